@@ -1,0 +1,90 @@
+//! The ray tree: is a segment blocked, and what does a ray meet first.
+//!
+//! An obvhs CWBVH over the scene's triangles. It serves rays only: clusters of light come from a tree of their own.
+
+use std::time::Duration;
+
+use glam::Vec3;
+use obvhs::{
+    BvhBuildParams,
+    cwbvh::{CwBvh, builder::build_cwbvh_from_tris},
+    ray::{Ray, RayHit},
+    rt_triangle::RtTriangle,
+    triangle::Triangle as RayTriangle,
+};
+
+use crate::scene::{Scene, TriangleId};
+
+/// Rays start and end this far from their ends, in frame units.
+/// Much smaller, and a ray meets the surface that it leaves; much larger, and thin gaps leak or close.
+/// At the rim of the frame (50 units) single precision resolves 4e-6.
+const RAY_OFFSET: f32 = 1e-4;
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// The triangle.
+    pub triangle: TriangleId,
+    /// Distance along the unit direction, in frame units.
+    pub distance: f32,
+}
+
+/// Answers occlusion and closest-hit questions about a scene.
+pub struct RayTree {
+    tree: CwBvh,
+    /// In the order of the tree's primitives.
+    triangles: Vec<RtTriangle>,
+    /// The scene's triangle of each primitive.
+    ids: Vec<u32>,
+}
+
+impl RayTree {
+    /// Build the tree over all triangles of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        let triangles: Vec<RayTriangle> = scene
+            .triangle_ids()
+            .map(|id| {
+                let [a, b, c] = scene.corners(id).map(Into::into);
+                RayTriangle { v0: a, v1: b, v2: c }
+            })
+            .collect();
+        let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default());
+        let ids = tree.primitive_indices.clone();
+        let ordered = ids.iter().map(|&id| RtTriangle::from(&triangles[id as usize])).collect();
+        Self { tree, triangles: ordered, ids }
+    }
+
+    /// Whether anything but the two triangles of its ends lies on the segment.
+    /// Naming the ends lets a segment start on its own surface however small that is.
+    pub fn occluded(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> bool {
+        let separation = to - from;
+        let length = separation.length();
+        if length <= 2.0 * RAY_OFFSET {
+            return false;
+        }
+        let ray = Ray::new(from.into(), (separation / length).into(), RAY_OFFSET, length - RAY_OFFSET);
+        let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
+        !self.tree.ray_traverse_miss(ray, |ray, primitive| {
+            let id = self.ids[primitive];
+            if id == first || id == second { f32::INFINITY } else { self.triangles[primitive].intersect(ray) }
+        })
+    }
+
+    /// The nearest triangle along a ray of unit direction, leaving out the one that it starts on.
+    pub fn closest(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Option<Hit> {
+        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        let start = from.map_or(u32::MAX, |id| id.0);
+        let mut hit = RayHit::none();
+        let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
+            if self.ids[primitive] == start { f32::INFINITY } else { self.triangles[primitive].intersect(ray) }
+        });
+        met.then(|| Hit { triangle: TriangleId(self.ids[hit.primitive_id as usize]), distance: hit.t })
+    }
+
+    /// Bytes that the tree holds.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.tree.nodes.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + 2 * size_of_val(self.ids.as_slice())
+    }
+}

@@ -1,0 +1,18 @@
+//! vecrad lights an OBJ scene by extended vector-based radiosity and shows the light while it is being computed.
+//!
+//! The method is that of Sun, Gong and Pan, "Extended Vector-Based Radiosity": a volume cluster is treated as its
+//! bounding box with six power vectors and six area vectors, links carry a vector irradiance, and each face takes its
+//! share by its own normal. The rooms of this library, each importing only from those before it:
+//!
+//! * [`scene`]: what is lit;
+//! * [`geometry`]: area vectors, exact polygon irradiance, sampling, rays;
+//! * [`hierarchy`]: clusters, patches, elements and their directional tables;
+//! * [`transport`]: node pairs, that is kernel, link, oracle and refinement;
+//! * [`solver`]: one progressive step after the other, as a value without threads, clocks or globals;
+//! * [`reference`]: the truth by other means, sharing no transport code;
+//! * [`metrics`]: error measures and reports;
+//! * [`export`]: files;
+//! * [`worker`]: the solver thread.
+
+pub mod geometry;
+pub mod scene;

@@ -1,0 +1,181 @@
+//! What is lit: triangles with reflectance, emission and sidedness, in a frame of known size.
+//!
+//! A [`Scene`] is made by [`SceneBuilder`], whatever it comes from (an OBJ file, a built-in scene, a test), so that
+//! every scene obeys the same promises: finite positions in the unit frame, no zero-area triangle, reflectance below
+//! the clamp, non-negative emission.
+//! Units: radiance in W·sr⁻¹·m⁻², lengths in units of the frame (see [`Frame`]).
+
+mod build;
+mod frame;
+mod sidedness;
+mod texture;
+mod warning;
+
+pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
+pub use frame::Frame;
+pub use texture::Texture;
+pub use warning::{Warning, WarningKind};
+
+use glam::{Vec2, Vec3};
+
+/// Index of a [`Material`] in [`Scene::materials`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MaterialId(pub u32);
+
+/// Index of a [`Triangle`] in [`Scene::triangles`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TriangleId(pub u32);
+
+/// Index of a [`Texture`] in [`Scene::textures`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TextureId(pub u32);
+
+impl MaterialId {
+    /// The position in [`Scene::materials`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl TriangleId {
+    /// The position in [`Scene::triangles`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl TextureId {
+    /// The position in [`Scene::textures`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// How a surface reflects and emits. Linear RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name in the MTL file, empty for the default material.
+    pub name: String,
+    /// Diffuse reflectance, 0 up to the clamp of [`SceneOptions::max_reflectance`]; multiplies the texture.
+    pub reflectance: Vec3,
+    /// Emitted radiance (`Ke`), W·sr⁻¹·m⁻², at least 0; multiplies the texture.
+    pub emission: Vec3,
+    /// `map_Kd`.
+    pub reflectance_texture: Option<TextureId>,
+    /// `map_Ke`.
+    pub emission_texture: Option<TextureId>,
+}
+
+impl Material {
+    /// A plain material without textures.
+    pub fn plain(name: &str, reflectance: Vec3, emission: Vec3) -> Self {
+        Self { name: name.to_owned(), reflectance, emission, reflectance_texture: None, emission_texture: None }
+    }
+}
+
+/// A triangle; its front is the side from which the corners run counter-clockwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// Indices into [`Scene::positions`].
+    pub corners: [u32; 3],
+    /// What it is made of.
+    pub material: MaterialId,
+    /// Whether the back reflects and emits as the front does. The back of a one-sided triangle is black but blocks.
+    pub two_sided: bool,
+}
+
+/// The quantities of a triangle that transport needs, with textures averaged over its area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Area times unit normal of the front, in square frame units; computed from the file's own digits.
+    pub area_vector: Vec3,
+    /// Mean reflectance, below the clamp.
+    pub reflectance: Vec3,
+    /// Mean emitted radiance of each side that emits.
+    pub emission: Vec3,
+}
+
+/// A named run of triangles (`o` or `g` in OBJ).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Name in the file, empty if it has none.
+    pub name: String,
+    /// First triangle.
+    pub start: TriangleId,
+    /// One past the last triangle.
+    pub end: TriangleId,
+}
+
+/// A scene ready to be lit.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What to call it in titles and reports: the file's stem or the built-in name.
+    pub name: String,
+    /// How positions relate to the file's coordinates.
+    pub frame: Frame,
+    /// Vertex positions in frame units, equal positions merged; all finite.
+    pub positions: Vec<Vec3>,
+    /// All triangles, none of zero area.
+    pub triangles: Vec<Triangle>,
+    /// One per triangle.
+    pub surfaces: Vec<Surface>,
+    /// Texture coordinates of the corners, one entry per triangle, or empty where no texture is used.
+    pub texcoords: Vec<[Vec2; 3]>,
+    /// Shading normals of the corners from the file, one entry per triangle, or empty where the file has none.
+    /// They steer where the display mesh is smooth; light is computed with geometric normals.
+    pub normals: Vec<[Vec3; 3]>,
+    /// All materials; at least one.
+    pub materials: Vec<Material>,
+    /// Decoded textures.
+    pub textures: Vec<Texture>,
+    /// Named runs of triangles, in order, covering all of them.
+    pub objects: Vec<Object>,
+    /// What was skipped, cured or clamped on the way in.
+    pub warnings: Vec<Warning>,
+}
+
+impl Scene {
+    /// The three corners of a triangle in frame units.
+    pub fn corners(&self, triangle: TriangleId) -> [Vec3; 3] {
+        self.triangles[triangle.index()].corners.map(|corner| self.positions[corner as usize])
+    }
+
+    /// The material of a triangle.
+    pub fn material(&self, triangle: TriangleId) -> &Material {
+        &self.materials[self.triangles[triangle.index()].material.index()]
+    }
+
+    /// Whether any triangle emits.
+    pub fn has_emitter(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.emission != Vec3::ZERO)
+    }
+
+    /// Every triangle in order.
+    pub fn triangle_ids(&self) -> impl Iterator<Item = TriangleId> + use<> {
+        (0..self.triangles.len() as u32).map(TriangleId)
+    }
+
+    /// Reflectance at a point of a triangle, texture looked up there. `barycentric` sums to 1.
+    pub fn reflectance_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
+        let material = self.material(triangle);
+        match (material.reflectance_texture, self.texcoords.get(triangle.index())) {
+            (Some(texture), Some(uv)) => {
+                let at = uv[0] * barycentric.x + uv[1] * barycentric.y + uv[2] * barycentric.z;
+                material.reflectance * self.textures[texture.index()].sample(at)
+            }
+            _ => material.reflectance,
+        }
+    }
+
+    /// Emitted radiance at a point of a triangle, texture looked up there. `barycentric` sums to 1.
+    pub fn emission_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
+        let material = self.material(triangle);
+        match (material.emission_texture, self.texcoords.get(triangle.index())) {
+            (Some(texture), Some(uv)) => {
+                let at = uv[0] * barycentric.x + uv[1] * barycentric.y + uv[2] * barycentric.z;
+                material.emission * self.textures[texture.index()].sample(at)
+            }
+            _ => material.emission,
+        }
+    }
+}
