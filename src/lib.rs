@@ -16,3 +16,4 @@
 
 pub mod geometry;
 pub mod scene;
+pub mod solver;

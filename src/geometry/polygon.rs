@@ -15,7 +15,11 @@ const CLIPPED_CORNERS: usize = 4;
 /// Its dot product with a unit normal whose horizon the triangle does not cross is the irradiance there.
 /// Zero where the point lies behind the triangle's front or in its plane.
 pub fn irradiance_vector(point: Vec3, corners: [Vec3; 3]) -> Vec3 {
-    if !sees_front(point, corners) { Vec3::ZERO } else { edge_sum(&corners.map(|corner| corner - point)) }
+    if !sees_front(point, corners) {
+        Vec3::ZERO
+    } else {
+        edge_sum(&corners.map(|corner| corner - point))
+    }
 }
 
 /// Irradiance at `point` with unit `normal` of a triangle of radiosity 1, clipped at the horizon; 0…1.
@@ -42,7 +46,11 @@ pub fn point_irradiance(point: Vec3, normal: Vec3, corners: [Vec3; 3]) -> f32 {
             count += 1;
         }
     }
-    if count < 3 { 0.0 } else { edge_sum(&clipped[..count]).dot(normal).clamp(0.0, 1.0) }
+    if count < 3 {
+        0.0
+    } else {
+        edge_sum(&clipped[..count]).dot(normal).clamp(0.0, 1.0)
+    }
 }
 
 /// Whether the point lies before the triangle's front.

@@ -45,13 +45,28 @@ impl RayTree {
             .triangle_ids()
             .map(|id| {
                 let [a, b, c] = scene.corners(id).map(Into::into);
-                RayTriangle { v0: a, v1: b, v2: c }
+                RayTriangle {
+                    v0: a,
+                    v1: b,
+                    v2: c,
+                }
             })
             .collect();
-        let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default());
+        let tree = build_cwbvh_from_tris(
+            &triangles,
+            BvhBuildParams::medium_build(),
+            &mut Duration::default(),
+        );
         let ids = tree.primitive_indices.clone();
-        let ordered = ids.iter().map(|&id| RtTriangle::from(&triangles[id as usize])).collect();
-        Self { tree, triangles: ordered, ids }
+        let ordered = ids
+            .iter()
+            .map(|&id| RtTriangle::from(&triangles[id as usize]))
+            .collect();
+        Self {
+            tree,
+            triangles: ordered,
+            ids,
+        }
     }
 
     /// Whether anything but the two triangles of its ends lies on the segment.
@@ -62,11 +77,20 @@ impl RayTree {
         if length <= 2.0 * RAY_OFFSET {
             return false;
         }
-        let ray = Ray::new(from.into(), (separation / length).into(), RAY_OFFSET, length - RAY_OFFSET);
+        let ray = Ray::new(
+            from.into(),
+            (separation / length).into(),
+            RAY_OFFSET,
+            length - RAY_OFFSET,
+        );
         let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
         !self.tree.ray_traverse_miss(ray, |ray, primitive| {
             let id = self.ids[primitive];
-            if id == first || id == second { f32::INFINITY } else { self.triangles[primitive].intersect(ray) }
+            if id == first || id == second {
+                f32::INFINITY
+            } else {
+                self.triangles[primitive].intersect(ray)
+            }
         })
     }
 
@@ -76,9 +100,16 @@ impl RayTree {
         let start = from.map_or(u32::MAX, |id| id.0);
         let mut hit = RayHit::none();
         let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
-            if self.ids[primitive] == start { f32::INFINITY } else { self.triangles[primitive].intersect(ray) }
+            if self.ids[primitive] == start {
+                f32::INFINITY
+            } else {
+                self.triangles[primitive].intersect(ray)
+            }
         });
-        met.then(|| Hit { triangle: TriangleId(self.ids[hit.primitive_id as usize]), distance: hit.t })
+        met.then(|| Hit {
+            triangle: TriangleId(self.ids[hit.primitive_id as usize]),
+            distance: hit.t,
+        })
     }
 
     /// Bytes that the tree holds.

@@ -12,15 +12,21 @@ pub struct Random {
 impl Random {
     /// The stream that belongs to a seed and to what is sampled.
     pub fn new(seed: u64, stream: u64) -> Self {
-        let mut random = Self { state: mix(seed ^ mix(stream.wrapping_add(0x9e37_79b9_7f4a_7c15))) };
+        let mut random = Self {
+            state: mix(seed ^ mix(stream.wrapping_add(0x9e37_79b9_7f4a_7c15))),
+        };
         random.next_u32();
         random
     }
 
     /// Uniform in all 32-bit numbers.
     pub fn next_u32(&mut self) -> u32 {
-        self.state = self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let word = ((self.state >> ((self.state >> 59) + 5)) ^ self.state).wrapping_mul(12_605_985_483_714_917_081);
+        self.state = self
+            .state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let word = ((self.state >> ((self.state >> 59) + 5)) ^ self.state)
+            .wrapping_mul(12_605_985_483_714_917_081);
         (word >> 43) as u32 ^ (word >> 11) as u32
     }
 

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{
-    Frame, Material, MaterialId, Object, Scene, Surface, Texture, Triangle, TriangleId, Warning, WarningKind,
+    Frame, Material, MaterialId, Object, Scene, Surface, Texture, Triangle, TriangleId, Warning,
+    WarningKind,
 };
 
 /// Which sides of a triangle reflect and emit.
@@ -33,7 +34,11 @@ pub struct SceneOptions {
 
 impl Default for SceneOptions {
     fn default() -> Self {
-        Self { sides: Sides::Auto, max_reflectance: 0.98, mtl_color_is_srgb: false }
+        Self {
+            sides: Sides::Auto,
+            max_reflectance: 0.98,
+            mtl_color_is_srgb: false,
+        }
     }
 }
 
@@ -114,7 +119,13 @@ impl SceneBuilder {
 
     /// Add a triangle without texture coordinates.
     pub fn push_triangle(&mut self, corners: [u32; 3], material: MaterialId) {
-        self.faces.push(Face { corners, texcoords: None, normals: None, material, line: 0 });
+        self.faces.push(Face {
+            corners,
+            texcoords: None,
+            normals: None,
+            material,
+            line: 0,
+        });
     }
 
     /// Check, clean, scale and finish.
@@ -125,11 +136,18 @@ impl SceneBuilder {
         const LIMIT: usize = i32::MAX as usize;
         let count = self.faces.len().max(self.positions.len());
         if count > LIMIT {
-            return Err(BuildError::TooLarge { count, limit: LIMIT });
+            return Err(BuildError::TooLarge {
+                count,
+                limit: LIMIT,
+            });
         }
         let dropped = self.drop_unusable_faces();
         if self.faces.is_empty() {
-            let detail = if dropped > 0 { format!(": all {dropped} were skipped") } else { String::new() };
+            let detail = if dropped > 0 {
+                format!(": all {dropped} were skipped")
+            } else {
+                String::new()
+            };
             return Err(BuildError::NoFaces { detail });
         }
         self.sanitise_materials(options);
@@ -165,7 +183,8 @@ impl SceneBuilder {
         if !scene.has_emitter() {
             scene.warnings.push(Warning {
                 kind: WarningKind::NoEmitter,
-                message: "nothing emits light, so the result is black; give a material Ke above 0".to_owned(),
+                message: "nothing emits light, so the result is black; give a material Ke above 0"
+                    .to_owned(),
                 count: 1,
                 place: None,
             });
@@ -197,7 +216,12 @@ impl SceneBuilder {
         for &(reason, count, line) in &skipped {
             let place = (line > 0).then(|| (self.source.file.clone(), line as usize));
             let message = format!("skipped a face: {reason}");
-            self.warnings.push(Warning { kind: WarningKind::FaceSkipped, message, count, place });
+            self.warnings.push(Warning {
+                kind: WarningKind::FaceSkipped,
+                message,
+                count,
+                place,
+            });
         }
         skipped.iter().map(|(_, count, _)| count).sum()
     }
@@ -205,25 +229,46 @@ impl SceneBuilder {
     /// Bring reflectance and emission into their ranges; give the scene a material if it has none.
     fn sanitise_materials(&mut self, options: &SceneOptions) {
         if self.materials.is_empty() {
-            self.materials.push(Material::plain("", Vec3::splat(0.5), Vec3::ZERO));
+            self.materials
+                .push(Material::plain("", Vec3::splat(0.5), Vec3::ZERO));
         }
         let max = options.max_reflectance.clamp(0.0, 1.0);
         let (mut clamped, mut cured) = (Vec::new(), Vec::new());
         for material in &mut self.materials {
-            let reflectance = material.reflectance.map(|x| if x.is_finite() { x.clamp(0.0, max) } else { 0.0 });
-            let emission = material.emission.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 });
+            let reflectance = material.reflectance.map(|x| {
+                if x.is_finite() {
+                    x.clamp(0.0, max)
+                } else {
+                    0.0
+                }
+            });
+            let emission = material
+                .emission
+                .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 });
             if material.reflectance.cmpgt(Vec3::splat(max)).any() {
                 clamped.push(material.name.clone());
             }
-            if emission != material.emission || reflectance.cmpne(material.reflectance.min(Vec3::splat(max))).any() {
+            if emission != material.emission
+                || reflectance
+                    .cmpne(material.reflectance.min(Vec3::splat(max)))
+                    .any()
+            {
                 cured.push(material.name.clone());
             }
             material.reflectance = reflectance;
             material.emission = emission;
         }
         for (names, what) in [
-            (clamped, format!("reflectance above {max} was clamped to it, since light must lose energy at every bounce")),
-            (cured, "reflectance or emission that was negative or not finite was set to 0".to_owned()),
+            (
+                clamped,
+                format!(
+                    "reflectance above {max} was clamped to it, since light must lose energy at every bounce"
+                ),
+            ),
+            (
+                cured,
+                "reflectance or emission that was negative or not finite was set to 0".to_owned(),
+            ),
         ] {
             if let Some(first) = names.first() {
                 self.warnings.push(Warning {
@@ -258,10 +303,12 @@ impl SceneBuilder {
             if *slot == u32::MAX {
                 // Adding 0 turns -0 into 0, so that both have the same bits.
                 let position = frame.from_world(self.positions[corner as usize]) + 0.0;
-                *slot = *merged.entry(position.to_array().map(f32::to_bits)).or_insert_with(|| {
-                    positions.push(position);
-                    positions.len() as u32 - 1
-                });
+                *slot = *merged
+                    .entry(position.to_array().map(f32::to_bits))
+                    .or_insert_with(|| {
+                        positions.push(position);
+                        positions.len() as u32 - 1
+                    });
             }
         }
         (positions, corner_of)
@@ -287,7 +334,11 @@ impl SceneBuilder {
 
 /// Why a face cannot be used, if it cannot.
 fn unusable(face: &Face, positions: &[DVec3], material_count: usize) -> Option<&'static str> {
-    if face.corners.iter().any(|&corner| corner as usize >= positions.len()) {
+    if face
+        .corners
+        .iter()
+        .any(|&corner| corner as usize >= positions.len())
+    {
         return Some("vertex index out of range");
     }
     if face.material.index() >= material_count {
@@ -297,16 +348,29 @@ fn unusable(face: &Face, positions: &[DVec3], material_count: usize) -> Option<&
     if !(a.is_finite() && b.is_finite() && c.is_finite()) {
         return Some("a corner is not a finite number");
     }
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
     let area = (b - a).cross(c - a).length();
     // Written so that a NaN from overflow counts as degenerate, too.
-    if area > DEGENERATE_AREA * longest && area.is_finite() { None } else { Some("no area") }
+    if area > DEGENERATE_AREA * longest && area.is_finite() {
+        None
+    } else {
+        Some("no area")
+    }
 }
 
 /// Corner values of all faces if any face has them, else nothing.
-fn corner_values<T: Copy + Default>(faces: &[Face], of: impl Fn(&Face) -> Option<[T; 3]>) -> Vec<[T; 3]> {
+fn corner_values<T: Copy + Default>(
+    faces: &[Face],
+    of: impl Fn(&Face) -> Option<[T; 3]>,
+) -> Vec<[T; 3]> {
     if faces.iter().any(|face| of(face).is_some()) {
-        faces.iter().map(|face| of(face).unwrap_or_default()).collect()
+        faces
+            .iter()
+            .map(|face| of(face).unwrap_or_default())
+            .collect()
     } else {
         Vec::new()
     }
@@ -315,5 +379,9 @@ fn corner_values<T: Copy + Default>(faces: &[Face], of: impl Fn(&Face) -> Option
 /// Runs of triangles from the first faces of objects.
 fn object_ranges(starts: &[(String, usize)], triangle_count: usize) -> Vec<Object> {
     let _ = starts;
-    vec![Object { name: String::new(), start: TriangleId(0), end: TriangleId(triangle_count as u32) }]
+    vec![Object {
+        name: String::new(),
+        start: TriangleId(0),
+        end: TriangleId(triangle_count as u32),
+    }]
 }

@@ -21,8 +21,15 @@ impl Frame {
     /// The frame that fits a box of world coordinates. A box without extent keeps its scale.
     pub fn fitting(min: DVec3, max: DVec3) -> Self {
         let extent = (max - min).max_element();
-        let scale = if extent > 0.0 && extent.is_finite() { Self::EXTENT / extent } else { 1.0 };
-        Self { centre: min + (max - min) * 0.5, scale }
+        let scale = if extent > 0.0 && extent.is_finite() {
+            Self::EXTENT / extent
+        } else {
+            1.0
+        };
+        Self {
+            centre: min + (max - min) * 0.5,
+            scale,
+        }
     }
 
     /// World to frame.

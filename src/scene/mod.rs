@@ -69,7 +69,13 @@ pub struct Material {
 impl Material {
     /// A plain material without textures.
     pub fn plain(name: &str, reflectance: Vec3, emission: Vec3) -> Self {
-        Self { name: name.to_owned(), reflectance, emission, reflectance_texture: None, emission_texture: None }
+        Self {
+            name: name.to_owned(),
+            reflectance,
+            emission,
+            reflectance_texture: None,
+            emission_texture: None,
+        }
     }
 }
 
@@ -137,7 +143,9 @@ pub struct Scene {
 impl Scene {
     /// The three corners of a triangle in frame units.
     pub fn corners(&self, triangle: TriangleId) -> [Vec3; 3] {
-        self.triangles[triangle.index()].corners.map(|corner| self.positions[corner as usize])
+        self.triangles[triangle.index()]
+            .corners
+            .map(|corner| self.positions[corner as usize])
     }
 
     /// The material of a triangle.
@@ -147,7 +155,9 @@ impl Scene {
 
     /// Whether any triangle emits.
     pub fn has_emitter(&self) -> bool {
-        self.surfaces.iter().any(|surface| surface.emission != Vec3::ZERO)
+        self.surfaces
+            .iter()
+            .any(|surface| surface.emission != Vec3::ZERO)
     }
 
     /// Every triangle in order.
@@ -158,7 +168,10 @@ impl Scene {
     /// Reflectance at a point of a triangle, texture looked up there. `barycentric` sums to 1.
     pub fn reflectance_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
         let material = self.material(triangle);
-        match (material.reflectance_texture, self.texcoords.get(triangle.index())) {
+        match (
+            material.reflectance_texture,
+            self.texcoords.get(triangle.index()),
+        ) {
             (Some(texture), Some(uv)) => {
                 let at = uv[0] * barycentric.x + uv[1] * barycentric.y + uv[2] * barycentric.z;
                 material.reflectance * self.textures[texture.index()].sample(at)
@@ -170,7 +183,10 @@ impl Scene {
     /// Emitted radiance at a point of a triangle, texture looked up there. `barycentric` sums to 1.
     pub fn emission_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
         let material = self.material(triangle);
-        match (material.emission_texture, self.texcoords.get(triangle.index())) {
+        match (
+            material.emission_texture,
+            self.texcoords.get(triangle.index()),
+        ) {
             (Some(texture), Some(uv)) => {
                 let at = uv[0] * barycentric.x + uv[1] * barycentric.y + uv[2] * barycentric.z;
                 material.emission * self.textures[texture.index()].sample(at)

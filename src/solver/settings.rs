@@ -1,0 +1,142 @@
+//! What to compute: every setting that changes the result, each default written once.
+
+use serde::{Deserialize, Serialize};
+
+/// How a cluster's directional power and area are represented.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Second-order spherical harmonics clamped between the octant sum and the six faces.
+    #[default]
+    Bounded,
+    /// Six power and six area vectors along the box normals (eqs 5–10 of the paper).
+    SixFace,
+    /// One vector per cluster (eq. 4; Willmott, Heckbert & Garland 1999).
+    Single,
+    /// The sum over all patches of the cluster (eq. 3; Smits 1994).
+    Exact,
+    /// A quarter of the area in every direction (Sillion 1995).
+    Isotropic,
+}
+
+/// How the error of a link is judged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Oracle {
+    /// Bounds of the transfer over both boxes.
+    #[default]
+    Interval,
+    /// Largest minus smallest transfer over p sample vectors (the paper's EstimateEnergy).
+    Samples,
+}
+
+/// How light that comes straight from emitters is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Direct {
+    /// Sampled where the emitters are few or small, linked where they are many.
+    #[default]
+    Auto,
+    /// Shadow rays from every vertex to every light.
+    Sampled,
+    /// Through links, as all other light (the paper's way).
+    Linked,
+}
+
+/// How the irradiance of several links on one cluster reaches its faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Push {
+    /// Kept in the method's own representation and pushed once per sweep (the paper's second way).
+    #[default]
+    Combined,
+    /// Every link's vector pushed to every face at once (the paper's first way); slow on large clusters.
+    AtOnce,
+}
+
+/// Settings of a solve. The same settings, scene and seed give the same bits on any number of threads.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SolveSettings {
+    /// Directional representation of clusters.
+    pub method: Method,
+    /// How links are judged.
+    pub oracle: Oracle,
+    /// How direct light is computed.
+    pub direct: Direct,
+    /// How irradiance is pushed down.
+    pub push: Push,
+    /// Link threshold at the last step: error of one link's irradiance, weighted by the square root of the receiver's
+    /// share of the area, relative to the scene's mean. Above 0 (0 refines until another limit stops it).
+    /// Lower is better and slower: links grow about as 1/ε. Start at 0.01.
+    pub epsilon: f32,
+    /// Sample pairs p of a link in the `samples` oracle; 1…4096. Cost per link grows with p.
+    pub samples: u32,
+    /// Shadow rays per vertex towards the lights; 1…1024. Noise in penumbrae falls as one over its root or better.
+    pub shadow_samples: u32,
+    /// Elements are not divided below this area, as a fraction of the scene's area; at least 0.
+    pub min_area: f32,
+    /// Tolerance of the mesh: elements are divided where linear interpolation of light errs by more, relative to the
+    /// scene's mean and weighted as `epsilon` is; above 0.
+    pub mesh_tolerance: f32,
+    /// Edges with a larger angle between their faces are creases, in degrees; 0…180.
+    pub crease_degrees: f32,
+    /// Steps at most; at least 1. The threshold falls geometrically to `epsilon` over about this many.
+    pub max_steps: u32,
+    /// Sweeps stop when the change falls below this fraction of the total power; above 0.
+    pub tolerance: f32,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+impl SolveSettings {
+    /// Seconds to a first impression.
+    pub const fn draft() -> Self {
+        Self {
+            epsilon: 0.08,
+            shadow_samples: 8,
+            mesh_tolerance: 0.04,
+            min_area: 1e-5,
+            max_steps: 3,
+            ..Self::normal()
+        }
+    }
+
+    /// The default: about 5 % error.
+    pub const fn normal() -> Self {
+        Self {
+            method: Method::Bounded,
+            oracle: Oracle::Interval,
+            direct: Direct::Auto,
+            push: Push::Combined,
+            epsilon: 0.02,
+            samples: 4,
+            shadow_samples: 16,
+            min_area: 1e-6,
+            mesh_tolerance: 0.01,
+            crease_degrees: 30.0,
+            max_steps: 5,
+            tolerance: 1e-3,
+            seed: 1,
+        }
+    }
+
+    /// For the bake that is kept: about 2 % error.
+    pub const fn finest() -> Self {
+        Self {
+            epsilon: 0.005,
+            shadow_samples: 64,
+            mesh_tolerance: 0.002,
+            min_area: 1e-7,
+            max_steps: 8,
+            tolerance: 1e-4,
+            ..Self::normal()
+        }
+    }
+}
+
+impl Default for SolveSettings {
+    fn default() -> Self {
+        Self::normal()
+    }
+}

@@ -1,0 +1,127 @@
+//! What a solve shows of itself: a display mesh with light at its vertices, the cluster tree, and one report per step.
+//!
+//! Parts that did not change between two snapshots are shared, so that a reader can tell by pointer what to upload.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use serde::Serialize;
+
+/// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DisplayMesh {
+    /// Vertex positions in frame units.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, towards the lit side.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, or empty where the scene has no textures.
+    pub texcoords: Vec<glam::Vec2>,
+    /// Reflectance at the vertex, mean of its elements (textures averaged).
+    pub reflectance: Vec<Vec3>,
+    /// Emitted radiance at the vertex.
+    pub emission: Vec<Vec3>,
+    /// Triangles, counter-clockwise from the lit side.
+    pub indices: Vec<[u32; 3]>,
+    /// The scene's triangle under each display triangle.
+    pub triangle_of: Vec<u32>,
+    /// Whether each display triangle is the back of a two-sided one.
+    pub is_back: Vec<bool>,
+    /// The element under each display triangle, as a node of the hierarchy.
+    pub element_of: Vec<u32>,
+}
+
+/// Light at the vertices of a [`DisplayMesh`], linear RGB; all finite and not negative.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VertexLight {
+    /// Total irradiance, W/m².
+    pub irradiance: Vec<Vec3>,
+    /// The part that comes straight from emitters, W/m².
+    pub direct: Vec<Vec3>,
+    /// Estimated error of the irradiance (luminance), W/m².
+    pub uncertainty: Vec<f32>,
+}
+
+/// One node of the tree, for display.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClusterBox {
+    /// Lower corner in frame units.
+    pub min: Vec3,
+    /// Upper corner in frame units.
+    pub max: Vec3,
+    /// Depth; the root has 0.
+    pub level: u32,
+    /// Index of the parent in the list, `u32::MAX` for the root.
+    pub parent: u32,
+    /// Number of patches below it.
+    pub patch_count: u32,
+    /// Sum of the patch areas, square frame units.
+    pub area: f32,
+    /// Luminance of the power that leaves it, frame units.
+    pub power: f32,
+    /// 1 − |Σ S| / Σ |S| : 0 when all normals agree, 1 when they cancel.
+    pub direction_spread: f32,
+    /// Links that this node receives over.
+    pub link_count: u32,
+    /// Sum of the estimated errors of its links (luminance irradiance).
+    pub error: f32,
+    /// Luminance of the power along the box normals, +x −x +y −y +z −z.
+    pub face_power: [f32; 6],
+}
+
+/// The state after a step.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    /// Number of the step, from 1; 0 before any light.
+    pub step: u32,
+    /// The mesh; the same `Arc` as before where elements did not change.
+    pub mesh: Arc<DisplayMesh>,
+    /// Light at its vertices.
+    pub light: Arc<VertexLight>,
+    /// The cluster tree, children after parents; patches and elements left out.
+    pub clusters: Arc<Vec<ClusterBox>>,
+}
+
+/// Figures of one step. Quantities in world units.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Number of the step, from 1.
+    pub step: u32,
+    /// Seconds since the scene was read; filled in by the caller that owns a clock.
+    pub elapsed_s: f64,
+    /// Seconds spent in solver steps; filled in by the caller that owns a clock.
+    pub solve_s: f64,
+    /// Link threshold of this step.
+    pub epsilon: f32,
+    /// Links in use.
+    pub links: u64,
+    /// Clusters, patches and elements.
+    pub nodes: u64,
+    /// Leaves that receive light.
+    pub elements: u64,
+    /// Vertices of the display mesh.
+    pub vertices: u64,
+    /// Rays shot so far.
+    pub shadow_rays: u64,
+    /// Bytes held by the solver.
+    pub memory_bytes: u64,
+    /// Sweeps of the iteration in this step.
+    pub sweeps: u32,
+    /// Change of the last sweep relative to the total power.
+    pub residual: f32,
+    /// Largest ratio of successive changes; below 1 while the iteration contracts.
+    pub contraction: f32,
+    /// Power arriving over links and samples, relative to the power that left for it; 1 in a closed scene.
+    pub energy_balance: f64,
+    /// Smallest sum of form factors over the elements; 1 in a closed scene.
+    pub row_sum_min: f32,
+    /// Area-weighted mean of the sums of form factors.
+    pub row_sum_mean: f32,
+    /// Largest sum of form factors.
+    pub row_sum_max: f32,
+    /// Sum of the link error estimates, root mean square over the area, relative to the mean irradiance.
+    pub estimated_error: f32,
+    /// Whether a further step can change anything.
+    pub is_final: bool,
+    /// What the solver had to do to stay stable, one sentence each.
+    pub notes: Vec<String>,
+}
