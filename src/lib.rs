@@ -15,5 +15,6 @@
 //! * [`worker`]: the solver thread.
 
 pub mod geometry;
+pub mod hierarchy;
 pub mod scene;
 pub mod solver;
