@@ -18,3 +18,4 @@ pub mod geometry;
 pub mod hierarchy;
 pub mod scene;
 pub mod solver;
+pub mod transport;

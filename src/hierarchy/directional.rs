@@ -123,6 +123,15 @@ impl<Q: Quantity> Moments<Q> {
         }
     }
 
+    /// Add light that comes alike from everywhere and gives each face the irradiance `value`, or power or area that
+    /// shows alike everywhere.
+    pub fn add_isotropic(&mut self, value: Q) {
+        for axis in 0..3 {
+            self.absolute[axis] += value * 2.0;
+            self.quadratic[axis] += value * (4.0 / 3.0);
+        }
+    }
+
     /// Add all of another set.
     pub fn merge(&mut self, other: &Self) {
         for (a, b) in self.linear.iter_mut().zip(other.linear) {

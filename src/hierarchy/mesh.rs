@@ -51,6 +51,8 @@ impl Element {
 pub struct Vertex {
     /// Index into [`Mesh::points`].
     pub point: u32,
+    /// The vertices between which this one was made, or `None` for a corner of the scene.
+    pub ends: Option<[u32; 2]>,
 }
 
 /// Elements with their points and vertices.
@@ -255,7 +257,10 @@ impl Mesh {
             self.points.len() as u32 - 1
         });
         let vertex = self.vertices.len() as u32;
-        self.vertices.push(Vertex { point });
+        self.vertices.push(Vertex {
+            point,
+            ends: Some([a, b]),
+        });
         self.vertex_between.insert(key, vertex);
         vertex
     }
@@ -384,6 +389,7 @@ fn share_vertices(
                     *slot = vertices.len() as u32;
                     vertices.push(Vertex {
                         point: points[side],
+                        ends: None,
                     });
                 }
                 *slot
