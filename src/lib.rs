@@ -17,3 +17,4 @@
 pub mod geometry;
 pub mod scene;
 pub mod solver;
+pub mod worker;
