@@ -19,3 +19,4 @@ pub mod hierarchy;
 pub mod scene;
 pub mod solver;
 pub mod transport;
+pub mod worker;

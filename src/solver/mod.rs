@@ -144,6 +144,12 @@ impl Solver {
         self.snapshot.clone()
     }
 
+    /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
+    /// threshold, the tolerances, the smallest area and the number of steps.
+    pub fn change_settings(&mut self, settings: SolveSettings) {
+        self.settings = settings;
+    }
+
     /// The scene being lit.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene

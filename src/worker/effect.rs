@@ -1,0 +1,89 @@
+//! What a change of settings does to a run.
+
+use crate::solver::{Oracle, SolveSettings};
+
+/// What a change of settings does to a run, from least to most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Effect {
+    /// The settings are the same.
+    Nothing,
+    /// What is computed stays as good as asked for; a run goes on, a finished one stays finished.
+    Continues,
+    /// What is computed stays, and a finished run takes up its work again.
+    Refines,
+    /// What is computed does not fit the settings: it begins anew.
+    Restarts,
+}
+
+/// What changing `old` to `new` does. Field by field:
+///
+/// * `method`, `oracle`, `direct`, `push`, `shadow_samples`, `crease_degrees`, `seed`: restart, since links, samples or
+///   vertices that exist were made by the old value;
+/// * `samples`: restarts where the oracle uses it, else continues;
+/// * `epsilon`, `min_area`, `mesh_tolerance`, `tolerance`: lower refines, higher continues;
+/// * `max_steps`: more refines, fewer continues.
+pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
+    if old == new {
+        return Effect::Nothing;
+    }
+    let restarts = old.method != new.method
+        || old.oracle != new.oracle
+        || old.direct != new.direct
+        || old.push != new.push
+        || old.shadow_samples != new.shadow_samples
+        || old.crease_degrees != new.crease_degrees
+        || old.seed != new.seed
+        || (old.samples != new.samples && new.oracle == Oracle::Samples);
+    let refines = new.epsilon < old.epsilon
+        || new.min_area < old.min_area
+        || new.mesh_tolerance < old.mesh_tolerance
+        || new.tolerance < old.tolerance
+        || new.max_steps > old.max_steps;
+    if restarts {
+        Effect::Restarts
+    } else if refines {
+        Effect::Refines
+    } else {
+        Effect::Continues
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solver::Method;
+
+    fn effect(change: impl Fn(&mut SolveSettings)) -> Effect {
+        let old = SolveSettings::normal();
+        let mut new = old.clone();
+        change(&mut new);
+        effect_of_change(&old, &new)
+    }
+
+    #[test]
+    fn each_field_has_the_documented_effect() {
+        assert_eq!(effect(|_| {}), Effect::Nothing);
+        assert_eq!(effect(|s| s.method = Method::SixFace), Effect::Restarts);
+        assert_eq!(effect(|s| s.seed += 1), Effect::Restarts);
+        assert_eq!(effect(|s| s.crease_degrees = 60.0), Effect::Restarts);
+        assert_eq!(effect(|s| s.samples = 9), Effect::Continues);
+        assert_eq!(effect(|s| s.epsilon *= 0.5), Effect::Refines);
+        assert_eq!(effect(|s| s.epsilon *= 2.0), Effect::Continues);
+        assert_eq!(effect(|s| s.max_steps += 1), Effect::Refines);
+        assert_eq!(effect(|s| s.max_steps -= 1), Effect::Continues);
+    }
+
+    #[test]
+    fn the_strongest_effect_of_several_wins() {
+        let both = effect(|s| {
+            s.epsilon *= 2.0;
+            s.tolerance *= 0.1;
+        });
+        assert_eq!(both, Effect::Refines);
+        let all = effect(|s| {
+            s.epsilon *= 0.5;
+            s.seed = 7;
+        });
+        assert_eq!(all, Effect::Restarts);
+    }
+}

@@ -1,0 +1,130 @@
+//! What goes in and out of the worker: commands, events, options of a run.
+
+use std::{sync::Arc, time::Duration};
+
+use serde::Serialize;
+
+use super::{Effect, controller::Returned};
+use crate::{
+    scene::Scene,
+    solver::{SolveSettings, StepReport},
+};
+
+/// Which run something belongs to; each start, reset and restart is a new one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Generation(u64);
+
+impl Generation {
+    /// The run after this one.
+    pub(super) fn next(self) -> Self {
+        Self(self.0 + 1)
+    }
+}
+
+/// How to run, apart from what to compute: nothing here changes a finished result.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunOptions {
+    /// Solver threads; 0 takes one for each core.
+    pub threads: usize,
+    /// Time from the start or the last continue after which the run stops.
+    pub time_limit: Option<Duration>,
+    /// Bytes that the solver may hold.
+    pub memory_limit: Option<u64>,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// The threshold asked for is reached and light has settled.
+    Converged,
+    /// The steps asked for are used up before the threshold is reached.
+    StepLimit,
+    /// The time limit has passed.
+    TimeLimit,
+    /// The memory limit is reached.
+    MemoryLimit,
+    /// Someone asked for it.
+    Requested,
+}
+
+impl StopReason {
+    /// Whether a limit cut the solve short.
+    pub fn is_limit(self) -> bool {
+        matches!(self, Self::StepLimit | Self::TimeLimit | Self::MemoryLimit)
+    }
+
+    /// Whether there is more to do under the same settings.
+    pub fn can_continue(self) -> bool {
+        matches!(self, Self::TimeLimit | Self::MemoryLimit | Self::Requested)
+    }
+}
+
+/// What the worker announces.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// A run begins; its solver is being prepared.
+    Started,
+    /// The solver is ready; the unlit mesh is in the slot.
+    Prepared {
+        /// Seconds that preparing took.
+        seconds: f64,
+    },
+    /// A step is done; its light is in the slot.
+    Stepped(StepReport),
+    /// The run rests until it is continued.
+    Paused,
+    /// The run goes on from where it stood.
+    Continued,
+    /// The run ended; the result is in the slot.
+    Finished(StopReason),
+    /// The solver panicked with this message; the run is over, the worker is not.
+    Failed(String),
+}
+
+/// What the owner asks of the worker.
+pub(super) enum Command {
+    /// Light a scene from the beginning.
+    Start {
+        /// The new run.
+        generation: Generation,
+        /// What to light.
+        scene: Arc<Scene>,
+        /// What to compute.
+        settings: SolveSettings,
+        /// How to run.
+        options: RunOptions,
+    },
+    /// Light the same scene from the beginning.
+    Restart {
+        /// The new run.
+        generation: Generation,
+        /// What to compute.
+        settings: SolveSettings,
+    },
+    /// Interrupt and rest.
+    Pause,
+    /// Go on.
+    Continue,
+    /// Interrupt and end.
+    Stop,
+    /// Other settings that the run can take over.
+    Settings {
+        /// What to compute from the next step on.
+        settings: SolveSettings,
+        /// What the change does.
+        effect: Effect,
+    },
+    /// Other limits.
+    Options(RunOptions),
+    /// End the thread.
+    Shutdown,
+}
+
+/// What the worker thread waits for.
+pub(super) enum Message {
+    /// The owner asks.
+    Command(Command),
+    /// The pool gives the solve back.
+    Returned(Returned),
+}

@@ -1,0 +1,200 @@
+//! The solver thread: commands in, small events out, and a latest-wins slot for the large snapshot.
+//!
+//! [`WorkerHandle`] owns a named thread that only waits, so that every command is answered at once. It hands the solve
+//! back and forth between itself and a pool of solver threads, one step at a time; dropping the handle cancels the step
+//! under way and joins. Every run has a [`Generation`]; the handle shows nothing of an older one.
+//! The window and the headless commands drain the same handle; neither needs to know how a step is made.
+
+mod controller;
+mod effect;
+mod message;
+mod slot;
+mod stepper;
+
+use std::{
+    io,
+    sync::{
+        Arc,
+        mpsc::{self, Receiver, Sender},
+    },
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
+};
+
+pub use effect::{Effect, effect_of_change};
+pub use message::{Event, Generation, RunOptions, StopReason};
+pub use slot::Slot;
+pub use stepper::{Job, MakeStepper, Stepper};
+
+use crate::{
+    scene::Scene,
+    solver::{Snapshot, SolveSettings, Solver},
+};
+use controller::{Controller, Outbox};
+use message::{Command, Message};
+
+/// Called from the worker whenever there is something new to see, such as a request to repaint.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// The owner's end of the worker. Dropping it cancels the step under way and joins the thread.
+pub struct WorkerHandle {
+    inbox: Sender<Message>,
+    events: Receiver<(Generation, Event)>,
+    slot: Arc<Slot<Snapshot>>,
+    generation: Generation,
+    settings: SolveSettings,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl WorkerHandle {
+    /// A worker without a run, which lights scenes with the [`Solver`].
+    ///
+    /// # Errors
+    /// When the system refuses a thread.
+    pub fn spawn(wake: Wake) -> io::Result<Self> {
+        Self::with_steppers(
+            wake,
+            Arc::new(|job: Job| {
+                Box::new(Solver::new(job.scene, job.settings, job.memory_limit)) as _
+            }),
+        )
+    }
+
+    /// A worker that steps whatever `make` returns.
+    ///
+    /// # Errors
+    /// When the system refuses a thread.
+    pub fn with_steppers(wake: Wake, make: MakeStepper) -> io::Result<Self> {
+        let (inbox, messages) = mpsc::channel();
+        let (events_in, events) = mpsc::channel();
+        let slot = Arc::new(Slot::default());
+        let outbox = Outbox::new(events_in, slot.clone(), wake);
+        let controller = Controller::new(messages, inbox.clone(), outbox, make);
+        let thread = thread::Builder::new()
+            .name("worker".to_owned())
+            .spawn(move || controller.run())?;
+        Ok(Self {
+            inbox,
+            events,
+            slot,
+            generation: Generation::default(),
+            settings: SolveSettings::default(),
+            thread: Some(thread),
+        })
+    }
+
+    /// Light a scene from the beginning, instead of what ran before. Nothing older is shown from here on.
+    pub fn start(
+        &mut self,
+        scene: Arc<Scene>,
+        settings: SolveSettings,
+        options: RunOptions,
+    ) -> Generation {
+        self.generation = self.generation.next();
+        self.settings = settings.clone();
+        self.send(Command::Start {
+            generation: self.generation,
+            scene,
+            settings,
+            options,
+        });
+        self.generation
+    }
+
+    /// Interrupt the step under way and wait. [`Event::Paused`] says when it rests.
+    pub fn pause(&self) {
+        self.send(Command::Pause);
+    }
+
+    /// Go on after a pause, a stop, or a limit of time or memory, from where it stands; each grants the time limit anew.
+    /// Without effect on a solve that came to its end: that takes other settings.
+    pub fn resume(&self) {
+        self.send(Command::Continue);
+    }
+
+    /// End the run and keep what it has. [`Event::Finished`] says when.
+    pub fn stop(&self) {
+        self.send(Command::Stop);
+    }
+
+    /// Light the same scene from the beginning, with the settings in force.
+    pub fn reset(&mut self) -> Generation {
+        self.generation = self.generation.next();
+        self.send(Command::Restart {
+            generation: self.generation,
+            settings: self.settings.clone(),
+        });
+        self.generation
+    }
+
+    /// Put other settings in force and say what that does to the run.
+    pub fn change_settings(&mut self, settings: SolveSettings) -> Effect {
+        let effect = effect_of_change(&self.settings, &settings);
+        self.settings = settings.clone();
+        match effect {
+            Effect::Nothing => {}
+            Effect::Continues | Effect::Refines => {
+                self.send(Command::Settings { settings, effect });
+            }
+            Effect::Restarts => {
+                self.reset();
+            }
+        }
+        effect
+    }
+
+    /// Put other limits or another number of threads in force, from the next step on.
+    pub fn change_options(&self, options: RunOptions) {
+        self.send(Command::Options(options));
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &SolveSettings {
+        &self.settings
+    }
+
+    /// The present run.
+    pub fn generation(&self) -> Generation {
+        self.generation
+    }
+
+    /// All events of the present run that have not been read. Never waits.
+    pub fn events(&self) -> impl Iterator<Item = Event> + '_ {
+        self.events
+            .try_iter()
+            .filter(|(generation, _)| *generation == self.generation)
+            .map(|(_, event)| event)
+    }
+
+    /// The next event of the present run, or nothing after `timeout`.
+    pub fn next_event(&self, timeout: Duration) -> Option<Event> {
+        let deadline = Instant::now() + timeout;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let (generation, event) = self.events.recv_timeout(left).ok()?;
+            if generation == self.generation {
+                return Some(event);
+            }
+        }
+    }
+
+    /// The newest snapshot of the present run. The same `Arc` as before where there is nothing newer.
+    pub fn latest(&self) -> Option<Arc<Snapshot>> {
+        self.slot.latest(self.generation)
+    }
+
+    fn send(&self, command: Command) {
+        // The worker ends only when this handle is dropped, so there is someone to hear.
+        let _ = self.inbox.send(Message::Command(command));
+    }
+}
+
+impl Drop for WorkerHandle {
+    fn drop(&mut self) {
+        self.send(Command::Shutdown);
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread has been printed; a second one here would hide it.
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! What the worker can run: the solver, or a stand-in for it.
+
+use std::sync::Arc;
+
+use crate::{
+    scene::Scene,
+    solver::{Cancel, Snapshot, SolveSettings, Solver, StepReport},
+};
+
+/// A solve that advances step by step.
+pub trait Stepper: Send {
+    /// One step, or `None` when cancelled on the way.
+    fn step(&mut self, cancel: &Cancel) -> Option<StepReport>;
+
+    /// The state as it stands.
+    fn snapshot(&self) -> Snapshot;
+
+    /// Go on under settings whose change does not restart (see [`super::effect_of_change`]).
+    fn change_settings(&mut self, settings: SolveSettings);
+}
+
+/// What a stepper is made from.
+pub struct Job {
+    /// What to light.
+    pub scene: Arc<Scene>,
+    /// What to compute.
+    pub settings: SolveSettings,
+    /// Bytes that it may hold.
+    pub memory_limit: Option<u64>,
+}
+
+/// Prepares a solve; called on a solver thread.
+pub type MakeStepper = Arc<dyn Fn(Job) -> Box<dyn Stepper> + Send + Sync>;
+
+impl Stepper for Solver {
+    fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        Self::step(self, cancel)
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        Self::snapshot(self)
+    }
+
+    fn change_settings(&mut self, settings: SolveSettings) {
+        Self::change_settings(self, settings);
+    }
+}
