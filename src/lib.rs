@@ -15,5 +15,7 @@
 //! * [`worker`]: the solver thread.
 
 pub mod geometry;
+pub mod metrics;
+pub mod reference;
 pub mod scene;
 pub mod solver;
