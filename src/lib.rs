@@ -16,6 +16,8 @@
 
 pub mod geometry;
 pub mod hierarchy;
+pub mod metrics;
+pub mod reference;
 pub mod scene;
 pub mod solver;
 pub mod transport;
