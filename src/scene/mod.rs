@@ -6,15 +6,18 @@
 //! Units: radiance in W·sr⁻¹·m⁻², lengths in units of the frame (see [`Frame`]).
 
 mod build;
+pub mod builtin;
 mod frame;
 mod sidedness;
 mod texture;
 mod warning;
+mod write;
 
 pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use frame::Frame;
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
+pub use write::{write_builtin, write_obj};
 
 use glam::{Vec2, Vec3};
 
