@@ -119,7 +119,7 @@ fn nothing_escapes_from_a_closed_room() {
 
 #[test]
 fn one_sided_backs_are_black_but_block() {
-    // A lamp shines down; a one-sided sheet that shows its back to the lamp shadows the floor and lights nothing.
+    // A lamp shines down; a one-sided sheet that shows its back to the lamp shadows the floor.
     let mut plates = Plates::default();
     let black = plates.material(0.0, 0.0);
     let lamp = plates.material(0.0, 1.0);
@@ -135,8 +135,7 @@ fn one_sided_backs_are_black_but_block() {
         .iter()
         .filter(|point| point.triangle.index() < 2)
     {
-        // The sheet's own front covers most of the sky: its form factor from the floor is at least that from a
-        // corner, 4/π·… below 1, so the irradiance lies between half and all of π.
+        // The sheet's front covers most of the floor's sky: between half and all of π.
         assert!(
             point.irradiance.x > 0.5 * PI && point.irradiance.x < 1.05 * PI,
             "{point:?}"
