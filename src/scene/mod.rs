@@ -7,14 +7,21 @@
 
 mod build;
 pub mod builtin;
+mod clean;
 mod frame;
+mod lines;
+mod locate;
+mod mtl;
+mod obj;
 mod sidedness;
 mod texture;
+mod triangulate;
 mod warning;
 mod write;
 
 pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use frame::Frame;
+pub use obj::{ReadError, read_obj};
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
 pub use write::{write_builtin, write_obj};
