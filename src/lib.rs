@@ -15,6 +15,10 @@
 //! * [`worker`]: the solver thread.
 
 pub mod geometry;
+pub mod hierarchy;
+pub mod metrics;
+pub mod reference;
 pub mod scene;
 pub mod solver;
+pub mod transport;
 pub mod worker;
