@@ -12,8 +12,11 @@
 //! * [`reference`]: the truth by other means, sharing no transport code;
 //! * [`metrics`]: error measures and reports;
 //! * [`export`]: files;
-//! * [`worker`]: the solver thread.
+//! * [`worker`]: the solver thread;
+//! * [`cli`]: flags to settings, headless commands.
 
+pub mod cli;
+pub mod export;
 pub mod geometry;
 pub mod hierarchy;
 pub mod metrics;
