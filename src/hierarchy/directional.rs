@@ -14,7 +14,7 @@
 //! The same moments hold light that arrives: with `S_j` replaced by the vector irradiances (eq. 14) `f(n)` is the
 //! irradiance of a face of normal n (eq. 15), for all links at once.
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 /// How the moments are read. The method of the settings, without `exact`, which does not read moments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub enum Reading {
     Isotropic,
 }
 
-/// What one number of a moment is: a scalar for area, RGB for power.
+/// What one number of a moment is: a scalar, or RGB with a fourth channel (see `Tables`).
 pub trait Quantity:
     Copy
     + Default
@@ -46,6 +46,8 @@ pub trait Quantity:
     fn lower_of(self, other: Self) -> Self;
     /// Component-wise larger.
     fn upper_of(self, other: Self) -> Self;
+    /// Component-wise `1 / (1/x + 1/limit)`: about x while it is small, never above the limit. Both not negative.
+    fn saturated(self, limit: Self) -> Self;
 }
 
 impl Quantity for f32 {
@@ -61,21 +63,26 @@ impl Quantity for f32 {
     fn upper_of(self, other: Self) -> Self {
         self.max(other)
     }
+    fn saturated(self, limit: Self) -> Self {
+        self * limit / (self + limit).max(f32::MIN_POSITIVE)
+    }
 }
 
-impl Quantity for Vec3A {
+impl Quantity for Vec4 {
     fn magnitude(self) -> Self {
         self.abs()
     }
     fn geometric_mean(self, other: Self) -> Self {
-        let product = (self * other).max(Self::ZERO);
-        Self::new(product.x.sqrt(), product.y.sqrt(), product.z.sqrt())
+        (self * other).max(Self::ZERO).sqrt()
     }
     fn lower_of(self, other: Self) -> Self {
         self.min(other)
     }
     fn upper_of(self, other: Self) -> Self {
         self.max(other)
+    }
+    fn saturated(self, limit: Self) -> Self {
+        self * limit / (self + limit).max(Self::splat(f32::MIN_POSITIVE))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
 //! Elements are divided where linear interpolation between their corners would miss it.
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 use super::{
     Cancel,
@@ -70,11 +70,11 @@ impl DirectField {
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid.
-    pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec3A {
+    pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
         let known = |vertex: u32| {
             self.vertices
                 .get(vertex as usize)
-                .map_or(Vec3A::ZERO, |light| light.irradiance)
+                .map_or(Vec4::ZERO, |light| light.irradiance)
         };
         let [a, b, c] = hierarchy.mesh.elements[element].vertices.map(known);
         let corners = a + b + c;
@@ -158,7 +158,7 @@ impl DirectField {
         luminance(
             (sum / hierarchy.area.max(f64::MIN_POSITIVE))
                 .as_vec3()
-                .into(),
+                .extend(0.0),
         )
     }
 

@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::{
@@ -29,7 +29,7 @@ struct Emitter {
     normal: Vec3,
     area: f32,
     triangle: TriangleId,
-    radiosity: Vec3A,
+    radiosity: Vec4,
 }
 
 /// Where direct light is wanted.
@@ -47,7 +47,7 @@ pub(super) struct Receiver {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DirectLight {
     /// Irradiance.
-    pub irradiance: Vec3A,
+    pub irradiance: Vec4,
     /// Rays shot.
     pub ray_count: u32,
     /// Standard error of the luminance.
@@ -70,7 +70,7 @@ impl Lights {
                 normal: patch.normal,
                 area: patch.area,
                 triangle: patch.triangle,
-                radiosity: Vec3A::from(patch.emission * PI),
+                radiosity: (patch.emission * PI).extend(0.0),
             }
         });
         Self {
@@ -112,12 +112,12 @@ impl Lights {
         random: &mut Random,
         sums: &mut Vec<f32>,
     ) -> DirectLight {
-        let mut exact = Vec3A::ZERO;
+        let mut exact = Vec4::ZERO;
         let mut total = 0.0;
         sums.clear();
         for emitter in &self.emitters {
             let arrives = if emitter.triangle == receiver.triangle {
-                Vec3A::ZERO
+                Vec4::ZERO
             } else {
                 emitter.radiosity
                     * point_irradiance(receiver.point, receiver.normal, emitter.corners)
@@ -216,8 +216,8 @@ impl Lights {
 /// Weights of shadow rays by outcome.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
-    sent: Vec3A,
-    arrived: Vec3A,
+    sent: Vec4,
+    arrived: Vec4,
     weight: f32,
     visible_weight: f32,
     shot: u32,
@@ -225,7 +225,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn count(&mut self, weight: f32, color: Vec3A, is_visible: bool) {
+    fn count(&mut self, weight: f32, color: Vec4, is_visible: bool) {
         self.sent += color * weight;
         self.weight += weight;
         self.shot += 1;
@@ -242,7 +242,7 @@ impl Tally {
     }
 
     /// Unoccluded fraction per channel.
-    fn fraction(&self) -> Vec3A {
+    fn fraction(&self) -> Vec4 {
         let ratio = |arrived: f32, sent: f32| {
             if sent > 0.0 {
                 (arrived / sent).clamp(0.0, 1.0)
@@ -250,10 +250,11 @@ impl Tally {
                 0.0
             }
         };
-        Vec3A::new(
+        Vec4::new(
             ratio(self.arrived.x, self.sent.x),
             ratio(self.arrived.y, self.sent.y),
             ratio(self.arrived.z, self.sent.z),
+            0.0,
         )
     }
 

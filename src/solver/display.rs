@@ -153,9 +153,8 @@ impl Solver {
     fn cluster_box(&self, index: usize, cluster: &Cluster, level: u32) -> ClusterBox {
         let links = self.links.of(NodeId(index as u32));
         let moments = &self.power.clusters[index];
-        let area = &self.area.clusters[index];
-        let vector = Vec3::from_array(area.linear);
-        let total = area.total();
+        let vector = Vec3::from_array(moments.linear.map(|along| along.w));
+        let total = moments.total().w;
         ClusterBox {
             min: cluster.min,
             max: cluster.max,

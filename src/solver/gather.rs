@@ -4,12 +4,12 @@
 //! cluster has to its children and lets each face take its share by its own normal (eq. 15), for all links at once.
 //! The paper's other way, each vector pushed to each face at once, is [`Push::AtOnce`].
 
-use glam::Vec3A;
+use glam::Vec4;
 use rayon::prelude::*;
 
 use super::Push;
 use crate::{
-    hierarchy::{Hierarchy, Kind, Moments, NodeId, Quantity, Reading},
+    hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
     transport::{Kernel, LinkStore, self_irradiance},
 };
 
@@ -17,11 +17,7 @@ use crate::{
 const TASK_NODES: usize = 256;
 
 /// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples.
-pub(super) fn gather<Q: Quantity + Send + Sync>(
-    kernel: Kernel<'_, Q>,
-    links: &LinkStore,
-    push: Push,
-) -> Vec<Q> {
+pub(super) fn gather(kernel: Kernel<'_>, links: &LinkStore, push: Push) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let mut irradiance = own_irradiance(kernel, links);
     let from_clusters = match push {
@@ -41,14 +37,14 @@ pub(super) fn gather<Q: Quantity + Send + Sync>(
 }
 
 /// What elements receive over their own links.
-fn own_irradiance<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let base = hierarchy.clusters.len() as u32;
     (0..hierarchy.mesh.elements.len())
         .into_par_iter()
         .with_min_len(TASK_NODES)
         .map(|index| {
-            let mut sum = Q::default();
+            let mut sum = Vec4::ZERO;
             let links = links.of(NodeId(base + index as u32));
             if links.is_empty() {
                 return sum;
@@ -71,10 +67,10 @@ fn own_irradiance<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &Link
 }
 
 /// What patches receive from the links of clusters, through the moments of all clusters above them.
-fn push_moments<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
-    let mut incident: Vec<Moments<Q>> = (0..hierarchy.clusters.len())
+    let mut incident: Vec<Moments<Vec4>> = (0..hierarchy.clusters.len())
         .into_par_iter()
         .with_min_len(TASK_NODES)
         .map(|index| cluster_incident(kernel, links, index))
@@ -102,11 +98,7 @@ fn push_moments<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkSt
 }
 
 /// The vector irradiances of all links of one cluster.
-fn cluster_incident<Q: Quantity>(
-    kernel: Kernel<'_, Q>,
-    links: &LinkStore,
-    index: usize,
-) -> Moments<Q> {
+fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Moments<Vec4> {
     let hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
     let mut sum = Moments::default();
@@ -126,16 +118,16 @@ fn cluster_incident<Q: Quantity>(
 }
 
 /// What patches receive from the links of clusters, each vector pushed by itself.
-fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+fn push_at_once(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let leaves: Vec<usize> = (0..hierarchy.clusters.len())
         .filter(|&index| hierarchy.clusters[index].is_leaf())
         .collect();
-    let parts: Vec<(usize, Vec<Q>)> = leaves
+    let parts: Vec<(usize, Vec<Vec4>)> = leaves
         .par_iter()
         .map(|&leaf| {
             let range = hierarchy.clusters[leaf].patches();
-            let mut sums = vec![Q::default(); range.len()];
+            let mut sums = vec![Vec4::ZERO; range.len()];
             let mut at = leaf;
             loop {
                 for link in links.of(NodeId(at as u32)) {
@@ -156,7 +148,7 @@ fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkSt
             (range.start, sums)
         })
         .collect();
-    let mut irradiance = vec![Q::default(); hierarchy.patches.len()];
+    let mut irradiance = vec![Vec4::ZERO; hierarchy.patches.len()];
     for (start, sums) in parts {
         irradiance[start..start + sums.len()].copy_from_slice(&sums);
     }
@@ -164,13 +156,13 @@ fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkSt
 }
 
 /// Eq. 15 for one link of a cluster and some of its patches.
-fn push_one<Q: Quantity>(
-    kernel: Kernel<'_, Q>,
+fn push_one(
+    kernel: Kernel<'_>,
     cluster: usize,
     source: NodeId,
     visibility: f32,
     patches: &[crate::hierarchy::Patch],
-    sums: &mut [Q],
+    sums: &mut [Vec4],
 ) {
     let hierarchy = kernel.hierarchy;
     if source.index() == cluster {
@@ -186,14 +178,14 @@ fn push_one<Q: Quantity>(
     }
 }
 
-/// Sum over elements of area times a quantity, in order and in double precision.
-pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec3A) -> glam::DVec3 {
+/// Sum over leaves of area times a colour, in order and in double precision.
+pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4) -> glam::DVec3 {
     hierarchy
         .mesh
         .leaves()
         .map(|leaf| {
             let area = f64::from(hierarchy.mesh.elements[leaf].area_vector.length());
-            glam::Vec3::from(of(leaf)).as_dvec3() * area
+            of(leaf).truncate().as_dvec3() * area
         })
         .sum()
 }

@@ -5,11 +5,11 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use crate::{
     geometry::{irradiance_vector, point_irradiance},
-    hierarchy::{Hierarchy, Kind, NodeId, Quantity, Reading, Tables},
+    hierarchy::{Hierarchy, Kind, NodeId, Quantity as _, Reading, Tables},
 };
 
 /// An element nearer than this many of its radii is integrated exactly.
@@ -18,27 +18,27 @@ const NEAR: f32 = 4.0;
 
 /// A vector irradiance: light that arrives at a point, and where from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Incident<Q> {
+pub struct Incident {
     /// Unit direction from the receiving point towards the source: −r of the paper.
     pub towards_source: Vec3,
     /// Irradiance of a face that looks that way.
-    pub strength: Q,
+    pub strength: Vec4,
 }
 
 /// Reads the source tables of a hierarchy by one method.
 #[derive(Clone, Copy)]
-pub struct Kernel<'a, Q> {
+pub struct Kernel<'a> {
     /// Where the nodes are.
     pub hierarchy: &'a Hierarchy,
     /// What they send.
-    pub tables: &'a Tables<Q>,
+    pub tables: &'a Tables,
     /// How moments are read; `None` sums over the patches of a cluster (eq. 3).
     pub reading: Option<Reading>,
 }
 
-impl<Q: Quantity> Kernel<'_, Q> {
+impl Kernel<'_> {
     /// ProjectPower (eq. 8): the power that a node sends along a unit direction, per unit solid angle and times π.
-    pub fn projected_power(&self, node: NodeId, unit: Vec3) -> Q {
+    pub fn projected_power(&self, node: NodeId, unit: Vec3) -> Vec4 {
         match self.hierarchy.kind(node) {
             Kind::Cluster(index) => self.cluster_power(index, unit),
             Kind::Element(index) => {
@@ -51,11 +51,11 @@ impl<Q: Quantity> Kernel<'_, Q> {
         }
     }
 
-    fn cluster_power(&self, index: usize, unit: Vec3) -> Q {
+    fn cluster_power(&self, index: usize, unit: Vec3) -> Vec4 {
         if let Some(reading) = self.reading {
             return self.tables.clusters[index].project(unit, reading);
         }
-        let mut sum = Q::default();
+        let mut sum = Vec4::ZERO;
         for patch in self.hierarchy.clusters[index].patches() {
             sum += self.tables.elements[patch]
                 * self.hierarchy.patches[patch].area_vector.dot(unit).max(0.0);
@@ -64,8 +64,9 @@ impl<Q: Quantity> Kernel<'_, Q> {
     }
 
     /// Vector irradiance (eq. 14, unoccluded) of a node at a point.
-    /// No more than the brightest patch of the source gives when it fills the view.
-    pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident<Q> {
+    /// Near the source the strength saturates towards its brightest patch, as that of a disc does exactly on its axis:
+    /// A/π r² becomes A/(π r² + A).
+    pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident {
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => {
                 let separation = point - self.hierarchy.clusters[index].centroid;
@@ -74,13 +75,13 @@ impl<Q: Quantity> Kernel<'_, Q> {
                 if squared <= 0.0 || !unit.is_finite() {
                     return Incident {
                         towards_source: Vec3::ZERO,
-                        strength: Q::default(),
+                        strength: Vec4::ZERO,
                     };
                 }
                 let strength = self.cluster_power(index, unit) * (1.0 / (PI * squared));
                 Incident {
                     towards_source: -unit,
-                    strength: strength.lower_of(self.tables.brightest[index]),
+                    strength: strength.saturated(self.tables.brightest[index]),
                 }
             }
             Kind::Element(index) => {
@@ -100,7 +101,7 @@ impl<Q: Quantity> Kernel<'_, Q> {
     }
 
     /// Irradiance (eqs 12 and 15, unoccluded) of a face of unit normal at a point.
-    pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Q {
+    pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Vec4 {
         match self.hierarchy.kind(source) {
             Kind::Cluster(_) => {
                 let incident = self.vector_irradiance(source, point);

@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 use super::{Kernel, PairSampler, luminance};
 use crate::{
@@ -43,10 +43,8 @@ const IN_PLANE: f32 = 1e-5;
 /// Judges pairs of nodes.
 #[derive(Clone, Copy)]
 pub struct Judge<'a> {
-    /// Reads what sources send.
-    pub power: Kernel<'a, Vec3A>,
-    /// Reads the area that receivers show.
-    pub area: Kernel<'a, f32>,
+    /// Reads what sources send, and the area that receivers show.
+    pub kernel: Kernel<'a>,
     /// How errors are estimated.
     pub estimate: Estimate,
     /// Draws sample points.
@@ -55,11 +53,11 @@ pub struct Judge<'a> {
 
 impl Judge<'_> {
     fn hierarchy(&self) -> &Hierarchy {
-        self.power.hierarchy
+        self.kernel.hierarchy
     }
 
-    fn tables(&self) -> &Tables<Vec3A> {
-        self.power.tables
+    fn tables(&self) -> &Tables {
+        self.kernel.tables
     }
 
     /// Judge a pair of different nodes, neither above the other.
@@ -123,7 +121,7 @@ impl Judge<'_> {
                 let cluster = &hierarchy.clusters[index];
                 let (min, max) = self.bounds(to);
                 let (least, most) = (min - cluster.max, max - cluster.min);
-                let faces = self.area.tables.clusters[index].six_faces();
+                let faces = self.tables().clusters[index].six_faces().map(|face| face.w);
                 let slack = IN_PLANE * cluster.area;
                 (0..3).any(|axis| {
                     (most[axis] > 0.0 && faces[2 * axis] > slack)
@@ -159,7 +157,7 @@ impl Judge<'_> {
         }
         let unit = (to - from) / distance;
         let total = luminance(self.tables().power(hierarchy, source));
-        let value = luminance(self.power.projected_power(source, unit));
+        let value = luminance(self.kernel.projected_power(source, unit));
         let swing = total * (reach / distance).asin();
         let (near, far) = (distance - reach, distance + reach);
         let upper = ((value + swing).min(total) / (PI * near * near)).min(brightest);
@@ -206,17 +204,13 @@ impl Judge<'_> {
         if squared <= 0.0 || !unit.is_finite() || area <= 0.0 {
             return f32::INFINITY;
         }
-        let power = luminance(self.power.projected_power(source, unit));
-        power * self.area.projected_power(receiver, -unit) / (PI * squared * area)
+        let power = luminance(self.kernel.projected_power(source, unit));
+        power * self.kernel.projected_power(receiver, -unit).w / (PI * squared * area)
     }
 }
 
 /// Mean irradiance that a cluster of the given power gives itself, from the odds that a ray meets a patch of it.
-pub(crate) fn self_irradiance<Q: crate::hierarchy::Quantity>(
-    hierarchy: &Hierarchy,
-    index: usize,
-    power: Q,
-) -> Q {
+pub(crate) fn self_irradiance(hierarchy: &Hierarchy, index: usize, power: Vec4) -> Vec4 {
     let cluster = &hierarchy.clusters[index];
     let size = cluster.max - cluster.min;
     let hull = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -224,6 +218,6 @@ pub(crate) fn self_irradiance<Q: crate::hierarchy::Quantity>(
     if sum > 0.0 {
         power * (1.0 / sum)
     } else {
-        Q::default()
+        Vec4::ZERO
     }
 }

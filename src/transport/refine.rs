@@ -78,7 +78,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     }
 
     fn hierarchy(&self) -> &'a Hierarchy {
-        self.judge.power.hierarchy
+        self.judge.kernel.hierarchy
     }
 
     /// Refine a receiver and all below it; `sources` are handed down from above.

@@ -4,7 +4,7 @@
 //! light that it carries: of a few candidate point pairs one is kept with probability proportional to its unoccluded
 //! transfer, and the outcome of its ray counts with their mean weight (resampled importance sampling, Talbot 2005).
 
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
 
 use super::luminance;
 use crate::{
@@ -32,7 +32,7 @@ pub struct PairSampler<'a> {
     /// Where the nodes are.
     pub hierarchy: &'a Hierarchy,
     /// What they send.
-    pub tables: &'a Tables<Vec3A>,
+    pub tables: &'a Tables,
     /// Running sums of the patch areas, in tree order, one more than there are patches.
     pub area_sums: &'a [f64],
     /// What blocks.
