@@ -130,6 +130,20 @@ impl<Q: Quantity> Moments<Q> {
         }
     }
 
+    /// Add light along a unit direction, of which the share `spread` comes from the half-space about it: its linear part
+    /// is that of the direction, its even part alike for all faces.
+    pub fn add_spread(&mut self, direction: Vec3, strength: Q, spread: f32) {
+        let before = self.linear;
+        self.add(direction, strength * (1.0 - spread));
+        let components = direction.to_array();
+        for axis in 0..3 {
+            self.linear[axis] = before[axis] + strength * components[axis];
+        }
+        if spread > 0.0 {
+            self.add_isotropic(strength * (0.5 * spread));
+        }
+    }
+
     /// Add light that comes alike from everywhere and gives each face the irradiance `value`, or power or area that
     /// shows alike everywhere.
     pub fn add_isotropic(&mut self, value: Q) {
@@ -204,6 +218,15 @@ impl<Q: Quantity> Moments<Q> {
             Reading::Single => linear,
             Reading::Isotropic => self.total() * 0.25,
         };
+        value.upper_of(Q::default())
+    }
+
+    /// The bounded projection for a receiver that is seen over a range of directions about a unit direction: of the even
+    /// part, the share `spread` is replaced by its mean over all directions, half of the total.
+    pub fn project_spread(&self, unit: Vec3, spread: f32) -> Q {
+        let linear = self.linear_part(unit);
+        let even = self.project(unit, Reading::Bounded) * 2.0 - linear;
+        let value = (even * (1.0 - spread) + self.total() * (0.5 * spread) + linear) * 0.5;
         value.upper_of(Q::default())
     }
 

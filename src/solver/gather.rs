@@ -104,14 +104,14 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     let mut sum = Moments::default();
     for link in links.of(NodeId(index as u32)) {
         if link.source.index() == index {
-            sum.add_isotropic(self_irradiance(
-                hierarchy,
-                index,
-                kernel.tables.clusters[index].total(),
-            ));
+            sum.add_isotropic(
+                self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
+                    * link.visibility,
+            );
         } else {
-            let incident = kernel.vector_irradiance(link.source, cluster.centroid);
-            sum.add(incident.towards_source, incident.strength * link.visibility);
+            kernel
+                .vector_irradiance(link.source, cluster.centroid, cluster.radius)
+                .add_to(&mut sum, link.visibility);
         }
     }
     sum
@@ -167,14 +167,15 @@ fn push_one(
     let hierarchy = kernel.hierarchy;
     if source.index() == cluster {
         let irradiance =
-            self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total());
+            self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total())
+                * visibility;
         sums.iter_mut().for_each(|sum| *sum += irradiance);
         return;
     }
-    let incident = kernel.vector_irradiance(source, hierarchy.clusters[cluster].centroid);
-    let strength = incident.strength * visibility;
+    let receiver = &hierarchy.clusters[cluster];
+    let incident = kernel.vector_irradiance(source, receiver.centroid, receiver.radius);
     for (sum, patch) in sums.iter_mut().zip(patches) {
-        *sum += strength * incident.towards_source.dot(patch.normal).max(0.0);
+        *sum += incident.on_face(patch.normal) * visibility;
     }
 }
 

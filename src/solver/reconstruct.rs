@@ -148,7 +148,7 @@ fn chain_irradiance(
             kernel.hierarchy,
             receiver,
             kernel.tables.clusters[receiver].total(),
-        );
+        ) * link.visibility;
     }
     debug_assert!(
         !matches!(kernel.hierarchy.kind(link.source), Kind::Cluster(index) if index == receiver)

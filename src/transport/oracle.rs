@@ -63,8 +63,7 @@ impl Judge<'_> {
     /// Judge a pair of different nodes, neither above the other.
     pub fn judge(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> Judgement {
         let brightest = luminance(self.tables().brightest(self.hierarchy(), source));
-        if brightest <= 0.0 || !self.can_face(source, receiver) || !self.can_face(receiver, source)
-        {
+        if !self.can_face(source, receiver) || !self.can_face(receiver, source) {
             return Judgement::Nothing;
         }
         match self.estimate {
@@ -73,24 +72,15 @@ impl Judge<'_> {
         }
     }
 
-    /// Judge the exchange of a cluster with itself: all of it is in doubt.
-    /// A ray that leaves a patch is taken to meet another before it leaves the box with the odds of their areas.
-    pub fn judge_self(&self, cluster: NodeId) -> Judgement {
-        let Kind::Cluster(index) = self.hierarchy().kind(cluster) else {
-            return Judgement::Nothing;
-        };
-        let irradiance = luminance(self_irradiance(
-            self.hierarchy(),
-            index,
-            self.tables().clusters[index].total(),
-        ));
-        if irradiance > 0.0 {
-            Judgement::Transfer {
-                irradiance,
-                error: irradiance,
-            }
-        } else {
-            Judgement::Nothing
+    /// Luminance of the irradiance that a cluster gives itself if all of its light falls on it; all of it is in doubt.
+    pub fn judge_self(&self, cluster: NodeId) -> f32 {
+        match self.hierarchy().kind(cluster) {
+            Kind::Cluster(index) => luminance(self_irradiance(
+                self.hierarchy(),
+                index,
+                self.tables().clusters[index].total(),
+            )),
+            Kind::Element(_) => 0.0,
         }
     }
 
@@ -209,14 +199,11 @@ impl Judge<'_> {
     }
 }
 
-/// Mean irradiance that a cluster of the given power gives itself, from the odds that a ray meets a patch of it.
+/// Mean irradiance that a cluster of the given power would give itself if all of its light fell on it.
 pub(crate) fn self_irradiance(hierarchy: &Hierarchy, index: usize, power: Vec4) -> Vec4 {
-    let cluster = &hierarchy.clusters[index];
-    let size = cluster.max - cluster.min;
-    let hull = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-    let sum = cluster.area + hull;
-    if sum > 0.0 {
-        power * (1.0 / sum)
+    let area = hierarchy.clusters[index].area;
+    if area > 0.0 {
+        power * (1.0 / area)
     } else {
         Vec4::ZERO
     }
