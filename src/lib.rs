@@ -12,9 +12,12 @@
 //! * [`reference`]: the truth by other means, sharing no transport code;
 //! * [`metrics`]: error measures and reports;
 //! * [`export`]: files;
-//! * [`worker`]: the solver thread.
+//! * [`worker`]: the solver thread;
+//! * `viewer`: the window and its pictures.
 
 pub mod geometry;
 pub mod scene;
 pub mod solver;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 pub mod worker;
