@@ -13,11 +13,18 @@
 //! * [`metrics`]: error measures and reports;
 //! * [`export`]: files;
 //! * [`worker`]: the solver thread;
-//! * `viewer`: the window and its pictures.
+//! * `viewer`: the window and its pictures;
+//! * [`cli`]: flags to settings, headless commands.
 
+pub mod cli;
+pub mod export;
 pub mod geometry;
+pub mod hierarchy;
+pub mod metrics;
+pub mod reference;
 pub mod scene;
 pub mod solver;
+pub mod transport;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 pub mod worker;

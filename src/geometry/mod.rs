@@ -20,3 +20,29 @@ pub fn area_vector([a, b, c]: [Vec3; 3]) -> Vec3 {
 pub fn centroid([a, b, c]: [Vec3; 3]) -> Vec3 {
     (a + b + c) / 3.0
 }
+
+/// Barycentric coordinates of the point of a triangle that lies nearest to `point` within its plane, moved inside
+/// where rounding put it outside; sums to 1. A triangle without area gives the centroid.
+pub fn barycentric(point: Vec3, corners: [Vec3; 3]) -> Vec3 {
+    let raw = barycentric_in_plane(point, corners).max(Vec3::ZERO);
+    let sum = raw.element_sum();
+    if sum > 0.0 && sum.is_finite() {
+        raw / sum
+    } else {
+        Vec3::splat(1.0 / 3.0)
+    }
+}
+
+/// Barycentric coordinates of the projection of `point` onto the plane of a triangle; negative outside.
+/// A triangle without area gives the centroid.
+pub fn barycentric_in_plane(point: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
+    let normal = (b - a).cross(c - a);
+    let scale = normal.length_squared();
+    if scale == 0.0 {
+        return Vec3::splat(1.0 / 3.0);
+    }
+    let from_a = point - a;
+    let second = from_a.cross(c - a).dot(normal) / scale;
+    let third = (b - a).cross(from_a).dot(normal) / scale;
+    Vec3::new(1.0 - second - third, second, third)
+}

@@ -1,6 +1,15 @@
 //! The solve as a value: [`Solver::new`], [`Solver::step`], [`Solver::snapshot`].
 //! No threads of its own, no channel, no clock, no global.
+//!
+//! A step lowers the threshold, divides elements where direct light bends, refines the links that exist, iterates
+//! gathering and pushing until the light settles, and gathers once more for the vertices.
 
+mod adapt;
+mod direct;
+mod display;
+mod gather;
+mod reconstruct;
+mod report;
 mod settings;
 mod snapshot;
 
@@ -9,10 +18,20 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
+use glam::{Vec3, Vec3A};
+
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
-use crate::scene::Scene;
+use crate::{
+    geometry::RayTree,
+    hierarchy::{Hierarchy, Reading, Tables},
+    scene::Scene,
+    transport::{Estimate, Judge, Kernel, LinkStore, PairSampler, Refiner, luminance},
+};
+use adapt::DirectField;
+use direct::Lights;
+use reconstruct::LeafLight;
 
 /// A request to stop, seen by everything that runs long. Clones share one flag.
 #[derive(Clone, Debug, Default)]
@@ -30,74 +49,99 @@ impl Cancel {
     }
 }
 
+/// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
+/// again costs more than the new ones.
+const THRESHOLD_FACTOR: f32 = 2.0;
+
+/// Sweeps of one step at most: enough for reflectance 0.98 from nothing.
+const MOST_SWEEPS: u32 = 400;
+
+/// Refinement passes of one step at most: elements divided in one pass take their links over in the next.
+const MOST_PASSES: u32 = 4;
+
 /// A solve in progress.
 pub struct Solver {
     scene: Arc<Scene>,
     settings: SolveSettings,
+    memory_limit: Option<u64>,
+    rays: RayTree,
+    hierarchy: Hierarchy,
+    area_sums: Vec<f64>,
+    /// Radiosity 1 everywhere: projected areas, and form factors when gathered.
+    area: Tables<f32>,
+    /// What links carry: reflected light, and emission where it is linked.
+    power: Tables<Vec3A>,
+    links: LinkStore,
+    direct: Option<DirectField>,
+    /// Linked irradiance of every element.
+    linked: Vec<Vec3A>,
+    leaves: Vec<LeafLight>,
+    mean_irradiance: f32,
     step: u32,
-    mesh: Arc<DisplayMesh>,
+    ray_count: u64,
+    snapshot: Snapshot,
 }
 
 impl Solver {
     /// Prepare a solve: hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
     pub fn new(scene: Arc<Scene>, settings: SolveSettings, memory_limit: Option<u64>) -> Self {
-        let _ = memory_limit;
-        let mut mesh = DisplayMesh::default();
-        for id in scene.triangle_ids() {
-            let corners = scene.corners(id);
-            let base = mesh.positions.len() as u32;
-            let surface = scene.surfaces[id.index()];
-            for corner in corners {
-                mesh.positions.push(corner);
-                mesh.normals.push(surface.area_vector.normalize_or_zero());
-                mesh.reflectance.push(surface.reflectance);
-                mesh.emission.push(surface.emission);
-            }
-            mesh.indices.push([base, base + 1, base + 2]);
-            mesh.triangle_of.push(id.0);
-            mesh.is_back.push(false);
-            mesh.element_of.push(id.0);
-        }
-        Self {
+        let rays = RayTree::new(&scene);
+        let hierarchy = Hierarchy::new(&scene, settings.crease_degrees);
+        let lights = Lights::new(&scene, &hierarchy);
+        let is_sampled = match settings.direct {
+            Direct::Auto => lights.are_few(),
+            Direct::Sampled => true,
+            Direct::Linked => false,
+        };
+        let mut solver = Self {
+            area_sums: PairSampler::area_sums(&hierarchy),
+            area: Tables::new(&hierarchy, |_| 1.0),
+            power: Tables::default(),
+            links: LinkStore::default(),
+            direct: is_sampled.then(|| DirectField::new(lights)),
+            linked: vec![Vec3A::ZERO; hierarchy.mesh.elements.len()],
+            leaves: Vec::new(),
+            mean_irradiance: 0.0,
+            step: 0,
+            ray_count: 0,
+            snapshot: Snapshot::default(),
             scene,
             settings,
-            step: 0,
-            mesh: Arc::new(mesh),
-        }
+            memory_limit,
+            rays,
+            hierarchy,
+        };
+        solver.pull();
+        solver.show();
+        solver
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.
-    /// Returns `None` when cancelled on the way; the light is then that of the last whole sweep.
+    /// Returns `None` when cancelled on the way; the light is then that of the last whole step.
     pub fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        if cancel.is_cancelled() {
-            return None;
-        }
-        self.step += 1;
-        Some(StepReport {
-            step: self.step,
-            is_final: self.step >= self.settings.max_steps,
+        let mut report = StepReport {
+            step: self.step + 1,
             ..StepReport::default()
-        })
+        };
+        let fineness =
+            THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
+        report.epsilon = self.settings.epsilon * fineness;
+        self.adapt_to_direct(fineness, cancel)?;
+        self.pull();
+        self.estimate_mean();
+        self.refine(report.epsilon, cancel)?;
+        self.iterate(&mut report, cancel)?;
+        self.leaves = reconstruct::gather_leaves(self.kernel(), &self.links);
+        self.step = report.step;
+        self.fill(&mut report);
+        self.show();
+        report.is_final = self.step >= self.settings.max_steps;
+        Some(report)
     }
 
-    /// The state as it stands. Cheap where the mesh did not change.
+    /// The state as it stands. Cheap: parts are shared.
     pub fn snapshot(&self) -> Snapshot {
-        let mesh = self.mesh.clone();
-        let light = VertexLight {
-            irradiance: mesh
-                .normals
-                .iter()
-                .map(|n| glam::Vec3::splat(1.0 + n.y))
-                .collect(),
-            direct: vec![glam::Vec3::ZERO; mesh.normals.len()],
-            uncertainty: vec![0.0; mesh.normals.len()],
-        };
-        Snapshot {
-            step: self.step,
-            mesh,
-            light: Arc::new(light),
-            clusters: Arc::default(),
-        }
+        self.snapshot.clone()
     }
 
     /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
@@ -115,4 +159,218 @@ impl Solver {
     pub fn settings(&self) -> &SolveSettings {
         &self.settings
     }
+
+    /// The hierarchy, for tests and inspection.
+    pub fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
+    }
+
+    /// The links, for tests and inspection.
+    pub fn links(&self) -> &LinkStore {
+        &self.links
+    }
+
+    fn reading(&self) -> Option<Reading> {
+        match self.settings.method {
+            Method::Bounded => Some(Reading::Bounded),
+            Method::SixFace => Some(Reading::SixFace),
+            Method::Single => Some(Reading::Single),
+            Method::Isotropic => Some(Reading::Isotropic),
+            Method::Exact => None,
+        }
+    }
+
+    fn kernel(&self) -> Kernel<'_, Vec3A> {
+        Kernel {
+            hierarchy: &self.hierarchy,
+            tables: &self.power,
+            reading: self.reading(),
+        }
+    }
+
+    fn area_kernel(&self) -> Kernel<'_, f32> {
+        Kernel {
+            hierarchy: &self.hierarchy,
+            tables: &self.area,
+            reading: self.reading(),
+        }
+    }
+
+    /// Direct irradiance of a leaf, by samples.
+    fn direct_of(&self, element: usize) -> Vec3A {
+        self.direct
+            .as_ref()
+            .map_or(Vec3A::ZERO, |field| field.element(&self.hierarchy, element))
+    }
+
+    /// Radiosity that a leaf sends over links.
+    fn radiosity(&self, element: usize) -> Vec3A {
+        let patch = self.hierarchy.patch_of(element);
+        let reflected =
+            Vec3A::from(patch.reflectance) * (self.linked[element] + self.direct_of(element));
+        match self.direct {
+            Some(_) => reflected,
+            None => reflected + Vec3A::from(patch.emission * std::f32::consts::PI),
+        }
+    }
+
+    /// Bring the source tables up to date with the irradiance of the leaves.
+    fn pull(&mut self) {
+        let mut power = std::mem::take(&mut self.power);
+        power.pull(&self.hierarchy, |leaf| self.radiosity(leaf));
+        self.power = power;
+    }
+
+    /// Make direct light known at all vertices, and divide elements where it bends.
+    fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
+        let limits = adapt::Limits {
+            tolerance: self.settings.mesh_tolerance * fineness,
+            min_area: self.min_area(),
+            shadow_samples: self.settings.shadow_samples,
+            seed: self.settings.seed,
+        };
+        adapt::divide_coarse(&mut self.hierarchy, limits.min_area);
+        if let Some(field) = &mut self.direct {
+            self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
+        }
+        self.extend_to_new_elements();
+        Some(())
+    }
+
+    /// Elements inherit the linked irradiance of the one that was divided.
+    fn extend_to_new_elements(&mut self) {
+        for index in self.linked.len()..self.hierarchy.mesh.elements.len() {
+            let parent = self.hierarchy.mesh.elements[index].parent;
+            self.linked.push(self.linked[parent as usize]);
+        }
+    }
+
+    /// Smallest element area that may be divided off, frame units.
+    fn min_area(&self) -> f32 {
+        (f64::from(self.settings.min_area) * self.hierarchy.area) as f32
+    }
+
+    /// Mean irradiance (luminance), to which thresholds relate. Before any link it is guessed from the direct light.
+    fn estimate_mean(&mut self) {
+        let total = gather::area_sum(&self.hierarchy, |leaf| {
+            self.linked[leaf] + self.direct_of(leaf)
+        });
+        let linked = gather::area_sum(&self.hierarchy, |leaf| self.linked[leaf]);
+        let area = self.hierarchy.area.max(f64::MIN_POSITIVE);
+        let mut mean = luminance((total / area).as_vec3().into());
+        if linked == glam::DVec3::ZERO {
+            let power = gather::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
+            mean += luminance((power / area).as_vec3().into());
+        }
+        self.mean_irradiance = mean;
+    }
+
+    /// Bring the links to a smaller threshold.
+    fn refine(&mut self, epsilon: f32, cancel: &Cancel) -> Option<()> {
+        for _ in 0..MOST_PASSES {
+            self.area.pull(&self.hierarchy, |_| 1.0);
+            self.pull();
+            let is_first = self.links.is_empty();
+            let refinement = {
+                let sampler = PairSampler {
+                    hierarchy: &self.hierarchy,
+                    tables: &self.power,
+                    area_sums: &self.area_sums,
+                    rays: &self.rays,
+                };
+                let estimate = match self.settings.oracle {
+                    Oracle::Interval => Estimate::Interval,
+                    Oracle::Samples => Estimate::Samples(self.settings.samples),
+                };
+                let refiner = Refiner {
+                    judge: Judge {
+                        power: self.kernel(),
+                        area: self.area_kernel(),
+                        estimate,
+                        sampler,
+                    },
+                    links_of: |node| self.links.of(node),
+                    threshold: epsilon * self.mean_irradiance,
+                    min_area: self.min_area(),
+                    seed: self.settings.seed,
+                    cancelled: &|| cancel.is_cancelled(),
+                };
+                refiner.refine(is_first)
+            };
+            if cancel.is_cancelled() {
+                return None;
+            }
+            self.ray_count += refinement.ray_count;
+            self.links = LinkStore::from_runs(
+                self.hierarchy.node_count(),
+                &refinement.runs,
+                &refinement.links,
+            );
+            if !self.hierarchy.mesh.divide(&refinement.wanted) {
+                break;
+            }
+            if let Some(field) = &mut self.direct {
+                let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
+                self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed);
+            }
+            self.extend_to_new_elements();
+        }
+        self.area.pull(&self.hierarchy, |_| 1.0);
+        self.pull();
+        Some(())
+    }
+
+    /// Gather, push and pull until the change is below tolerance.
+    fn iterate(&mut self, report: &mut StepReport, cancel: &Cancel) -> Option<()> {
+        let mut last_change = f64::INFINITY;
+        loop {
+            if cancel.is_cancelled() {
+                return None;
+            }
+            let gathered = gather::gather(self.kernel(), &self.links, self.settings.push);
+            let change = gather::area_sum(&self.hierarchy, |leaf| {
+                (gathered[leaf] - self.linked[leaf]).abs()
+            });
+            let total = gather::area_sum(&self.hierarchy, |leaf| {
+                gathered[leaf] + self.direct_of(leaf)
+            });
+            self.linked = gathered;
+            self.pull();
+            report.sweeps += 1;
+            let change = change.element_sum();
+            report.residual = (change / total.element_sum().max(f64::MIN_POSITIVE)) as f32;
+            if last_change.is_finite() && last_change > 0.0 {
+                report.contraction = (change / last_change) as f32;
+            }
+            last_change = change;
+            if report.residual <= self.settings.tolerance || report.sweeps >= MOST_SWEEPS {
+                return Some(());
+            }
+        }
+    }
+
+    /// Bytes held.
+    fn memory_bytes(&self) -> u64 {
+        let own = self.hierarchy.memory_bytes()
+            + self.rays.memory_bytes()
+            + self.area.memory_bytes()
+            + self.power.memory_bytes()
+            + self.links.memory_bytes()
+            + size_of_val(self.area_sums.as_slice())
+            + size_of_val(self.linked.as_slice())
+            + size_of_val(self.leaves.as_slice())
+            + self.direct.as_ref().map_or(0, DirectField::memory_bytes);
+        own as u64
+    }
+
+    /// Whether the memory limit is reached.
+    fn is_out_of_memory(&self) -> bool {
+        self.memory_limit
+            .is_some_and(|limit| self.memory_bytes() > limit)
+    }
+}
+
+/// A colour that is safe to show: finite and not negative.
+fn displayable(color: Vec3A) -> Vec3 {
+    Vec3::from(color).map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
 }

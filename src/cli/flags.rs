@@ -1,0 +1,350 @@
+//! Flags shared by the commands, and what they set. A flag that is not given leaves the preset as it is.
+
+use std::{str::FromStr, time::Duration};
+
+use clap::{Args, ValueEnum};
+
+use crate::{
+    export::{ColorOptions, PlyOptions, ToneMap, UpAxis},
+    scene::{SceneOptions, Sides},
+    solver::{Direct, Method, Oracle, SolveSettings},
+    worker::RunOptions,
+};
+
+/// A place to start from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// Seconds to a first impression
+    Draft,
+    /// The default
+    #[default]
+    Normal,
+    /// For the result that is kept
+    Final,
+}
+
+/// Flags of [`SceneOptions`].
+#[derive(Clone, Debug, Args)]
+pub struct SceneFlags {
+    /// Which sides of faces reflect and emit
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Scene")]
+    pub sides: SidesFlag,
+    /// Clamp reflectance to this, 0 to 1
+    #[arg(long, value_name = "R", value_parser = fraction, help_heading = "Scene")]
+    pub max_reflectance: Option<f32>,
+    /// Encoding of Kd and Ke in the MTL file
+    #[arg(long, value_enum, default_value = "linear", help_heading = "Scene")]
+    pub mtl_color: MtlColorFlag,
+    /// Up axis of the scene
+    #[arg(
+        long,
+        value_enum,
+        default_value = "+Y",
+        allow_hyphen_values = true,
+        help_heading = "Scene"
+    )]
+    pub up: UpFlag,
+}
+
+impl SceneFlags {
+    /// The options that the flags ask for.
+    pub fn options(&self) -> SceneOptions {
+        let default = SceneOptions::default();
+        SceneOptions {
+            sides: match self.sides {
+                SidesFlag::Auto => Sides::Auto,
+                SidesFlag::One => Sides::One,
+                SidesFlag::Two => Sides::Two,
+            },
+            max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
+            mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
+        }
+    }
+}
+
+/// Flags of [`SolveSettings`].
+#[derive(Clone, Debug, Args)]
+pub struct SettingFlags {
+    /// Settings to start from; single flags override it
+    #[arg(long, value_enum, default_value = "normal", help_heading = "Settings")]
+    pub preset: Preset,
+    /// How clusters store power and area
+    #[arg(long, value_enum, help_heading = "Settings")]
+    pub method: Option<MethodFlag>,
+    /// How the error of a link is judged
+    #[arg(long, value_enum, help_heading = "Settings")]
+    pub oracle: Option<OracleFlag>,
+    /// How light straight from emitters is computed
+    #[arg(long, value_enum, help_heading = "Settings")]
+    pub direct: Option<DirectFlag>,
+    /// Link threshold at the last step; lower is better and slower
+    #[arg(long, value_name = "E", value_parser = at_least_zero, help_heading = "Settings")]
+    pub epsilon: Option<f32>,
+    /// Sample pairs of a link in the samples oracle, 1 to 4096
+    #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Settings")]
+    pub samples: Option<u32>,
+    /// Smallest element as a fraction of the scene's area
+    #[arg(long, value_name = "A", value_parser = at_least_zero, help_heading = "Settings")]
+    pub min_area: Option<f32>,
+    /// Steps at most
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Settings")]
+    pub max_steps: Option<u32>,
+    /// Seed of every random choice
+    #[arg(long, value_name = "N", help_heading = "Settings")]
+    pub seed: Option<u64>,
+}
+
+impl SettingFlags {
+    /// The preset with every given flag put in.
+    pub fn settings(&self) -> SolveSettings {
+        let preset = match self.preset {
+            Preset::Draft => SolveSettings::draft(),
+            Preset::Normal => SolveSettings::normal(),
+            Preset::Final => SolveSettings::finest(),
+        };
+        SolveSettings {
+            method: self.method.map_or(preset.method, MethodFlag::method),
+            oracle: self.oracle.map_or(preset.oracle, OracleFlag::oracle),
+            direct: self.direct.map_or(preset.direct, DirectFlag::direct),
+            epsilon: self.epsilon.unwrap_or(preset.epsilon),
+            samples: self.samples.unwrap_or(preset.samples),
+            min_area: self.min_area.unwrap_or(preset.min_area),
+            max_steps: self.max_steps.unwrap_or(preset.max_steps),
+            seed: self.seed.unwrap_or(preset.seed),
+            ..preset
+        }
+    }
+}
+
+/// Flags of [`RunOptions`] and of the colours of exports.
+#[derive(Clone, Debug, Args)]
+pub struct RunFlags {
+    /// Stop after this time
+    #[arg(long, value_name = "SEC", value_parser = seconds, help_heading = "Limits")]
+    pub time_limit: Option<Duration>,
+    /// Stop when the solver holds this much
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40), help_heading = "Limits")]
+    pub memory_limit: Option<u64>,
+    /// Solver threads, by default one for each core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Limits")]
+    pub threads: Option<u16>,
+    /// Exposure of the byte colours in stops
+    #[arg(long, value_name = "EV", default_value = "0", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
+    pub exposure: f32,
+    /// Tone curve of the byte colours
+    #[arg(long, value_enum, default_value = "neutral", help_heading = "Output")]
+    pub tonemap: ToneMapFlag,
+}
+
+impl RunFlags {
+    /// The options that the flags ask for.
+    pub fn options(&self) -> RunOptions {
+        RunOptions {
+            threads: self.threads.map_or(0, usize::from),
+            time_limit: self.time_limit,
+            memory_limit: self.memory_limit.map(|mebibytes| mebibytes << 20),
+        }
+    }
+
+    /// How exported files look.
+    pub fn export(&self, up: UpFlag) -> PlyOptions {
+        PlyOptions {
+            color: ColorOptions {
+                exposure_ev: self.exposure,
+                tone_map: match self.tonemap {
+                    ToneMapFlag::None => ToneMap::None,
+                    ToneMapFlag::Neutral => ToneMap::Neutral,
+                },
+            },
+            up: match up {
+                UpFlag::Y => UpAxis::Y,
+                UpFlag::Z => UpAxis::Z,
+            },
+        }
+    }
+}
+
+/// `--reference`: what to measure the error against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// Path tracing with this many samples per point.
+    Paths(u32),
+}
+
+impl FromStr for Reference {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        /// Enough to tell an error of a few per cent in usual rooms.
+        const DEFAULT_SAMPLES: u32 = 256;
+        let samples = match text.split_once('=') {
+            None if text == "paths" => DEFAULT_SAMPLES,
+            Some(("paths", samples)) => samples
+                .parse()
+                .ok()
+                .filter(|&samples| samples > 0)
+                .ok_or_else(|| format!("'{samples}' is not a number of samples"))?,
+            _ => return Err("expected paths or paths=SAMPLES".to_owned()),
+        };
+        Ok(Self::Paths(samples))
+    }
+}
+
+/// `--sides`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SidesFlag {
+    /// Closed shells one-sided, sheets two-sided
+    Auto,
+    /// Counter-clockwise is the front
+    One,
+    /// Both sides
+    Two,
+}
+
+/// `--mtl-color`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MtlColorFlag {
+    /// As they are
+    Linear,
+    /// Decoded from sRGB
+    Srgb,
+}
+
+/// `--up`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum UpFlag {
+    /// +Y
+    #[value(name = "+Y")]
+    Y,
+    /// +Z
+    #[value(name = "+Z")]
+    Z,
+}
+
+/// `--tonemap`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ToneMapFlag {
+    /// Cut off at white
+    None,
+    /// Khronos PBR Neutral
+    Neutral,
+}
+
+/// `--method`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MethodFlag {
+    /// Spherical harmonics within bounds
+    Bounded,
+    /// Six vectors along the box normals: the paper
+    SixFace,
+    /// One vector
+    Single,
+    /// Sum over all patches
+    Exact,
+    /// The same in every direction
+    Isotropic,
+}
+
+impl MethodFlag {
+    fn method(self) -> Method {
+        match self {
+            Self::Bounded => Method::Bounded,
+            Self::SixFace => Method::SixFace,
+            Self::Single => Method::Single,
+            Self::Exact => Method::Exact,
+            Self::Isotropic => Method::Isotropic,
+        }
+    }
+}
+
+/// `--oracle`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OracleFlag {
+    /// Bounds over both boxes
+    Interval,
+    /// Largest minus smallest over sample pairs: the paper
+    Samples,
+}
+
+impl OracleFlag {
+    fn oracle(self) -> Oracle {
+        match self {
+            Self::Interval => Oracle::Interval,
+            Self::Samples => Oracle::Samples,
+        }
+    }
+}
+
+/// `--direct`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DirectFlag {
+    /// Whichever suits the emitters
+    Auto,
+    /// Shadow rays from every vertex
+    Sampled,
+    /// Over links: the paper
+    Linked,
+}
+
+impl DirectFlag {
+    fn direct(self) -> Direct {
+        match self {
+            Self::Auto => Direct::Auto,
+            Self::Sampled => Direct::Sampled,
+            Self::Linked => Direct::Linked,
+        }
+    }
+}
+
+fn number(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|number: &f32| number.is_finite())
+        .ok_or_else(|| "not a number".to_owned())
+}
+
+fn at_least_zero(text: &str) -> Result<f32, String> {
+    number(text).and_then(|value| match value >= 0.0 {
+        true => Ok(value),
+        false => Err("must be at least 0".to_owned()),
+    })
+}
+
+fn fraction(text: &str) -> Result<f32, String> {
+    number(text).and_then(|value| match (0.0..=1.0).contains(&value) {
+        true => Ok(value),
+        false => Err("must be within 0 and 1".to_owned()),
+    })
+}
+
+fn exposure(text: &str) -> Result<f32, String> {
+    number(text).and_then(|value| match value.abs() <= 60.0 {
+        true => Ok(value),
+        false => Err("must be within -60 and 60".to_owned()),
+    })
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    Duration::try_from_secs_f64(f64::from(at_least_zero(text)?)).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reference_is_read_with_and_without_samples() {
+        assert_eq!("paths=32".parse(), Ok(Reference::Paths(32)));
+        assert!("paths".parse::<Reference>().is_ok());
+        for wrong in ["paths=0", "paths=x", "photons", ""] {
+            assert!(wrong.parse::<Reference>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_outside_their_range_are_refused() {
+        assert!(at_least_zero("-1").is_err() && at_least_zero("nan").is_err());
+        assert!(fraction("1.5").is_err() && seconds("inf").is_err());
+        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
+    }
+}

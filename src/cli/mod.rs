@@ -1,0 +1,103 @@
+//! The command line: flags to settings, commands, exit codes.
+//!
+//! Exit codes: 0 done, 2 usage, 3 scene cannot be read, 4 stopped early with the outputs written, 5 no graphics
+//! adapter, 1 anything else.
+
+mod flags;
+mod load;
+mod output;
+mod progress;
+mod report;
+mod solve;
+mod truth;
+
+use std::{io, path::PathBuf, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+
+pub use flags::{Preset, Reference, RunFlags, SceneFlags, SettingFlags};
+pub use load::{LoadError, load};
+
+/// Light an OBJ scene by extended vector-based radiosity.
+#[derive(Debug, Parser)]
+#[command(version, args_conflicts_with_subcommands = true)]
+pub struct Arguments {
+    /// What to do instead of opening the window
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Scene to open in the window
+    pub scene: Option<PathBuf>,
+}
+
+/// The headless commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Light a scene without a window and write what is asked for
+    Solve(Box<solve::SolveArguments>),
+}
+
+/// A usage error that clap cannot see.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct UsageError(pub(crate) String);
+
+/// How a command that wrote its outputs ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// All was done.
+    Done,
+    /// A limit or an interruption came first; outputs are written.
+    StoppedEarly,
+}
+
+/// Read the command line, do what it says, and return the exit code.
+pub fn run() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match arguments.command {
+        Some(Command::Solve(solve)) => solve::solve(&solve),
+        None => Err(UsageError(
+            "this build has no window; use 'vecrad solve SCENE.obj --export lit.ply'".to_owned(),
+        )
+        .into()),
+    };
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::StoppedEarly) => ExitCode::from(4),
+        // The reader of a pipe has seen enough.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            exit_code_of(&error)
+        }
+    }
+}
+
+fn exit_code_of(error: &anyhow::Error) -> ExitCode {
+    if error.is::<UsageError>() {
+        ExitCode::from(2)
+    } else if error.is::<LoadError>() {
+        ExitCode::from(3)
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<io::Error>()
+            .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_flags_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,158 @@
+//! The JSON report of `solve`.
+
+use serde::Serialize;
+
+use crate::{
+    export::ColorOptions,
+    metrics::ErrorMeasures,
+    scene::{Frame, Scene, Warning},
+    solver::{SolveSettings, StepReport},
+    worker::StopReason,
+};
+
+/// Everything that is known of a solve when it ends.
+#[derive(Debug, Serialize)]
+pub(super) struct SolveReport {
+    pub(super) version: &'static str,
+    pub(super) scene: SceneFacts,
+    pub(super) settings: SolveSettings,
+    pub(super) color: ColorOptions,
+    /// What was skipped because this scene does not need it, and why.
+    pub(super) left_out: Vec<String>,
+    pub(super) warnings: Vec<WarningFacts>,
+    pub(super) steps: Vec<StepFacts>,
+    pub(super) stop_reason: StopReason,
+    pub(super) totals: Totals,
+    pub(super) threads: usize,
+    pub(super) machine: Machine,
+}
+
+/// The scene in figures; lengths in world units.
+#[derive(Debug, Serialize)]
+pub(super) struct SceneFacts {
+    name: String,
+    triangles: usize,
+    /// Sides of triangles that reflect and emit.
+    patches: usize,
+    materials: usize,
+    textures: usize,
+    emitters: usize,
+    bounds: Bounds,
+}
+
+#[derive(Debug, Serialize)]
+struct Bounds {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+impl SceneFacts {
+    /// Count a scene.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let two_sided = scene.triangles.iter().filter(|t| t.two_sided).count();
+        let emits = |surface: &&crate::scene::Surface| surface.emission.max_element() > 0.0;
+        Self {
+            name: scene.name.clone(),
+            triangles: scene.triangles.len(),
+            patches: scene.triangles.len() + two_sided,
+            materials: scene.materials.len(),
+            textures: scene.textures.len(),
+            emitters: scene.surfaces.iter().filter(emits).count(),
+            bounds: bounds(scene, &scene.frame),
+        }
+    }
+}
+
+fn bounds(scene: &Scene, frame: &Frame) -> Bounds {
+    let (mut min, mut max) = (glam::DVec3::MAX, glam::DVec3::MIN);
+    for &position in &scene.positions {
+        let position = frame.to_world(position);
+        min = min.min(position);
+        max = max.max(position);
+    }
+    Bounds {
+        min: min.to_array(),
+        max: max.to_array(),
+    }
+}
+
+/// A warning of the loader.
+#[derive(Debug, Serialize)]
+pub(super) struct WarningFacts {
+    kind: String,
+    message: String,
+    count: usize,
+    file: Option<String>,
+    line: Option<usize>,
+}
+
+impl WarningFacts {
+    /// A warning, field by field.
+    pub(super) fn of(warning: &Warning) -> Self {
+        Self {
+            kind: format!("{:?}", warning.kind),
+            message: warning.message.clone(),
+            count: warning.count,
+            file: warning.place.as_ref().map(|(file, _)| file.clone()),
+            line: warning.place.as_ref().map(|(_, line)| *line),
+        }
+    }
+}
+
+/// A step and its error.
+#[derive(Debug, Serialize)]
+pub(super) struct StepFacts {
+    #[serde(flatten)]
+    pub(super) report: StepReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) error: Option<ErrorMeasures>,
+}
+
+/// Times in seconds; the figures of the last step are in `steps`.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Totals {
+    pub(super) steps: usize,
+    pub(super) read_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reference_s: Option<f64>,
+    pub(super) prepare_s: f64,
+    pub(super) solve_s: f64,
+    pub(super) elapsed_s: f64,
+}
+
+/// The machine that the times belong to.
+#[derive(Debug, Serialize)]
+pub(super) struct Machine {
+    os: &'static str,
+    architecture: &'static str,
+    /// Logical cores that the program may use.
+    cores: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    processor: Option<String>,
+    debug_build: bool,
+}
+
+impl Machine {
+    /// The machine that this runs on.
+    pub(super) fn present() -> Self {
+        Self {
+            os: std::env::consts::OS,
+            architecture: std::env::consts::ARCH,
+            cores: core_count(),
+            processor: processor(),
+            debug_build: cfg!(debug_assertions),
+        }
+    }
+}
+
+/// Logical cores that the program may use.
+pub(super) fn core_count() -> usize {
+    std::thread::available_parallelism().map_or(1, Into::into)
+}
+
+/// The processor's name where the system tells it in a file.
+fn processor() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}

@@ -1,0 +1,7 @@
+//! Files of the lit scene: one format a file, and the colours they share.
+
+mod color;
+mod ply;
+
+pub use color::{ColorOptions, ToneMap, linear_from_srgb, neutral, srgb_from_linear};
+pub use ply::{PlyOptions, UpAxis, write_ply};

@@ -1,0 +1,181 @@
+//! The light tree: split by extent, not by surface area cost.
+//!
+//! Each cluster is cut at the middle of the longest axis of its centroids, so that clusters are compact in all
+//! directions; a cut that leaves one side empty, or a depth that an unlucky scene would drive on, is replaced by one
+//! at the median.
+
+use glam::Vec3;
+
+use super::{Cluster, Patch};
+use crate::{
+    geometry::centroid,
+    scene::{Scene, TriangleId},
+};
+
+/// Patches that a leaf cluster holds at most. With 1, tables cost more than they save; with many, links that need
+/// single patches skip a level of the tree.
+const LEAF_PATCHES: usize = 4;
+
+/// Depth from which cuts are at the median. It bounds the depth of the tree by this plus 32.
+const MEDIAN_DEPTH: u32 = 48;
+
+/// A patch on its way into the tree.
+struct Item {
+    triangle: TriangleId,
+    is_back: bool,
+    centroid: Vec3,
+}
+
+/// Clusters, and patches in the order of the tree.
+pub(super) fn build(scene: &Scene) -> (Vec<Cluster>, Vec<Patch>) {
+    let mut items = lit_sides(scene);
+    let mut clusters = vec![cluster(0, items.len(), u32::MAX)];
+    let mut pending = vec![(0usize, 0u32)];
+    while let Some((index, depth)) = pending.pop() {
+        let Cluster { start, end, .. } = clusters[index];
+        let range = start as usize..end as usize;
+        if range.len() <= LEAF_PATCHES {
+            continue;
+        }
+        let middle = range.start + split(&mut items[range.clone()], depth >= MEDIAN_DEPTH);
+        let first = clusters.len();
+        clusters[index].first_child = first as u32;
+        clusters.push(cluster(range.start, middle, index as u32));
+        clusters.push(cluster(middle, range.end, index as u32));
+        pending.push((first + 1, depth + 1));
+        pending.push((first, depth + 1));
+    }
+    let patches: Vec<Patch> = items.iter().map(|item| patch(scene, item)).collect();
+    fit_boxes(scene, &patches, &mut clusters);
+    (clusters, patches)
+}
+
+/// Fronts of all triangles and backs of the two-sided ones.
+fn lit_sides(scene: &Scene) -> Vec<Item> {
+    let mut items = Vec::with_capacity(scene.triangles.len());
+    for triangle in scene.triangle_ids() {
+        let centroid = centroid(scene.corners(triangle));
+        items.push(Item {
+            triangle,
+            is_back: false,
+            centroid,
+        });
+        if scene.triangles[triangle.index()].two_sided {
+            items.push(Item {
+                triangle,
+                is_back: true,
+                centroid,
+            });
+        }
+    }
+    items
+}
+
+fn cluster(start: usize, end: usize, parent: u32) -> Cluster {
+    Cluster {
+        min: Vec3::ZERO,
+        max: Vec3::ZERO,
+        first_child: Cluster::LEAF,
+        start: start as u32,
+        end: end as u32,
+        parent,
+        area: 0.0,
+        centroid: Vec3::ZERO,
+        radius: 0.0,
+    }
+}
+
+fn patch(scene: &Scene, item: &Item) -> Patch {
+    let surface = scene.surfaces[item.triangle.index()];
+    let area_vector = if item.is_back {
+        -surface.area_vector
+    } else {
+        surface.area_vector
+    };
+    Patch {
+        triangle: item.triangle,
+        is_back: item.is_back,
+        area_vector,
+        normal: area_vector.as_dvec3().normalize_or_zero().as_vec3(),
+        area: area_vector.length(),
+        reflectance: surface.reflectance,
+        emission: surface.emission,
+    }
+}
+
+/// Reorder the items about a cut and return how many come before it; both sides hold at least one.
+fn split(items: &mut [Item], at_median: bool) -> usize {
+    let (mut min, mut max) = (Vec3::MAX, Vec3::MIN);
+    for item in items.iter() {
+        min = min.min(item.centroid);
+        max = max.max(item.centroid);
+    }
+    let extent = max - min;
+    let axis = extent.max_position();
+    if !at_median && extent[axis] > 0.0 {
+        let cut = min[axis] + 0.5 * extent[axis];
+        let mut count = 0;
+        for i in 0..items.len() {
+            if items[i].centroid[axis] < cut {
+                items.swap(i, count);
+                count += 1;
+            }
+        }
+        if count > 0 && count < items.len() {
+            return count;
+        }
+    }
+    let middle = items.len() / 2;
+    items.select_nth_unstable_by(middle, |a, b| {
+        let key = |item: &Item| (item.triangle, item.is_back);
+        a.centroid[axis]
+            .total_cmp(&b.centroid[axis])
+            .then_with(|| key(a).cmp(&key(b)))
+    });
+    middle
+}
+
+/// Boxes, areas and centroids, from the leaves up.
+fn fit_boxes(scene: &Scene, patches: &[Patch], clusters: &mut [Cluster]) {
+    for index in (0..clusters.len()).rev() {
+        let mut cluster = clusters[index];
+        let (mut min, mut max, mut area) = (Vec3::MAX, Vec3::MIN, 0.0f64);
+        let (mut weighted, mut plain, mut count) = (glam::DVec3::ZERO, glam::DVec3::ZERO, 0.0);
+        if cluster.is_leaf() {
+            for patch in &patches[cluster.patches()] {
+                let corners = scene.corners(patch.triangle);
+                for corner in corners {
+                    min = min.min(corner);
+                    max = max.max(corner);
+                }
+                let middle = centroid(corners).as_dvec3();
+                area += f64::from(patch.area);
+                weighted += middle * f64::from(patch.area);
+                plain += middle;
+                count += 1.0;
+            }
+        } else {
+            for child in &clusters[cluster.first_child as usize..cluster.first_child as usize + 2] {
+                min = min.min(child.min);
+                max = max.max(child.max);
+                let middle = child.centroid.as_dvec3();
+                area += f64::from(child.area);
+                weighted += middle * f64::from(child.area);
+                plain += middle;
+                count += 1.0;
+            }
+        }
+        (cluster.min, cluster.max, cluster.area) = (min, max, area as f32);
+        // Areas may underflow: then all count alike.
+        let middle = if area > 0.0 {
+            weighted / area
+        } else {
+            plain / count
+        };
+        cluster.centroid = middle.as_vec3().clamp(min, max);
+        cluster.radius = (cluster.centroid - min)
+            .max(max - cluster.centroid)
+            .length();
+        clusters[index] = cluster;
+    }
+}

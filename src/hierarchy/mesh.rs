@@ -1,0 +1,428 @@
+//! Elements: patches divided into four, again and again, on vertices that neighbours share.
+//!
+//! Points and vertices are kept apart. A point is a place; an edge between two points has one midpoint, whoever
+//! divides it, so that no crack can open. A vertex is a point as one smooth surface sees it: faces on both sides of a
+//! crease or of a material border have vertices of their own at the same point.
+//! Neighbours stay within one level, so that an edge of a leaf carries at most one hanging point.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use super::Patch;
+use crate::scene::Scene;
+
+/// Levels of division at most: beyond, single precision cannot tell neighbours apart.
+const DEEPEST_LEVEL: u8 = 14;
+
+/// A triangle that receives and sends as one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Element {
+    /// Indices into [`Mesh::vertices`], counter-clockwise from the lit side.
+    pub vertices: [u32; 3],
+    /// First of four adjacent children, or [`Element::LEAF`].
+    pub first_child: u32,
+    /// The patch it lies on.
+    pub patch: u32,
+    /// The element above, or `u32::MAX` for a patch.
+    pub parent: u32,
+    /// Divisions between the patch and this.
+    pub level: u8,
+    /// Mean of the corners.
+    pub centroid: Vec3,
+    /// Largest distance of a corner from the centroid.
+    pub radius: f32,
+    /// Area times unit normal.
+    pub area_vector: Vec3,
+}
+
+impl Element {
+    /// Stands for missing children.
+    pub const LEAF: u32 = u32::MAX;
+
+    /// Whether it has no children.
+    pub fn is_leaf(&self) -> bool {
+        self.first_child == Self::LEAF
+    }
+}
+
+/// A point as one smooth surface sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    /// Index into [`Mesh::points`].
+    pub point: u32,
+    /// The vertices between which this one was made, or `None` for a corner of the scene.
+    pub ends: Option<[u32; 2]>,
+}
+
+/// Elements with their points and vertices.
+pub struct Mesh {
+    /// Places in frame units; the scene's positions come first.
+    pub points: Vec<Vec3>,
+    /// Points as smooth surfaces see them.
+    pub vertices: Vec<Vertex>,
+    /// All elements; the patches come first, in order.
+    pub elements: Vec<Element>,
+    /// Midpoint of the edge between two points, lower index first.
+    point_between: HashMap<(u32, u32), u32>,
+    /// Midpoint vertex of the edge between two vertices, lower index first.
+    vertex_between: HashMap<(u32, u32), u32>,
+    /// Leaves at each side of an edge between points, for balance: element ids by edge.
+    leaves_at: HashMap<(u32, u32), Vec<u32>>,
+}
+
+fn edge(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+impl Mesh {
+    /// One element per patch.
+    pub(super) fn new(scene: &Scene, patches: &[Patch], crease_degrees: f32) -> Self {
+        let corners: Vec<[u32; 3]> = patches
+            .iter()
+            .map(|patch| {
+                let [a, b, c] = scene.triangles[patch.triangle.index()].corners;
+                if patch.is_back { [a, c, b] } else { [a, b, c] }
+            })
+            .collect();
+        let (vertices, vertex_of) = share_vertices(scene, patches, &corners, crease_degrees);
+        let mut mesh = Self {
+            points: scene.positions.clone(),
+            vertices,
+            elements: Vec::with_capacity(patches.len()),
+            point_between: HashMap::new(),
+            vertex_between: HashMap::new(),
+            leaves_at: HashMap::new(),
+        };
+        for (index, patch) in patches.iter().enumerate() {
+            let element = mesh.element(
+                vertex_of[index],
+                index as u32,
+                u32::MAX,
+                0,
+                patch.area_vector,
+            );
+            mesh.elements.push(element);
+        }
+        mesh
+    }
+
+    fn element(
+        &self,
+        vertices: [u32; 3],
+        patch: u32,
+        parent: u32,
+        level: u8,
+        area_vector: Vec3,
+    ) -> Element {
+        let corners = vertices.map(|vertex| self.position(vertex));
+        let centroid = crate::geometry::centroid(corners);
+        let radius = corners
+            .iter()
+            .map(|corner| corner.distance(centroid))
+            .fold(0.0, f32::max);
+        Element {
+            vertices,
+            first_child: Element::LEAF,
+            patch,
+            parent,
+            level,
+            centroid,
+            radius,
+            area_vector,
+        }
+    }
+
+    /// Where a vertex is.
+    pub fn position(&self, vertex: u32) -> Vec3 {
+        self.points[self.vertices[vertex as usize].point as usize]
+    }
+
+    /// The corners of an element.
+    pub fn corners(&self, element: usize) -> [Vec3; 3] {
+        self.elements[element]
+            .vertices
+            .map(|vertex| self.position(vertex))
+    }
+
+    /// The leaves in order.
+    pub fn leaves(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.elements.len()).filter(|&index| self.elements[index].is_leaf())
+    }
+
+    /// Divide the given leaves, and their neighbours as far as balance asks. Elements that are no leaves are passed
+    /// over, as are those at the deepest level. Returns whether anything was divided.
+    pub fn divide(&mut self, wanted: &[u32]) -> bool {
+        if self.leaves_at.is_empty() {
+            self.index_leaves();
+        }
+        let before = self.elements.len();
+        let mut pending: Vec<u32> = wanted.to_vec();
+        while let Some(index) = pending.pop() {
+            let element = self.elements[index as usize];
+            if !element.is_leaf() || element.level >= DEEPEST_LEVEL {
+                continue;
+            }
+            self.divide_one(index);
+            // An edge of the new children may lie on a neighbour's half edge: then the neighbour is two levels
+            // above and must be divided, too.
+            for half in self.half_edges_of_parent(index) {
+                if let Some(coarse) = self.leaf_over(half) {
+                    pending.extend(coarse);
+                }
+            }
+        }
+        self.elements.len() > before
+    }
+
+    /// The three edges of an element, as pairs of points.
+    fn point_edges(&self, vertices: [u32; 3]) -> [(u32, u32); 3] {
+        let [a, b, c] = vertices.map(|vertex| self.vertices[vertex as usize].point);
+        [edge(a, b), edge(b, c), edge(c, a)]
+    }
+
+    fn index_leaves(&mut self) {
+        for index in 0..self.elements.len() {
+            if self.elements[index].is_leaf() {
+                for key in self.point_edges(self.elements[index].vertices) {
+                    self.leaves_at.entry(key).or_default().push(index as u32);
+                }
+            }
+        }
+    }
+
+    fn divide_one(&mut self, index: u32) {
+        let parent = self.elements[index as usize];
+        for key in self.point_edges(parent.vertices) {
+            if let Some(leaves) = self.leaves_at.get_mut(&key) {
+                leaves.retain(|&leaf| leaf != index);
+            }
+        }
+        let [a, b, c] = parent.vertices;
+        let (ab, bc, ca) = (self.middle(a, b), self.middle(b, c), self.middle(c, a));
+        self.elements[index as usize].first_child = self.elements.len() as u32;
+        for vertices in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
+            let child = self.element(
+                vertices,
+                parent.patch,
+                index,
+                parent.level + 1,
+                parent.area_vector * 0.25,
+            );
+            let child_index = self.elements.len() as u32;
+            self.elements.push(child);
+            for key in self.point_edges(vertices) {
+                self.leaves_at.entry(key).or_default().push(child_index);
+            }
+        }
+    }
+
+    /// Edges whose midpoint is an end of a half edge of the divided element: the edges that its own edges are halves
+    /// of, where a leaf may still lie undivided.
+    fn half_edges_of_parent(&self, index: u32) -> Vec<(u32, u32)> {
+        let element = self.elements[index as usize];
+        if element.parent == u32::MAX {
+            return Vec::new();
+        }
+        self.point_edges(self.elements[element.parent as usize].vertices)
+            .to_vec()
+    }
+
+    /// Leaves that have a whole edge where others already have quarters of it.
+    fn leaf_over(&self, key: (u32, u32)) -> Option<Vec<u32>> {
+        let middle = *self.point_between.get(&key)?;
+        let quartered = [edge(key.0, middle), edge(middle, key.1)]
+            .iter()
+            .any(|half| self.point_between.contains_key(half));
+        if !quartered {
+            return None;
+        }
+        let leaves = self.leaves_at.get(&key)?;
+        (!leaves.is_empty()).then(|| leaves.clone())
+    }
+
+    /// The vertex in the middle between two vertices, made if it is not there.
+    fn middle(&mut self, a: u32, b: u32) -> u32 {
+        let key = edge(a, b);
+        if let Some(&vertex) = self.vertex_between.get(&key) {
+            return vertex;
+        }
+        let points = edge(
+            self.vertices[a as usize].point,
+            self.vertices[b as usize].point,
+        );
+        let place = (self.points[points.0 as usize] + self.points[points.1 as usize]) * 0.5;
+        let point = *self.point_between.entry(points).or_insert_with(|| {
+            self.points.push(place);
+            self.points.len() as u32 - 1
+        });
+        let vertex = self.vertices.len() as u32;
+        self.vertices.push(Vertex {
+            point,
+            ends: Some([a, b]),
+        });
+        self.vertex_between.insert(key, vertex);
+        vertex
+    }
+
+    /// Whether an edge of a leaf carries more than one hanging point.
+    pub(super) fn hangs_twice(&self, leaf: usize) -> bool {
+        self.point_edges(self.elements[leaf].vertices)
+            .iter()
+            .any(|key| {
+                self.point_between.get(key).is_some_and(|&middle| {
+                    let halves = [edge(key.0, middle), edge(middle, key.1)];
+                    halves
+                        .iter()
+                        .any(|half| self.point_between.contains_key(half))
+                })
+            })
+    }
+
+    /// The leaves as triangles without T-junctions, each with the element that it lies on: where a neighbour divided
+    /// an edge, the vertex in its middle is used on this side, too. Vertices that this side of a crease lacks are made.
+    pub fn closed_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
+        let mut triangles = Vec::with_capacity(self.elements.len());
+        for index in 0..self.elements.len() {
+            if !self.elements[index].is_leaf() {
+                continue;
+            }
+            let corners = self.elements[index].vertices;
+            let keys = self.point_edges(corners);
+            let middles: [Option<u32>; 3] = std::array::from_fn(|side| {
+                let hangs = self.point_between.contains_key(&keys[side]);
+                hangs.then(|| self.middle(corners[side], corners[(side + 1) % 3]))
+            });
+            close(corners, middles, |vertices| {
+                triangles.push((index as u32, vertices))
+            });
+        }
+        triangles
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        /// A hash table keeps about an eighth of its slots free and a byte of control per slot.
+        const SLOT: usize = 16;
+        size_of_val(self.points.as_slice())
+            + size_of_val(self.vertices.as_slice())
+            + size_of_val(self.elements.as_slice())
+            + SLOT * (self.point_between.capacity() + self.vertex_between.capacity())
+            + 3 * SLOT * self.leaves_at.capacity()
+    }
+}
+
+/// Triangulate a triangle with vertices in the middle of some of its edges (edge k starts at corner k).
+fn close([a, b, c]: [u32; 3], middles: [Option<u32>; 3], mut emit: impl FnMut([u32; 3])) {
+    match middles {
+        [None, None, None] => emit([a, b, c]),
+        [Some(ab), Some(bc), Some(ca)] => {
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                .into_iter()
+                .for_each(emit);
+        }
+        // Turn the triangle until the first edge is the one that differs from the others.
+        [Some(ab), None, None] => [[a, ab, c], [ab, b, c]].into_iter().for_each(emit),
+        [None, Some(bc), Some(ca)] => [[a, b, ca], [b, bc, ca], [ca, bc, c]]
+            .into_iter()
+            .for_each(emit),
+        [first, second, third] => close([b, c, a], [second, third, first], emit),
+    }
+}
+
+/// Vertices of the patches: corners at one point are one vertex where a chain of smooth edges joins their patches.
+fn share_vertices(
+    scene: &Scene,
+    patches: &[Patch],
+    corners: &[[u32; 3]],
+    crease_degrees: f32,
+) -> (Vec<Vertex>, Vec<[u32; 3]>) {
+    let mut corner_group = Groups::new(corners.len() * 3);
+    // Half edges sorted by edge: neighbours are then adjacent. The last fields tell which corners they join.
+    let mut half_edges: Vec<(u32, u32, bool, u32, u8)> = Vec::with_capacity(corners.len() * 3);
+    for (patch, points) in corners.iter().enumerate() {
+        for side in 0..3 {
+            let (a, b) = (points[side], points[(side + 1) % 3]);
+            half_edges.push((a.min(b), a.max(b), a < b, patch as u32, side as u8));
+        }
+    }
+    half_edges.sort_unstable();
+    let smooth = crease_degrees.to_radians().cos();
+    for run in half_edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let first_down = run.partition_point(|half| !half.2);
+        let (down, up) = run.split_at(first_down);
+        for one in up {
+            let likeness = |other: &&(u32, u32, bool, u32, u8)| {
+                patches[one.3 as usize]
+                    .normal
+                    .dot(patches[other.3 as usize].normal)
+            };
+            let best = down
+                .iter()
+                .max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+            let Some(other) = best else { continue };
+            if likeness(&other) >= smooth && same_material(scene, patches, one.3, other.3) {
+                let (a, b) = (
+                    one.3 * 3 + u32::from(one.4),
+                    one.3 * 3 + u32::from((one.4 + 1) % 3),
+                );
+                let (c, d) = (
+                    other.3 * 3 + u32::from(other.4),
+                    other.3 * 3 + u32::from((other.4 + 1) % 3),
+                );
+                // They run in opposite directions: the start of one is the end of the other.
+                corner_group.join(a, d);
+                corner_group.join(b, c);
+            }
+        }
+    }
+    let mut vertices = Vec::new();
+    let mut vertex_of_group = vec![u32::MAX; corners.len() * 3];
+    let vertex_of = corners
+        .iter()
+        .enumerate()
+        .map(|(patch, points)| {
+            std::array::from_fn(|side| {
+                let slot =
+                    &mut vertex_of_group[corner_group.find((patch * 3 + side) as u32) as usize];
+                if *slot == u32::MAX {
+                    *slot = vertices.len() as u32;
+                    vertices.push(Vertex {
+                        point: points[side],
+                        ends: None,
+                    });
+                }
+                *slot
+            })
+        })
+        .collect();
+    (vertices, vertex_of)
+}
+
+fn same_material(scene: &Scene, patches: &[Patch], a: u32, b: u32) -> bool {
+    let material = |patch: u32| scene.triangles[patches[patch as usize].triangle.index()].material;
+    material(a) == material(b)
+}
+
+/// Disjoint sets over the corners.
+struct Groups(Vec<u32>);
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn find(&mut self, mut item: u32) -> u32 {
+        while self.0[item as usize] != item {
+            let above = self.0[self.0[item as usize] as usize];
+            self.0[item as usize] = above;
+            item = above;
+        }
+        item
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+}

@@ -1,0 +1,228 @@
+//! The light hierarchy: clusters over patches, patches divided into elements, and what each shows of itself.
+//!
+//! Two trees in flat arrays. Clusters form a binary tree split by extent, each over a contiguous range of patches; a
+//! patch is one lit side of a triangle, and the root of a tree of elements that are divided into four.
+//! A [`NodeId`] names any of them. The tree for rays is another one (see `geometry`): a tree that is good for rays
+//! strews flat clusters over whole walls.
+
+mod build;
+mod directional;
+mod mesh;
+mod tables;
+mod validate;
+
+pub use directional::{Moments, Quantity, Reading};
+pub use mesh::{Element, Mesh, Vertex};
+pub use tables::Tables;
+
+use glam::Vec3;
+
+use crate::scene::{Scene, TriangleId};
+
+/// Index of a patch, in tree order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PatchId(pub u32);
+
+/// Index of an element; the first ones are the patches themselves, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ElementId(pub u32);
+
+/// A cluster or an element: clusters come first, so that ids of clusters never change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(pub u32);
+
+impl PatchId {
+    /// The position among the patches.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl ElementId {
+    /// The position among the elements.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl NodeId {
+    /// The position in a table over all nodes.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// One lit side of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// The triangle.
+    pub triangle: TriangleId,
+    /// Whether this is the back of a two-sided triangle.
+    pub is_back: bool,
+    /// Area times unit normal, towards the lit side.
+    pub area_vector: Vec3,
+    /// Unit normal.
+    pub normal: Vec3,
+    /// Area, above 0 unless it underflows.
+    pub area: f32,
+    /// Mean reflectance.
+    pub reflectance: Vec3,
+    /// Mean emitted radiance.
+    pub emission: Vec3,
+}
+
+/// A node of the binary tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cluster {
+    /// Lower corner of the bounding box.
+    pub min: Vec3,
+    /// Upper corner of the bounding box.
+    pub max: Vec3,
+    /// First of two adjacent child clusters, or [`Cluster::LEAF`].
+    pub first_child: u32,
+    /// First patch.
+    pub start: u32,
+    /// One past the last patch.
+    pub end: u32,
+    /// The cluster above, or `u32::MAX` for the root.
+    pub parent: u32,
+    /// Sum of the patch areas.
+    pub area: f32,
+    /// Area-weighted mean of the patch centroids: the point that stands for the cluster. The centre of the box would
+    /// err by a share of (size / distance), this errs by its square.
+    pub centroid: Vec3,
+    /// Radius of a sphere about the centroid that holds the box.
+    pub radius: f32,
+}
+
+impl Cluster {
+    /// Stands for a missing child: the children are then the patches themselves.
+    pub const LEAF: u32 = u32::MAX;
+
+    /// Whether the children are patches.
+    pub fn is_leaf(&self) -> bool {
+        self.first_child == Self::LEAF
+    }
+
+    /// Range of patches.
+    pub fn patches(&self) -> std::ops::Range<usize> {
+        self.start as usize..self.end as usize
+    }
+}
+
+/// Either kind of node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Index into [`Hierarchy::clusters`].
+    Cluster(usize),
+    /// Index into the elements of [`Hierarchy::mesh`].
+    Element(usize),
+}
+
+/// The children of a node: a run of ids, empty for a leaf.
+pub type Children = std::ops::Range<u32>;
+
+/// Clusters, patches and elements of a scene.
+pub struct Hierarchy {
+    /// The binary tree; the root is first, children come after their parents.
+    pub clusters: Vec<Cluster>,
+    /// The lit sides, in tree order.
+    pub patches: Vec<Patch>,
+    /// Elements and the vertices that they share.
+    pub mesh: Mesh,
+    /// Sum of all patch areas.
+    pub area: f64,
+}
+
+impl Hierarchy {
+    /// Build the tree of a scene. `crease_degrees` is the angle between faces above which vertices are not shared.
+    pub fn new(scene: &Scene, crease_degrees: f32) -> Self {
+        let (clusters, patches) = build::build(scene);
+        let mesh = Mesh::new(scene, &patches, crease_degrees);
+        let area = patches.iter().map(|patch| f64::from(patch.area)).sum();
+        Self {
+            clusters,
+            patches,
+            mesh,
+            area,
+        }
+    }
+
+    /// The root cluster.
+    pub const ROOT: NodeId = NodeId(0);
+
+    /// Number of nodes of both kinds.
+    pub fn node_count(&self) -> usize {
+        self.clusters.len() + self.mesh.elements.len()
+    }
+
+    /// What a node is.
+    pub fn kind(&self, node: NodeId) -> Kind {
+        let clusters = self.clusters.len();
+        if node.index() < clusters {
+            Kind::Cluster(node.index())
+        } else {
+            Kind::Element(node.index() - clusters)
+        }
+    }
+
+    /// The node of an element.
+    pub fn element_node(&self, element: ElementId) -> NodeId {
+        NodeId(self.clusters.len() as u32 + element.0)
+    }
+
+    /// The children of a node, as node ids.
+    pub fn children(&self, node: NodeId) -> Children {
+        let base = self.clusters.len() as u32;
+        match self.kind(node) {
+            Kind::Cluster(index) => {
+                let cluster = &self.clusters[index];
+                if cluster.is_leaf() {
+                    base + cluster.start..base + cluster.end
+                } else {
+                    cluster.first_child..cluster.first_child + 2
+                }
+            }
+            Kind::Element(index) => match self.mesh.elements[index].first_child {
+                Element::LEAF => 0..0,
+                first => base + first..base + first + 4,
+            },
+        }
+    }
+
+    /// The point that stands for a node: the centroid of its area.
+    pub fn centroid(&self, node: NodeId) -> Vec3 {
+        match self.kind(node) {
+            Kind::Cluster(index) => self.clusters[index].centroid,
+            Kind::Element(index) => self.mesh.elements[index].centroid,
+        }
+    }
+
+    /// Radius of a sphere about the centroid that holds the node.
+    pub fn radius(&self, node: NodeId) -> f32 {
+        match self.kind(node) {
+            Kind::Cluster(index) => self.clusters[index].radius,
+            Kind::Element(index) => self.mesh.elements[index].radius,
+        }
+    }
+
+    /// Total area of a node.
+    pub fn node_area(&self, node: NodeId) -> f32 {
+        match self.kind(node) {
+            Kind::Cluster(index) => self.clusters[index].area,
+            Kind::Element(index) => self.mesh.elements[index].area_vector.length(),
+        }
+    }
+
+    /// The patch that an element lies on.
+    pub fn patch_of(&self, element: usize) -> &Patch {
+        &self.patches[self.mesh.elements[element].patch as usize]
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.clusters.as_slice())
+            + size_of_val(self.patches.as_slice())
+            + self.mesh.memory_bytes()
+    }
+}

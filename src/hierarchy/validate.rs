@@ -1,0 +1,202 @@
+//! Checks that a hierarchy keeps its promises; for tests, after every build and division.
+
+use super::{Hierarchy, NodeId};
+
+impl Hierarchy {
+    /// The first promise that is broken, in words.
+    ///
+    /// # Errors
+    /// Names the node and what is wrong with it.
+    pub fn validate(&self) -> Result<(), String> {
+        self.validate_clusters()?;
+        self.validate_elements()?;
+        self.validate_balance()
+    }
+
+    /// Clusters cover each patch once, children divide their parent's range and lie in its box.
+    fn validate_clusters(&self) -> Result<(), String> {
+        let root = self.clusters.first().ok_or("no root cluster")?;
+        if root.patches() != (0..self.patches.len()) {
+            return Err("the root does not cover all patches".to_owned());
+        }
+        for (index, cluster) in self.clusters.iter().enumerate() {
+            let children = self.children(NodeId(index as u32));
+            if cluster.is_leaf() {
+                continue;
+            }
+            let [first, second] =
+                [children.start, children.end - 1].map(|child| &self.clusters[child as usize]);
+            let divides = first.start == cluster.start
+                && first.end == second.start
+                && second.end == cluster.end;
+            if !divides || first.patches().is_empty() || second.patches().is_empty() {
+                return Err(format!(
+                    "cluster {index}: children do not divide its patches"
+                ));
+            }
+            for child in [first, second] {
+                if child.parent != index as u32
+                    || child.min.cmplt(cluster.min).any()
+                    || child.max.cmpgt(cluster.max).any()
+                {
+                    return Err(format!("cluster {index}: a child does not lie in it"));
+                }
+            }
+            let area = first.area + second.area;
+            if (area - cluster.area).abs() > 1e-5 * cluster.area {
+                return Err(format!(
+                    "cluster {index}: area {} but children have {area}",
+                    cluster.area
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Children of elements share their parent's area and patch.
+    fn validate_elements(&self) -> Result<(), String> {
+        let elements = &self.mesh.elements;
+        for (index, element) in elements.iter().enumerate() {
+            if element.is_leaf() {
+                continue;
+            }
+            for child in element.first_child as usize..element.first_child as usize + 4 {
+                let child = elements
+                    .get(child)
+                    .ok_or(format!("element {index}: missing child"))?;
+                if child.parent != index as u32
+                    || child.patch != element.patch
+                    || child.level != element.level + 1
+                {
+                    return Err(format!("element {index}: a child does not belong to it"));
+                }
+                if child.area_vector != element.area_vector * 0.25 {
+                    return Err(format!(
+                        "element {index}: a child has not a quarter of its area"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// No edge of a leaf carries more than one hanging point.
+    fn validate_balance(&self) -> Result<(), String> {
+        for leaf in self.mesh.leaves() {
+            if self.mesh.hangs_twice(leaf) {
+                return Err(format!("element {leaf}: a neighbour is two levels finer"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::{
+        geometry::Random,
+        scene::{Material, SceneBuilder, SceneOptions},
+    };
+
+    /// A bumpy sheet of `2 · side²` triangles.
+    fn sheet(side: u32, seed: u64) -> SceneBuilder {
+        let mut random = Random::new(seed, 0);
+        let mut builder = SceneBuilder::default();
+        let material = builder.push_material(Material::plain("grey", Vec3::splat(0.5), Vec3::ONE));
+        for row in 0..=side {
+            for column in 0..=side {
+                builder.push_position(DVec3::new(
+                    column.into(),
+                    f64::from(random.uniform()),
+                    row.into(),
+                ));
+            }
+        }
+        for row in 0..side {
+            for column in 0..side {
+                let a = row * (side + 1) + column;
+                let (b, c, d) = (a + 1, a + side + 1, a + side + 2);
+                builder.push_triangle([a, c, b], material);
+                builder.push_triangle([b, c, d], material);
+            }
+        }
+        builder
+    }
+
+    fn hierarchy(builder: SceneBuilder) -> Hierarchy {
+        let scene = builder
+            .finish(&SceneOptions::default())
+            .expect("the sheet has faces");
+        Hierarchy::new(&scene, 40.0)
+    }
+
+    #[test]
+    fn hierarchies_of_any_size_keep_their_promises() {
+        for side in [1, 2, 3, 7, 20] {
+            hierarchy(sheet(side, 1)).validate().unwrap();
+        }
+    }
+
+    #[test]
+    fn random_divisions_stay_balanced() {
+        for seed in 0..5 {
+            let mut hierarchy = hierarchy(sheet(4, seed));
+            let mut random = Random::new(seed, 1);
+            for _ in 0..40 {
+                let wanted = random.below(hierarchy.mesh.elements.len() as u32);
+                hierarchy.mesh.divide(&[wanted]);
+                hierarchy.validate().unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn deep_division_at_one_corner_stays_balanced() {
+        let mut hierarchy = hierarchy(sheet(3, 3));
+        for _ in 0..8 {
+            let corner = hierarchy
+                .mesh
+                .leaves()
+                .find(|&leaf| hierarchy.mesh.elements[leaf].vertices.contains(&0));
+            hierarchy.mesh.divide(&[corner.unwrap() as u32]);
+            hierarchy.validate().unwrap();
+        }
+    }
+
+    #[test]
+    fn closed_edges_leave_no_crack() {
+        let mut hierarchy = hierarchy(sheet(3, 4));
+        for _ in 0..4 {
+            let wanted: Vec<u32> = hierarchy
+                .mesh
+                .leaves()
+                .step_by(5)
+                .map(|leaf| leaf as u32)
+                .collect();
+            hierarchy.mesh.divide(&wanted);
+        }
+        let triangles = hierarchy.mesh.closed_triangles();
+        // Each edge inside the sheet has as many triangles on one side as on the other.
+        let mut balance = std::collections::HashMap::new();
+        for (_, vertices) in &triangles {
+            let points = vertices.map(|vertex| hierarchy.mesh.vertices[vertex as usize].point);
+            for side in 0..3 {
+                let (a, b) = (points[side], points[(side + 1) % 3]);
+                *balance.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
+            }
+        }
+        let border = |point: u32| {
+            let position = hierarchy.mesh.points[point as usize];
+            let rim = 0.999 * 50.0;
+            (position.x.abs() > rim, position.z.abs() > rim)
+        };
+        for ((a, b), sum) in balance {
+            let (a, b) = (border(a), border(b));
+            let on_rim = (a.0 && b.0) || (a.1 && b.1);
+            assert!(sum == 0 || on_rim, "open edge inside the sheet");
+        }
+    }
+}

@@ -1,0 +1,21 @@
+//! The truth by other means: closed forms, the full radiosity matrix, path tracing.
+//!
+//! This room sees only scene and geometry and shares no code with the transport, so that an error in the method's
+//! kernel cannot hide in what it is measured against. Radiosity B = π·L throughout, radiance `L = Le + ρ·E/π`.
+
+pub mod analytic;
+mod emitters;
+mod estimator;
+mod form_factor;
+mod matrix;
+mod path_trace;
+
+pub use matrix::{MatrixError, MatrixPatch, MatrixSettings, MatrixSolution, solve_matrix};
+pub use path_trace::{BakePoint, PathSettings, PathTraced, PathTracer, ReferencePoint, bake};
+
+use glam::Vec3;
+
+/// Luminance of linear RGB (Rec. 709).
+pub fn luminance(rgb: Vec3) -> f32 {
+    rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}

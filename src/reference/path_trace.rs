@@ -1,0 +1,353 @@
+//! Irradiance at random surface points by path tracing, pass by pass, with its standard error.
+//!
+//! Points are spread evenly over the lit area, so plain means over them are area-weighted. Each takes its samples in
+//! groups; a group covers the hemisphere with a randomly shifted low-discrepancy sequence, and since groups are
+//! independent their scatter gives an unbiased variance. All random numbers belong to a point and a group, so the
+//! result does not depend on threads.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::{
+    emitters::Emitters,
+    estimator::{Bounce, Estimator, PathPoint},
+    luminance,
+};
+use crate::{
+    geometry::{Random, RayTree, centroid, low_discrepancy_2d, triangle_point},
+    scene::{Scene, TriangleId},
+};
+
+/// Samples of a group. Fewer lose stratification, more leave too few groups to tell the variance from.
+const GROUP: u32 = 8;
+
+/// How a path-traced reference is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathSettings {
+    /// Number of surface points; the error of a relative RMS over them is about `1/√(2·points)` of itself.
+    pub point_count: u32,
+    /// Samples per point and pass, rounded up to at least two groups of 8.
+    pub samples_per_pass: u32,
+    /// Same seed, same points and same samples.
+    pub seed: u64,
+}
+
+impl Default for PathSettings {
+    fn default() -> Self {
+        Self {
+            point_count: 4000,
+            samples_per_pass: 32,
+            seed: 0,
+        }
+    }
+}
+
+/// A point of the reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferencePoint {
+    /// The triangle it lies on.
+    pub triangle: TriangleId,
+    /// Whether it lies on the back of a two-sided triangle.
+    pub is_back: bool,
+    /// Its place in the triangle; sums to 1.
+    pub barycentric: Vec3,
+    /// Position in frame units.
+    pub position: Vec3,
+    /// Unit normal towards the lit side.
+    pub normal: Vec3,
+    /// Reflectance there.
+    pub reflectance: Vec3,
+    /// Emitted radiance there, W·sr⁻¹·m⁻².
+    pub emission: Vec3,
+    /// Irradiance, W/m²; 0 before the first pass.
+    pub irradiance: Vec3,
+    /// Standard error of the luminance of the irradiance, W/m².
+    pub irradiance_error: f32,
+    /// Standard error of the luminance of the radiance, W·sr⁻¹·m⁻².
+    pub standard_error: f32,
+}
+
+impl ReferencePoint {
+    /// Radiance that leaves the point, emitted and reflected, W·sr⁻¹·m⁻².
+    pub fn radiance(&self) -> Vec3 {
+        self.emission + self.reflectance * self.irradiance * std::f32::consts::FRAC_1_PI
+    }
+}
+
+/// A reference as it stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PathTraced {
+    /// Area-weighted random points.
+    pub points: Vec<ReferencePoint>,
+    /// Samples taken at each point so far.
+    pub samples: u32,
+    /// Rays shot so far.
+    pub rays: u64,
+}
+
+/// Sums over the groups of a point; in f64, since squares of thousands of terms are subtracted.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    irradiance: DVec3,
+    irradiance_squared: f64,
+    radiance_squared: f64,
+}
+
+/// A path-traced reference in progress.
+pub struct PathTracer {
+    scene: Arc<Scene>,
+    rays: Arc<RayTree>,
+    emitters: Emitters,
+    settings: PathSettings,
+    points: Vec<ReferencePoint>,
+    sums: Vec<Sums>,
+    group_count: u32,
+    ray_count: u64,
+}
+
+impl PathTracer {
+    /// Choose the points. `rays` is the ray tree of the scene.
+    pub fn new(scene: Arc<Scene>, rays: Arc<RayTree>, settings: PathSettings) -> Self {
+        let points = surface_points(&scene, settings);
+        Self {
+            emitters: Emitters::new(&scene),
+            sums: vec![Sums::default(); points.len()],
+            scene,
+            rays,
+            settings,
+            points,
+            group_count: 0,
+            ray_count: 0,
+        }
+    }
+
+    /// One more pass over all points. `false` when `cancel` came true on the way; the pass then leaves no trace.
+    pub fn pass(&mut self, cancel: &(dyn Fn() -> bool + Sync)) -> bool {
+        let groups = self.settings.samples_per_pass.div_ceil(GROUP).max(2);
+        let first = self.group_count;
+        let estimator = Estimator {
+            scene: &self.scene,
+            rays: &self.rays,
+            emitters: &self.emitters,
+        };
+        let seed = self.settings.seed;
+        let added: Option<Vec<(Sums, u64)>> = (&self.points, &self.sums)
+            .into_par_iter()
+            .enumerate()
+            .map(|(index, (point, &sums))| {
+                (!cancel()).then(|| {
+                    add_groups(
+                        &estimator,
+                        point,
+                        sums,
+                        seed,
+                        (index, first..first + groups),
+                    )
+                })
+            })
+            .collect();
+        let Some(added) = added else {
+            return false;
+        };
+        self.ray_count += added.iter().map(|(_, rays)| rays).sum::<u64>();
+        self.sums = added.into_iter().map(|(sums, _)| sums).collect();
+        self.group_count += groups;
+        true
+    }
+
+    /// The points with what is known of them so far.
+    pub fn result(&self) -> PathTraced {
+        let mut points = self.points.clone();
+        if self.group_count > 0 {
+            for (point, sums) in points.iter_mut().zip(&self.sums) {
+                sums.write(self.group_count, point);
+            }
+        }
+        PathTraced {
+            points,
+            samples: self.group_count * GROUP,
+            rays: self.ray_count,
+        }
+    }
+}
+
+impl Sums {
+    /// Add the value of a group.
+    fn add(&mut self, irradiance: Vec3, reflectance: Vec3) {
+        self.irradiance += irradiance.as_dvec3();
+        let [received, reflected] = [irradiance, irradiance * reflectance].map(luminance);
+        self.irradiance_squared += f64::from(received).powi(2);
+        self.radiance_squared += f64::from(reflected).powi(2);
+    }
+
+    /// Means and standard errors of `count` groups (at least 2).
+    fn write(&self, count: u32, point: &mut ReferencePoint) {
+        let count = f64::from(count);
+        let mean = (self.irradiance / count).as_vec3();
+        let error_of = |squares: f64, mean: f32| {
+            let variance = (squares / count - f64::from(mean).powi(2)).max(0.0) / (count - 1.0);
+            variance.sqrt() as f32
+        };
+        point.irradiance = mean;
+        point.irradiance_error = error_of(self.irradiance_squared, luminance(mean));
+        point.standard_error = error_of(self.radiance_squared, luminance(mean * point.reflectance))
+            * std::f32::consts::FRAC_1_PI;
+    }
+}
+
+/// Add groups of samples to the sums of the point with this index; also the rays that it took.
+fn add_groups(
+    estimator: &Estimator<'_>,
+    point: &ReferencePoint,
+    mut sums: Sums,
+    seed: u64,
+    (index, groups): (usize, std::ops::Range<u32>),
+) -> (Sums, u64) {
+    let start = PathPoint {
+        position: point.position,
+        normal: point.normal,
+        triangle: point.triangle,
+    };
+    let mut ray_count = 0;
+    for group in groups {
+        let mut random = Random::new(seed, (index as u64) << 32 | u64::from(group));
+        let (irradiance, rays) = estimate_group(estimator, start, &mut random);
+        sums.add(irradiance, point.reflectance);
+        ray_count += rays;
+    }
+    (sums, ray_count)
+}
+
+/// Mean of a group of samples whose first bounces are spread evenly, and the rays that it took.
+fn estimate_group(estimator: &Estimator<'_>, start: PathPoint, random: &mut Random) -> (Vec3, u64) {
+    if estimator.emitters.is_empty() {
+        return (Vec3::ZERO, 0);
+    }
+    let (direction_shift, emitter_shift) = (random.uniform_2d(), random.uniform_2d());
+    let choice_shift = f64::from(random.next_u32()) / 4_294_967_296.0;
+    let (mut sum, mut ray_count) = (Vec3::ZERO, 0);
+    for sample in 0..GROUP {
+        let first = Bounce {
+            direction: low_discrepancy_2d(sample, direction_shift),
+            choice: (f64::from(sample) + choice_shift) / f64::from(GROUP),
+            emitter: low_discrepancy_2d(sample, emitter_shift),
+        };
+        let (irradiance, rays) = estimator.irradiance(start, first, random);
+        sum += irradiance;
+        ray_count += u64::from(rays);
+    }
+    (sum / GROUP as f32, ray_count)
+}
+
+/// Points spread over the lit sides: systematically along their running area, low-discrepancy within a triangle.
+fn surface_points(scene: &Scene, settings: PathSettings) -> Vec<ReferencePoint> {
+    let mut random = Random::new(settings.seed, u64::MAX);
+    let offset = f64::from(random.uniform());
+    let shift = random.uniform_2d();
+    let sides: Vec<(TriangleId, bool)> = lit_sides(scene).collect();
+    let area = |id: TriangleId| f64::from(scene.surfaces[id.index()].area_vector.length());
+    let total: f64 = sides.iter().map(|&(id, _)| area(id)).sum();
+    let (mut points, mut passed) = (Vec::new(), 0.0);
+    let mut next = 0;
+    for (id, is_back) in sides {
+        passed += area(id);
+        while next < settings.point_count
+            && (f64::from(next) + offset) * total < passed * f64::from(settings.point_count)
+        {
+            let square = low_discrepancy_2d(next, shift);
+            points.push(surface_point(scene, id, is_back, square));
+            next += 1;
+        }
+    }
+    points
+}
+
+/// Every side that receives light: all fronts, and the backs of two-sided triangles.
+fn lit_sides(scene: &Scene) -> impl Iterator<Item = (TriangleId, bool)> {
+    scene.triangle_ids().flat_map(|id| {
+        let back = scene.triangles[id.index()].two_sided;
+        std::iter::once((id, false)).chain(back.then_some((id, true)))
+    })
+}
+
+/// The point of a side that belongs to a point of the unit square, not yet lit.
+fn surface_point(scene: &Scene, id: TriangleId, is_back: bool, square: Vec2) -> ReferencePoint {
+    let barycentric = triangle_point(square);
+    let [a, b, c] = scene.corners(id);
+    let front = scene.surfaces[id.index()].area_vector.normalize_or_zero();
+    ReferencePoint {
+        triangle: id,
+        is_back,
+        barycentric,
+        position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
+        normal: if is_back { -front } else { front },
+        reflectance: scene.reflectance_at(id, barycentric),
+        emission: scene.emission_at(id, barycentric),
+        irradiance: Vec3::ZERO,
+        irradiance_error: 0.0,
+        standard_error: 0.0,
+    }
+}
+
+/// A point to bake: a vertex of one of the triangles that share it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BakePoint {
+    /// Position in frame units.
+    pub position: Vec3,
+    /// Unit normal towards the lit side.
+    pub normal: Vec3,
+    /// The triangle it belongs to.
+    pub triangle: TriangleId,
+}
+
+/// How far a baked vertex is drawn into its triangle, in frame units: at the vertex itself, rays would start in the
+/// plane of the wall beside it and pass through. Far above the offset of rays, far below what can be seen.
+const BAKE_INSET: f32 = 2e-3;
+
+/// Irradiance at given points, each by `samples` paths (rounded up to groups of 8); `None` when cancelled.
+/// Calls with different seeds are independent, so their means may be averaged.
+pub fn bake(
+    scene: &Scene,
+    rays: &RayTree,
+    points: &[BakePoint],
+    samples: u32,
+    seed: u64,
+    cancel: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<Vec3>> {
+    let emitters = Emitters::new(scene);
+    let estimator = Estimator {
+        scene,
+        rays,
+        emitters: &emitters,
+    };
+    let groups = samples.div_ceil(GROUP).max(1);
+    points
+        .par_iter()
+        .enumerate()
+        .map(|(index, point)| {
+            (!cancel()).then(|| {
+                let start = inset(scene, point);
+                let sum: Vec3 = (0..groups)
+                    .map(|group| {
+                        let stream = (index as u64) << 32 | u64::from(group);
+                        estimate_group(&estimator, start, &mut Random::new(seed, stream)).0
+                    })
+                    .sum();
+                sum / groups as f32
+            })
+        })
+        .collect()
+}
+
+/// Where the paths of a baked vertex start: a little inside its triangle.
+fn inset(scene: &Scene, point: &BakePoint) -> PathPoint {
+    let inward = centroid(scene.corners(point.triangle)) - point.position;
+    let distance = BAKE_INSET.min(inward.length() / 3.0);
+    PathPoint {
+        position: point.position + inward.normalize_or_zero() * distance,
+        normal: point.normal,
+        triangle: point.triangle,
+    }
+}

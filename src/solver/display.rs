@@ -1,0 +1,177 @@
+//! From the state of a solve to what is shown of it.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+
+use super::{
+    ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable, reconstruct::VertexMeans,
+};
+use crate::{
+    geometry::area_vector,
+    hierarchy::{Cluster, NodeId},
+    transport::luminance,
+};
+
+impl Solver {
+    /// Renew the snapshot after a step. The mesh is kept where no element was divided.
+    pub(super) fn show(&mut self) {
+        let shown = self.snapshot.mesh.indices.is_empty();
+        let has_changed =
+            shown || self.snapshot.mesh.positions.len() != self.hierarchy.mesh.vertices.len();
+        if has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown() {
+            self.snapshot.mesh = Arc::new(self.display_mesh());
+        }
+        let light = self.vertex_light();
+        self.snapshot = Snapshot {
+            step: self.step,
+            mesh: self.snapshot.mesh.clone(),
+            light: Arc::new(light),
+            clusters: Arc::new(self.cluster_boxes()),
+        };
+    }
+
+    /// Number of leaves in the mesh that is shown: display triangles of one element follow each other.
+    fn leaf_count_shown(&self) -> usize {
+        self.snapshot
+            .mesh
+            .element_of
+            .chunk_by(|a, b| a == b)
+            .count()
+    }
+
+    fn display_mesh(&mut self) -> DisplayMesh {
+        let triangles = self.hierarchy.mesh.closed_triangles();
+        let mesh = &self.hierarchy.mesh;
+        let count = mesh.vertices.len();
+        let has_texcoords = !self.scene.texcoords.is_empty();
+        let mut display = DisplayMesh {
+            positions: (0..count as u32)
+                .map(|vertex| mesh.position(vertex))
+                .collect(),
+            normals: vec![Vec3::ZERO; count],
+            texcoords: if has_texcoords {
+                vec![Vec2::ZERO; count]
+            } else {
+                Vec::new()
+            },
+            reflectance: vec![Vec3::ZERO; count],
+            emission: vec![Vec3::ZERO; count],
+            ..DisplayMesh::default()
+        };
+        let mut weights = vec![0.0f32; count];
+        for (element, vertices) in triangles {
+            let patch = self.hierarchy.patch_of(element as usize);
+            let corners = vertices.map(|vertex| display.positions[vertex as usize]);
+            let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
+            for vertex in vertices.map(|vertex| vertex as usize) {
+                display.normals[vertex] += patch.normal * weight;
+                display.reflectance[vertex] += patch.reflectance * weight;
+                display.emission[vertex] += patch.emission * weight;
+                weights[vertex] += weight;
+            }
+            if has_texcoords {
+                self.place_texcoords(patch.triangle, vertices, &mut display);
+            }
+            display.indices.push(vertices);
+            display.triangle_of.push(patch.triangle.0);
+            display.is_back.push(patch.is_back);
+            display
+                .element_of
+                .push(self.hierarchy.clusters.len() as u32 + element);
+        }
+        for (index, &weight) in weights
+            .iter()
+            .enumerate()
+            .filter(|(_, weight)| **weight > 0.0)
+        {
+            display.normals[index] = display.normals[index].normalize_or_zero();
+            display.reflectance[index] /= weight;
+            display.emission[index] /= weight;
+        }
+        display
+    }
+
+    /// Texture coordinates of vertices on a triangle, by their barycentric coordinates there.
+    fn place_texcoords(
+        &self,
+        triangle: crate::scene::TriangleId,
+        vertices: [u32; 3],
+        display: &mut DisplayMesh,
+    ) {
+        let uv = self.scene.texcoords[triangle.index()];
+        let corners = self.scene.corners(triangle);
+        let whole = area_vector(corners);
+        let scale = 1.0 / whole.length_squared().max(f32::MIN_POSITIVE);
+        for vertex in vertices {
+            let point = display.positions[vertex as usize];
+            let [a, b, c] = corners;
+            let u = area_vector([point, b, c]).dot(whole) * scale;
+            let v = area_vector([a, point, c]).dot(whole) * scale;
+            display.texcoords[vertex as usize] = uv[0] * u + uv[1] * v + uv[2] * (1.0 - u - v);
+        }
+    }
+
+    fn vertex_light(&self) -> VertexLight {
+        let means = VertexMeans::new(&self.hierarchy, &self.leaves);
+        let count = means.irradiance.len();
+        let mut light = VertexLight {
+            irradiance: Vec::with_capacity(count),
+            direct: Vec::with_capacity(count),
+            uncertainty: Vec::with_capacity(count),
+        };
+        for (vertex, (&linked, &error)) in means.irradiance.iter().zip(&means.error).enumerate() {
+            let direct = self
+                .direct
+                .as_ref()
+                .map(|field| field.vertex(vertex))
+                .unwrap_or_default();
+            light
+                .irradiance
+                .push(displayable(linked + direct.irradiance));
+            light.direct.push(displayable(direct.irradiance));
+            let error = error + direct.error;
+            light
+                .uncertainty
+                .push(if error.is_finite() { error } else { f32::MAX });
+        }
+        light
+    }
+
+    fn cluster_boxes(&self) -> Vec<ClusterBox> {
+        let mut boxes: Vec<ClusterBox> = Vec::with_capacity(self.hierarchy.clusters.len());
+        for (index, cluster) in self.hierarchy.clusters.iter().enumerate() {
+            let level = match cluster.parent {
+                u32::MAX => 0,
+                parent => boxes[parent as usize].level + 1,
+            };
+            boxes.push(self.cluster_box(index, cluster, level));
+        }
+        boxes
+    }
+
+    fn cluster_box(&self, index: usize, cluster: &Cluster, level: u32) -> ClusterBox {
+        let links = self.links.of(NodeId(index as u32));
+        let moments = &self.power.clusters[index];
+        let area = &self.area.clusters[index];
+        let vector = Vec3::from_array(area.linear);
+        let total = area.total();
+        ClusterBox {
+            min: cluster.min,
+            max: cluster.max,
+            level,
+            parent: cluster.parent,
+            patch_count: cluster.end - cluster.start,
+            area: cluster.area,
+            power: luminance(moments.total()),
+            direction_spread: if total > 0.0 {
+                (1.0 - vector.length() / total).clamp(0.0, 1.0)
+            } else {
+                0.0
+            },
+            link_count: links.len() as u32,
+            error: links.iter().map(|link| link.error).sum(),
+            face_power: moments.six_faces().map(luminance),
+        }
+    }
+}

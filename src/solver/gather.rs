@@ -1,0 +1,199 @@
+//! One sweep: light gathered over all links, then pushed down to the leaves.
+//!
+//! Clusters collect the vector irradiances of their links as moments, elements as plain irradiance. Pushing adds what a
+//! cluster has to its children and lets each face take its share by its own normal (eq. 15), for all links at once.
+//! The paper's other way, each vector pushed to each face at once, is [`Push::AtOnce`].
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::Push;
+use crate::{
+    hierarchy::{Hierarchy, Kind, Moments, NodeId, Quantity, Reading},
+    transport::{Kernel, LinkStore, self_irradiance},
+};
+
+/// Nodes that one task gathers for.
+const TASK_NODES: usize = 256;
+
+/// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples.
+pub(super) fn gather<Q: Quantity + Send + Sync>(
+    kernel: Kernel<'_, Q>,
+    links: &LinkStore,
+    push: Push,
+) -> Vec<Q> {
+    let hierarchy = kernel.hierarchy;
+    let mut irradiance = own_irradiance(kernel, links);
+    let from_clusters = match push {
+        Push::Combined => push_moments(kernel, links),
+        Push::AtOnce => push_at_once(kernel, links),
+    };
+    // Parents come before their children.
+    for index in 0..irradiance.len() {
+        let element = &hierarchy.mesh.elements[index];
+        let above = match element.parent {
+            u32::MAX => from_clusters[index],
+            parent => irradiance[parent as usize],
+        };
+        irradiance[index] += above;
+    }
+    irradiance
+}
+
+/// What elements receive over their own links.
+fn own_irradiance<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+    let hierarchy = kernel.hierarchy;
+    let base = hierarchy.clusters.len() as u32;
+    (0..hierarchy.mesh.elements.len())
+        .into_par_iter()
+        .with_min_len(TASK_NODES)
+        .map(|index| {
+            let mut sum = Q::default();
+            let links = links.of(NodeId(base + index as u32));
+            if links.is_empty() {
+                return sum;
+            }
+            let (point, normal) = (
+                hierarchy.mesh.elements[index].centroid,
+                hierarchy.patch_of(index).normal,
+            );
+            for link in links {
+                sum += match hierarchy.kind(link.source) {
+                    Kind::Element(source) => kernel.tables.elements[source] * link.form_factor,
+                    Kind::Cluster(_) => {
+                        kernel.irradiance(link.source, point, normal) * link.visibility
+                    }
+                };
+            }
+            sum
+        })
+        .collect()
+}
+
+/// What patches receive from the links of clusters, through the moments of all clusters above them.
+fn push_moments<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+    let hierarchy = kernel.hierarchy;
+    let reading = kernel.reading.unwrap_or(Reading::Bounded);
+    let mut incident: Vec<Moments<Q>> = (0..hierarchy.clusters.len())
+        .into_par_iter()
+        .with_min_len(TASK_NODES)
+        .map(|index| cluster_incident(kernel, links, index))
+        .collect();
+    for index in 1..incident.len() {
+        let above = incident[hierarchy.clusters[index].parent as usize];
+        incident[index].merge(&above);
+    }
+    let mut leaf_of = vec![0u32; hierarchy.patches.len()];
+    for (index, cluster) in hierarchy
+        .clusters
+        .iter()
+        .enumerate()
+        .filter(|(_, cluster)| cluster.is_leaf())
+    {
+        leaf_of[cluster.patches()].fill(index as u32);
+    }
+    (0..hierarchy.patches.len())
+        .into_par_iter()
+        .with_min_len(TASK_NODES)
+        .map(|patch| {
+            incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
+        })
+        .collect()
+}
+
+/// The vector irradiances of all links of one cluster.
+fn cluster_incident<Q: Quantity>(
+    kernel: Kernel<'_, Q>,
+    links: &LinkStore,
+    index: usize,
+) -> Moments<Q> {
+    let hierarchy = kernel.hierarchy;
+    let cluster = &hierarchy.clusters[index];
+    let mut sum = Moments::default();
+    for link in links.of(NodeId(index as u32)) {
+        if link.source.index() == index {
+            sum.add_isotropic(self_irradiance(
+                hierarchy,
+                index,
+                kernel.tables.clusters[index].total(),
+            ));
+        } else {
+            let incident = kernel.vector_irradiance(link.source, cluster.centroid);
+            sum.add(incident.towards_source, incident.strength * link.visibility);
+        }
+    }
+    sum
+}
+
+/// What patches receive from the links of clusters, each vector pushed by itself.
+fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+    let hierarchy = kernel.hierarchy;
+    let leaves: Vec<usize> = (0..hierarchy.clusters.len())
+        .filter(|&index| hierarchy.clusters[index].is_leaf())
+        .collect();
+    let parts: Vec<(usize, Vec<Q>)> = leaves
+        .par_iter()
+        .map(|&leaf| {
+            let range = hierarchy.clusters[leaf].patches();
+            let mut sums = vec![Q::default(); range.len()];
+            let mut at = leaf;
+            loop {
+                for link in links.of(NodeId(at as u32)) {
+                    push_one(
+                        kernel,
+                        at,
+                        link.source,
+                        link.visibility,
+                        &hierarchy.patches[range.clone()],
+                        &mut sums,
+                    );
+                }
+                match hierarchy.clusters[at].parent {
+                    u32::MAX => break,
+                    parent => at = parent as usize,
+                }
+            }
+            (range.start, sums)
+        })
+        .collect();
+    let mut irradiance = vec![Q::default(); hierarchy.patches.len()];
+    for (start, sums) in parts {
+        irradiance[start..start + sums.len()].copy_from_slice(&sums);
+    }
+    irradiance
+}
+
+/// Eq. 15 for one link of a cluster and some of its patches.
+fn push_one<Q: Quantity>(
+    kernel: Kernel<'_, Q>,
+    cluster: usize,
+    source: NodeId,
+    visibility: f32,
+    patches: &[crate::hierarchy::Patch],
+    sums: &mut [Q],
+) {
+    let hierarchy = kernel.hierarchy;
+    if source.index() == cluster {
+        let irradiance =
+            self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total());
+        sums.iter_mut().for_each(|sum| *sum += irradiance);
+        return;
+    }
+    let incident = kernel.vector_irradiance(source, hierarchy.clusters[cluster].centroid);
+    let strength = incident.strength * visibility;
+    for (sum, patch) in sums.iter_mut().zip(patches) {
+        *sum += strength * incident.towards_source.dot(patch.normal).max(0.0);
+    }
+}
+
+/// Sum over elements of area times a quantity, in order and in double precision.
+pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec3A) -> glam::DVec3 {
+    hierarchy
+        .mesh
+        .leaves()
+        .map(|leaf| {
+            let area = f64::from(hierarchy.mesh.elements[leaf].area_vector.length());
+            glam::Vec3::from(of(leaf)).as_dvec3() * area
+        })
+        .sum()
+}

@@ -1,0 +1,84 @@
+//! The figures of a step: counts, energy balance and row sums.
+
+use glam::Vec3A;
+
+use super::{Solver, StepReport, gather};
+use crate::transport::luminance;
+
+impl Solver {
+    /// Fill in what can be read off the state after a step.
+    pub(super) fn fill(&self, report: &mut StepReport) {
+        report.links = self.links.len() as u64;
+        report.nodes = self.hierarchy.node_count() as u64;
+        report.elements = self.leaves.len() as u64;
+        report.vertices = self.hierarchy.mesh.vertices.len() as u64;
+        report.shadow_rays = self.ray_count;
+        report.memory_bytes = self.memory_bytes();
+        report.energy_balance = self.energy_balance();
+        report.estimated_error = self.estimated_error();
+        self.fill_row_sums(report);
+        if self.is_out_of_memory() {
+            report.is_final = true;
+            report
+                .notes
+                .push("the memory limit is reached; refinement stops here".to_owned());
+        }
+    }
+
+    /// Power that arrives at all leaves relative to power that left: emission and reflection.
+    fn energy_balance(&self) -> f64 {
+        let arrived = gather::area_sum(&self.hierarchy, |leaf| {
+            self.linked[leaf] + self.direct_of(leaf)
+        });
+        let sent = gather::area_sum(&self.hierarchy, |leaf| {
+            let patch = self.hierarchy.patch_of(leaf);
+            let emitted = Vec3A::from(patch.emission * std::f32::consts::PI);
+            Vec3A::from(patch.reflectance) * (self.linked[leaf] + self.direct_of(leaf)) + emitted
+        });
+        let sum = sent.element_sum();
+        if sum > 0.0 {
+            arrived.element_sum() / sum
+        } else {
+            1.0
+        }
+    }
+
+    /// Root mean square over the area of the sum of link errors, relative to the mean irradiance.
+    fn estimated_error(&self) -> f32 {
+        let sum: f64 = self
+            .leaves
+            .iter()
+            .map(|leaf| {
+                let area = self.hierarchy.mesh.elements[leaf.element as usize]
+                    .area_vector
+                    .length();
+                f64::from(area) * f64::from(leaf.error).powi(2)
+            })
+            .sum();
+        let mean = gather::area_sum(&self.hierarchy, |leaf| {
+            self.linked[leaf] + self.direct_of(leaf)
+        }) / self.hierarchy.area.max(f64::MIN_POSITIVE);
+        let reference = f64::from(luminance(mean.as_vec3().into()));
+        let root = (sum / self.hierarchy.area.max(f64::MIN_POSITIVE)).sqrt();
+        if reference > 0.0 {
+            (root / reference) as f32
+        } else {
+            0.0
+        }
+    }
+
+    /// Sums of form factors: what leaves receive when everything sends 1.
+    fn fill_row_sums(&self, report: &mut StepReport) {
+        let rows = gather::gather(self.area_kernel(), &self.links, self.settings.push);
+        let (mut least, mut most, mut sum) = (f32::INFINITY, 0.0f32, 0.0f64);
+        for leaf in self.hierarchy.mesh.leaves() {
+            least = least.min(rows[leaf]);
+            most = most.max(rows[leaf]);
+            sum += f64::from(rows[leaf])
+                * f64::from(self.hierarchy.mesh.elements[leaf].area_vector.length());
+        }
+        report.row_sum_min = least.min(most);
+        report.row_sum_max = most;
+        report.row_sum_mean = (sum / self.hierarchy.area.max(f64::MIN_POSITIVE)) as f32;
+    }
+}

@@ -1,0 +1,141 @@
+//! Links: over which pairs of nodes light travels.
+
+use crate::hierarchy::{Hierarchy, NodeId};
+
+/// A source as one receiver sees it. The receiver is known from where the link is stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// Where the light comes from. Equal to the receiver for the light that a cluster exchanges within itself.
+    pub source: NodeId,
+    /// Unoccluded fraction of the transfer, 0…1.
+    pub visibility: f32,
+    /// Estimated error of the irradiance that the receiver gets over this link (luminance).
+    pub error: f32,
+    /// Form factor including visibility between elements, where it is a constant; else 0.
+    pub form_factor: f32,
+}
+
+/// All links, grouped by receiver.
+#[derive(Clone, Debug, Default)]
+pub struct LinkStore {
+    /// Start of each receiver's run; one more than there are nodes.
+    offsets: Vec<u32>,
+    links: Vec<Link>,
+}
+
+impl LinkStore {
+    /// From runs of links in any order of receivers; each receiver at most once.
+    pub fn from_runs(node_count: usize, runs: &[(NodeId, u32)], links: &[Link]) -> Self {
+        let mut offsets = vec![0u32; node_count + 1];
+        for &(node, count) in runs {
+            offsets[node.index() + 1] = count;
+        }
+        for index in 0..node_count {
+            offsets[index + 1] += offsets[index];
+        }
+        let empty = Link {
+            source: NodeId(0),
+            visibility: 0.0,
+            error: 0.0,
+            form_factor: 0.0,
+        };
+        let mut sorted = vec![empty; links.len()];
+        let mut start = 0;
+        for &(node, count) in runs {
+            let to = offsets[node.index()] as usize;
+            let count = count as usize;
+            sorted[to..to + count].copy_from_slice(&links[start..start + count]);
+            start += count;
+        }
+        Self {
+            offsets,
+            links: sorted,
+        }
+    }
+
+    /// The links over which a node receives. Nodes that came after the store was made have none.
+    pub fn of(&self, node: NodeId) -> &[Link] {
+        match self.offsets.get(node.index()..node.index() + 2) {
+            Some(&[start, end]) => &self.links[start as usize..end as usize],
+            _ => &[],
+        }
+    }
+
+    /// Number of links.
+    pub fn len(&self) -> usize {
+        self.links.len()
+    }
+
+    /// Whether there is no link.
+    pub fn is_empty(&self) -> bool {
+        self.links.is_empty()
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.links.as_slice()) + size_of_val(self.offsets.as_slice())
+    }
+
+    /// Check that each pair of a receiving and a sending leaf is covered at most once, and that sources exist.
+    ///
+    /// # Errors
+    /// Names the first receiver and source that break the promise.
+    pub fn validate(&self, hierarchy: &Hierarchy) -> Result<(), String> {
+        let mut covering: Vec<u32> = vec![u32::MAX; hierarchy.node_count()];
+        self.validate_below(hierarchy, Hierarchy::ROOT, &mut covering)
+    }
+
+    /// `covering` holds, for each source that a receiver on the path from the root links to, that receiver.
+    fn validate_below(
+        &self,
+        hierarchy: &Hierarchy,
+        node: NodeId,
+        covering: &mut [u32],
+    ) -> Result<(), String> {
+        for link in self.of(node) {
+            let slot = covering
+                .get_mut(link.source.index())
+                .ok_or("a source does not exist")?;
+            if *slot != u32::MAX {
+                return Err(format!(
+                    "node {} and its ancestor {slot} both receive from {}",
+                    node.0, link.source.0
+                ));
+            }
+            *slot = node.0;
+        }
+        let children = hierarchy.children(node);
+        if children.is_empty() {
+            self.validate_sources(hierarchy, Hierarchy::ROOT, node, covering, None)?;
+        }
+        for child in children {
+            self.validate_below(hierarchy, NodeId(child), covering)?;
+        }
+        for link in self.of(node) {
+            covering[link.source.index()] = u32::MAX;
+        }
+        Ok(())
+    }
+
+    /// No source below another source of the same leaf.
+    fn validate_sources(
+        &self,
+        hierarchy: &Hierarchy,
+        source: NodeId,
+        leaf: NodeId,
+        covering: &[u32],
+        above: Option<NodeId>,
+    ) -> Result<(), String> {
+        let here = (covering[source.index()] != u32::MAX).then_some(source);
+        if let (Some(above), Some(here)) = (above, here) {
+            return Err(format!(
+                "leaf {} receives from {} and from {} above it",
+                leaf.0, here.0, above.0
+            ));
+        }
+        for child in hierarchy.children(source) {
+            self.validate_sources(hierarchy, NodeId(child), leaf, covering, above.or(here))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,229 @@
+//! Is a pair good enough? Bounds or samples of what a receiver gets from a source.
+//!
+//! `interval` bounds the transfer over all points of both nodes, from spheres about their centroids: the distance lies
+//! in d ± (r_s + r_r), the direction in a cone of sine (r_s + r_r) / d, and a projection changes by at most its total
+//! per radian. `samples` is the paper's EstimateEnergy: largest minus smallest transfer over p sample vectors.
+
+use std::f32::consts::PI;
+
+use glam::{Vec3, Vec3A};
+
+use super::{Kernel, PairSampler, luminance};
+use crate::{
+    geometry::Random,
+    hierarchy::{Hierarchy, Kind, NodeId, Tables},
+};
+
+/// How errors are estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estimate {
+    /// From bounds.
+    Interval,
+    /// From this many sample pairs.
+    Samples(u32),
+}
+
+/// What the oracle says of a pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Judgement {
+    /// No point of the source can light any point of the receiver.
+    Nothing,
+    /// Luminance of the irradiance, unoccluded.
+    Transfer {
+        /// Its likely value.
+        irradiance: f32,
+        /// How far it may be off, or vary over the receiver.
+        error: f32,
+    },
+}
+
+/// A point nearer to a plane than this, relative to the pair's size, lies in it: rounding tilts flat meshes.
+const IN_PLANE: f32 = 1e-5;
+
+/// Judges pairs of nodes.
+#[derive(Clone, Copy)]
+pub struct Judge<'a> {
+    /// Reads what sources send.
+    pub power: Kernel<'a, Vec3A>,
+    /// Reads the area that receivers show.
+    pub area: Kernel<'a, f32>,
+    /// How errors are estimated.
+    pub estimate: Estimate,
+    /// Draws sample points.
+    pub sampler: PairSampler<'a>,
+}
+
+impl Judge<'_> {
+    fn hierarchy(&self) -> &Hierarchy {
+        self.power.hierarchy
+    }
+
+    fn tables(&self) -> &Tables<Vec3A> {
+        self.power.tables
+    }
+
+    /// Judge a pair of different nodes, neither above the other.
+    pub fn judge(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> Judgement {
+        let brightest = luminance(self.tables().brightest(self.hierarchy(), source));
+        if brightest <= 0.0 || !self.can_face(source, receiver) || !self.can_face(receiver, source)
+        {
+            return Judgement::Nothing;
+        }
+        match self.estimate {
+            Estimate::Interval => self.interval(source, receiver, brightest),
+            Estimate::Samples(count) => self.samples(source, receiver, brightest, count, random),
+        }
+    }
+
+    /// Judge the exchange of a cluster with itself: all of it is in doubt.
+    /// A ray that leaves a patch is taken to meet another before it leaves the box with the odds of their areas.
+    pub fn judge_self(&self, cluster: NodeId) -> Judgement {
+        let Kind::Cluster(index) = self.hierarchy().kind(cluster) else {
+            return Judgement::Nothing;
+        };
+        let irradiance = luminance(self_irradiance(
+            self.hierarchy(),
+            index,
+            self.tables().clusters[index].total(),
+        ));
+        if irradiance > 0.0 {
+            Judgement::Transfer {
+                irradiance,
+                error: irradiance,
+            }
+        } else {
+            Judgement::Nothing
+        }
+    }
+
+    /// Whether any face of `from` can look at any point of `to`.
+    fn can_face(&self, from: NodeId, to: NodeId) -> bool {
+        let hierarchy = self.hierarchy();
+        match hierarchy.kind(from) {
+            Kind::Element(index) => {
+                let element = &hierarchy.mesh.elements[index];
+                let normal = hierarchy.patch_of(index).normal;
+                let height = match hierarchy.kind(to) {
+                    Kind::Element(other) => hierarchy
+                        .mesh
+                        .corners(other)
+                        .iter()
+                        .map(|&corner| (corner - element.centroid).dot(normal))
+                        .fold(f32::MIN, f32::max),
+                    Kind::Cluster(other) => {
+                        let cluster = &hierarchy.clusters[other];
+                        let middle = (cluster.min + cluster.max) * 0.5;
+                        let half = (cluster.max - cluster.min) * 0.5;
+                        (middle - element.centroid).dot(normal) + half.dot(normal.abs())
+                    }
+                };
+                height > IN_PLANE * (element.radius + hierarchy.radius(to))
+            }
+            Kind::Cluster(index) => {
+                let cluster = &hierarchy.clusters[index];
+                let (min, max) = self.bounds(to);
+                let (least, most) = (min - cluster.max, max - cluster.min);
+                let faces = self.area.tables.clusters[index].six_faces();
+                let slack = IN_PLANE * cluster.area;
+                (0..3).any(|axis| {
+                    (most[axis] > 0.0 && faces[2 * axis] > slack)
+                        || (least[axis] < 0.0 && faces[2 * axis + 1] > slack)
+                })
+            }
+        }
+    }
+
+    fn bounds(&self, node: NodeId) -> (Vec3, Vec3) {
+        let hierarchy = self.hierarchy();
+        match hierarchy.kind(node) {
+            Kind::Cluster(index) => (hierarchy.clusters[index].min, hierarchy.clusters[index].max),
+            Kind::Element(index) => {
+                let [a, b, c] = hierarchy.mesh.corners(index);
+                (a.min(b).min(c), a.max(b).max(c))
+            }
+        }
+    }
+
+    /// From bounds of distance and direction.
+    fn interval(&self, source: NodeId, receiver: NodeId, brightest: f32) -> Judgement {
+        let hierarchy = self.hierarchy();
+        let (from, to) = (hierarchy.centroid(source), hierarchy.centroid(receiver));
+        let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
+        let distance = from.distance(to);
+        if distance <= reach {
+            // The nodes may touch: anything up to the brightest patch is possible.
+            return Judgement::Transfer {
+                irradiance: 0.5 * brightest,
+                error: brightest,
+            };
+        }
+        let unit = (to - from) / distance;
+        let total = luminance(self.tables().power(hierarchy, source));
+        let value = luminance(self.power.projected_power(source, unit));
+        let swing = total * (reach / distance).asin();
+        let (near, far) = (distance - reach, distance + reach);
+        let upper = ((value + swing).min(total) / (PI * near * near)).min(brightest);
+        let lower = (value - swing).max(0.0) / (PI * far * far);
+        let irradiance = (value / (PI * distance * distance)).min(brightest);
+        Judgement::Transfer {
+            irradiance,
+            error: (upper - lower).max(0.0),
+        }
+    }
+
+    /// The paper's EstimateEnergy, per area of the receiver.
+    fn samples(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        brightest: f32,
+        count: u32,
+        random: &mut Random,
+    ) -> Judgement {
+        let hierarchy = self.hierarchy();
+        let area = hierarchy.node_area(receiver);
+        let (mut least, mut most, mut sum) = (f32::INFINITY, 0.0f32, 0.0);
+        for _ in 0..count {
+            let (from, _) = self.sampler.point_on(source, random);
+            let (to, _) = self.sampler.point_on(receiver, random);
+            let irradiance = self
+                .transferred(source, receiver, to - from, area)
+                .min(brightest);
+            least = least.min(irradiance);
+            most = most.max(irradiance);
+            sum += irradiance;
+        }
+        Judgement::Transfer {
+            irradiance: sum / count as f32,
+            error: most - least.min(most),
+        }
+    }
+
+    /// Eq. 11 divided by the receiver's area: mean irradiance for one separation.
+    fn transferred(&self, source: NodeId, receiver: NodeId, separation: Vec3, area: f32) -> f32 {
+        let squared = separation.length_squared();
+        let unit = separation / squared.sqrt();
+        if squared <= 0.0 || !unit.is_finite() || area <= 0.0 {
+            return f32::INFINITY;
+        }
+        let power = luminance(self.power.projected_power(source, unit));
+        power * self.area.projected_power(receiver, -unit) / (PI * squared * area)
+    }
+}
+
+/// Mean irradiance that a cluster of the given power gives itself, from the odds that a ray meets a patch of it.
+pub(crate) fn self_irradiance<Q: crate::hierarchy::Quantity>(
+    hierarchy: &Hierarchy,
+    index: usize,
+    power: Q,
+) -> Q {
+    let cluster = &hierarchy.clusters[index];
+    let size = cluster.max - cluster.min;
+    let hull = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    let sum = cluster.area + hull;
+    if sum > 0.0 {
+        power * (1.0 / sum)
+    } else {
+        Q::default()
+    }
+}

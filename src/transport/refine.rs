@@ -1,0 +1,347 @@
+//! Refinement: from the links of the last step to those of a smaller threshold.
+//!
+//! Receivers are walked from the root. A pair whose error, weighted by the root of the receiver's share of the area,
+//! exceeds the threshold is replaced by pairs with the children of the node that causes the error, which is the larger
+//! one. Links that are good enough stay as they are: nothing is traced again.
+
+use super::{Judge, Judgement, Link, kernel::element_form_factor};
+use crate::{
+    geometry::Random,
+    hierarchy::{Hierarchy, Kind, NodeId},
+};
+
+/// Receivers with fewer patches than this are refined by one task.
+const TASK_PATCHES: u32 = 256;
+
+/// Rays of one link at most.
+const MOST_RAYS: u32 = 8;
+
+/// Share of a partly visible transfer that counts as error: shadows vary over the receiver, and neither node's
+/// table knows how.
+const PARTIAL_VISIBILITY: f32 = 0.5;
+
+/// Links of some receivers, in the order of the walk.
+#[derive(Clone, Debug, Default)]
+pub struct Refinement {
+    /// Receivers with their number of links.
+    pub runs: Vec<(NodeId, u32)>,
+    /// The links, run after run.
+    pub links: Vec<Link>,
+    /// Leaf elements that should be divided.
+    pub wanted: Vec<u32>,
+    /// Rays shot.
+    pub ray_count: u64,
+}
+
+impl Refinement {
+    fn append(&mut self, mut other: Self) {
+        self.runs.append(&mut other.runs);
+        self.links.append(&mut other.links);
+        self.wanted.append(&mut other.wanted);
+        self.ray_count += other.ray_count;
+    }
+}
+
+/// What refinement needs to know.
+pub struct Refiner<'a, F> {
+    /// Judges pairs.
+    pub judge: Judge<'a>,
+    /// The links that a receiver has so far.
+    pub links_of: F,
+    /// Largest error of a link, times the root of the receiver's share of the area (luminance irradiance).
+    pub threshold: f32,
+    /// Elements below this area are not divided.
+    pub min_area: f32,
+    /// Seed of the rays.
+    pub seed: u64,
+    /// Tells to stop; the result is then incomplete and must be thrown away.
+    pub cancelled: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// What becomes of a pair.
+enum Decision {
+    Drop,
+    Keep(Link),
+    DivideSource,
+    DivideReceiver,
+}
+
+impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
+    /// Refine everything, from the root's exchange with itself where there are no links yet.
+    pub fn refine(&self, is_first: bool) -> Refinement {
+        let start = if is_first {
+            vec![Hierarchy::ROOT]
+        } else {
+            Vec::new()
+        };
+        self.visit(Hierarchy::ROOT, &start)
+    }
+
+    fn hierarchy(&self) -> &'a Hierarchy {
+        self.judge.power.hierarchy
+    }
+
+    /// Refine a receiver and all below it; `sources` are handed down from above.
+    fn visit(&self, receiver: NodeId, sources: &[NodeId]) -> Refinement {
+        let mut refinement = Refinement::default();
+        if (self.cancelled)() {
+            return refinement;
+        }
+        let mut down = Vec::new();
+        self.refine_links(receiver, sources, &mut refinement, &mut down);
+        let children = self.hierarchy().children(receiver);
+        let is_large = match self.hierarchy().kind(receiver) {
+            Kind::Cluster(index) => {
+                let cluster = &self.hierarchy().clusters[index];
+                !cluster.is_leaf() && cluster.end - cluster.start > TASK_PATCHES
+            }
+            Kind::Element(_) => false,
+        };
+        if is_large {
+            let (first, second) = rayon::join(
+                || self.visit(NodeId(children.start), &down),
+                || self.visit(NodeId(children.start + 1), &down),
+            );
+            refinement.append(first);
+            refinement.append(second);
+        } else {
+            for child in children {
+                self.visit_into(NodeId(child), &down, &mut refinement);
+            }
+        }
+        refinement
+    }
+
+    /// As `visit`, within one task. Depth is bounded by that of the trees.
+    fn visit_into(&self, receiver: NodeId, sources: &[NodeId], refinement: &mut Refinement) {
+        let mut down = Vec::new();
+        self.refine_links(receiver, sources, refinement, &mut down);
+        for child in self.hierarchy().children(receiver) {
+            self.visit_into(NodeId(child), &down, refinement);
+        }
+    }
+
+    /// Decide on the links of one receiver; sources for its children go to `down`.
+    fn refine_links(
+        &self,
+        receiver: NodeId,
+        sources: &[NodeId],
+        out: &mut Refinement,
+        down: &mut Vec<NodeId>,
+    ) {
+        let before = out.links.len();
+        let mut is_wanted = false;
+        let mut pending: Vec<NodeId> = Vec::new();
+        for link in (self.links_of)(receiver) {
+            let decision = self.decide(link.source, receiver, Some(link), out);
+            self.apply(
+                decision,
+                link.source,
+                receiver,
+                out,
+                &mut pending,
+                down,
+                &mut is_wanted,
+            );
+        }
+        pending.extend(sources.iter().rev());
+        while let Some(source) = pending.pop() {
+            let decision = self.decide(source, receiver, None, out);
+            self.apply(
+                decision,
+                source,
+                receiver,
+                out,
+                &mut pending,
+                down,
+                &mut is_wanted,
+            );
+        }
+        let count = (out.links.len() - before) as u32;
+        if count > 0 {
+            out.runs.push((receiver, count));
+        }
+        if let (true, Kind::Element(index)) = (is_wanted, self.hierarchy().kind(receiver)) {
+            out.wanted.push(index as u32);
+        }
+    }
+
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the state of one walk; a struct would be filled and read once"
+    )]
+    fn apply(
+        &self,
+        decision: Decision,
+        source: NodeId,
+        receiver: NodeId,
+        out: &mut Refinement,
+        pending: &mut Vec<NodeId>,
+        down: &mut Vec<NodeId>,
+        is_wanted: &mut bool,
+    ) {
+        match decision {
+            Decision::Drop => {}
+            Decision::Keep(link) => out.links.push(link),
+            Decision::DivideSource => {
+                pending.extend(self.hierarchy().children(source).rev().map(NodeId))
+            }
+            Decision::DivideReceiver if source == receiver => {
+                down.extend(self.hierarchy().children(receiver).map(NodeId));
+            }
+            Decision::DivideReceiver => {
+                if self.hierarchy().children(receiver).is_empty() {
+                    // The element will be divided after this pass; until then its link stays.
+                    *is_wanted = true;
+                    let link = self.link(source, receiver, f32::INFINITY, 1, out);
+                    out.links.push(link);
+                } else {
+                    down.push(source);
+                }
+            }
+        }
+    }
+
+    /// What becomes of a pair; `known` is its link if it has one.
+    fn decide(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        known: Option<&Link>,
+        out: &mut Refinement,
+    ) -> Decision {
+        let weight = self.weight(receiver);
+        if source == receiver {
+            return self.decide_self(source, weight);
+        }
+        let mut random = self.random(source, receiver);
+        let (irradiance, error) = match self.judge.judge(source, receiver, &mut random) {
+            Judgement::Nothing => return Decision::Drop,
+            Judgement::Transfer { irradiance, error } => (irradiance, error),
+        };
+        let fits = |error: f32| error * weight <= self.threshold;
+        let divide = self.division(source, receiver);
+        if let (false, Some(decision)) = (fits(error), divide) {
+            return decision;
+        }
+        let link = match known {
+            Some(link) => *link,
+            None => {
+                let importance = irradiance * weight / self.threshold.max(f32::MIN_POSITIVE);
+                let ray_count = (importance.min(64.0).ceil() as u32).clamp(1, MOST_RAYS);
+                self.link(source, receiver, error, ray_count, out)
+            }
+        };
+        let partial = 2.0 * (link.visibility * (1.0 - link.visibility)).max(0.0).sqrt();
+        let error = error * link.visibility + PARTIAL_VISIBILITY * irradiance * partial;
+        if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
+            return decision;
+        }
+        Decision::Keep(Link { error, ..link })
+    }
+
+    fn decide_self(&self, cluster: NodeId, weight: f32) -> Decision {
+        match self.judge.judge_self(cluster) {
+            Judgement::Nothing => Decision::Drop,
+            Judgement::Transfer { error, .. } if error * weight <= self.threshold => {
+                Decision::Keep(Link {
+                    source: cluster,
+                    visibility: 1.0,
+                    error,
+                    form_factor: 0.0,
+                })
+            }
+            Judgement::Transfer { .. } => Decision::DivideReceiver,
+        }
+    }
+
+    /// Which node to divide: the larger that can be.
+    fn division(&self, source: NodeId, receiver: NodeId) -> Option<Decision> {
+        let hierarchy = self.hierarchy();
+        let can_divide_source = !hierarchy.children(source).is_empty();
+        let can_divide_receiver = match hierarchy.kind(receiver) {
+            Kind::Cluster(_) => true,
+            Kind::Element(index) => {
+                let area = hierarchy.mesh.elements[index].area_vector.length();
+                !hierarchy.mesh.elements[index].is_leaf() || area * 0.25 >= self.min_area
+            }
+        };
+        let prefers_source = hierarchy.radius(source) >= hierarchy.radius(receiver);
+        match (can_divide_source, can_divide_receiver) {
+            (true, true) => Some(if prefers_source {
+                Decision::DivideSource
+            } else {
+                Decision::DivideReceiver
+            }),
+            (true, false) => Some(Decision::DivideSource),
+            (false, true) => Some(Decision::DivideReceiver),
+            (false, false) => None,
+        }
+    }
+
+    /// Root of the receiver's share of the area: error is summed in squares over area.
+    fn weight(&self, receiver: NodeId) -> f32 {
+        let share = f64::from(self.hierarchy().node_area(receiver))
+            / self.hierarchy().area.max(f64::MIN_POSITIVE);
+        (share as f32).sqrt()
+    }
+
+    fn random(&self, source: NodeId, receiver: NodeId) -> Random {
+        Random::new(
+            self.seed,
+            (u64::from(receiver.0) << 32) | u64::from(source.0),
+        )
+    }
+
+    fn link(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        error: f32,
+        ray_count: u32,
+        out: &mut Refinement,
+    ) -> Link {
+        let mut random = self.random(source, receiver);
+        out.ray_count += u64::from(ray_count);
+        let visibility = self
+            .judge
+            .sampler
+            .visibility(source, receiver, ray_count, &mut random);
+        let hierarchy = self.hierarchy();
+        let form_factor = match (hierarchy.kind(source), hierarchy.kind(receiver)) {
+            (Kind::Element(from), Kind::Element(to)) => {
+                visibility * area_form_factor(hierarchy, from, to)
+            }
+            _ => 0.0,
+        };
+        Link {
+            source,
+            visibility,
+            error,
+            form_factor,
+        }
+    }
+}
+
+/// Form factor from one element to another, unoccluded, averaged over the receiver where they are near.
+fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f32 {
+    let (from, to) = (
+        &hierarchy.mesh.elements[source],
+        &hierarchy.mesh.elements[receiver],
+    );
+    let normal = hierarchy.patch_of(receiver).normal;
+    let distance = from.centroid.distance(to.centroid);
+    if distance > 2.0 * (from.radius + to.radius) {
+        return element_form_factor(hierarchy, source, to.centroid, normal);
+    }
+    // A rule of degree 3 whose points lie inside: centroid and three points towards the corners (Strang and Fix's
+    // would have a negative weight, so the four are weighed alike at three fifths of the way).
+    let corners = hierarchy.mesh.corners(receiver);
+    let sum: f32 = corners
+        .iter()
+        .map(|&corner| {
+            element_form_factor(hierarchy, source, to.centroid.lerp(corner, 0.6), normal)
+        })
+        .sum();
+    (sum + element_form_factor(hierarchy, source, to.centroid, normal)) * 0.25
+}

@@ -1,0 +1,136 @@
+//! The program from outside: exit codes, sentences, files.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+const SCENE: &str = "quads";
+
+fn vecrad(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_vecrad"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn error_of(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn solve(folder: &Path, more: &[&str]) -> Output {
+    let start = ["solve", "--scene", SCENE, "--preset", "draft"];
+    vecrad(folder, &[&start, more].concat())
+}
+
+#[test]
+fn a_solve_writes_a_mesh_and_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = solve(
+        folder.path(),
+        &["--export", "lit.ply", "--report", "out.json"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    assert!(output.stdout.is_empty(), "progress is for stderr");
+
+    let ply = fs::read(folder.path().join("lit.ply")).unwrap();
+    let end = b"end_header\n";
+    let body = ply.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let header = String::from_utf8(ply[..body].to_vec()).unwrap();
+    let count = |element: &str| -> usize {
+        let line = header
+            .lines()
+            .find_map(|line| line.strip_prefix(&format!("element {element} ")));
+        line.unwrap().parse().unwrap()
+    };
+    assert!(header.starts_with("ply\nformat binary_little_endian 1.0\n"));
+    assert!(header.contains("property list uchar int vertex_indices"));
+    assert_eq!(ply.len() - body, 51 * count("vertex") + 13 * count("face"));
+
+    let report = fs::read(folder.path().join("out.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!(report["scene"]["triangles"], 4);
+    assert_eq!(report["stop_reason"], "converged");
+    assert_eq!(report["settings"]["method"], "bounded");
+    let steps = report["steps"].as_array().unwrap();
+    assert!(!steps.is_empty());
+    for key in [
+        "elapsed_s",
+        "epsilon",
+        "links",
+        "residual",
+        "energy_balance",
+    ] {
+        assert!(steps[0][key].is_number(), "{key}");
+    }
+    let files = fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(files, 2, "nothing is left beside the outputs");
+}
+
+#[test]
+fn a_dash_sends_the_report_to_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = solve(folder.path(), &["--report", "-", "--quiet"]);
+    assert_eq!(output.status.code(), Some(0));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["scene"]["name"], SCENE);
+}
+
+#[test]
+fn a_reference_puts_an_error_into_every_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--report", "-", "--reference", "paths=16"];
+    let output = solve(folder.path(), &more);
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for step in report["steps"].as_array().unwrap() {
+        assert!(step["error"]["relative_rms"].is_number(), "{step}");
+    }
+}
+
+#[test]
+fn a_limit_ends_with_code_4_and_writes_what_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = solve(
+        folder.path(),
+        &["--report", "out.json", "--time-limit", "0"],
+    );
+    assert_eq!(output.status.code(), Some(4), "{}", error_of(&output));
+    let report = fs::read_to_string(folder.path().join("out.json")).unwrap();
+    assert!(report.contains("\"time-limit\""));
+}
+
+#[test]
+fn wrong_usage_ends_with_code_2_and_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, sentence) in [
+        (&["--export", "lit.obj"][..], "must end in .ply"),
+        (&["--export", "missing/lit.ply"], "there is no such folder"),
+        (&["--epsilon", "-1"], "at least 0"),
+        (&["--threads", "0"], "--threads"),
+        (&["--reference", "photons"], "expected paths"),
+    ] {
+        let output = solve(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            error_of(&output).contains(sentence),
+            "{}",
+            error_of(&output)
+        );
+    }
+}
+
+#[test]
+fn a_scene_that_cannot_be_read_ends_with_code_3() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["solve", "missing.obj"][..],
+        &["solve", "--scene", "nowhere"],
+    ] {
+        let output = vecrad(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(3), "{arguments:?}");
+        assert!(error_of(&output).starts_with("error: "), "{arguments:?}");
+    }
+}

@@ -1,0 +1,49 @@
+//! Same scene, settings and seed: the same bits on any number of threads.
+
+use std::{path::Path, sync::Arc, time::Duration};
+
+use vecrad::{
+    cli,
+    scene::SceneOptions,
+    solver::{Snapshot, SolveSettings},
+    worker::{Event, RunOptions, WorkerHandle},
+};
+
+fn light(threads: usize) -> Arc<Snapshot> {
+    let none: Option<&Path> = None;
+    let scene = cli::load(none, Some("quads"), &SceneOptions::default()).unwrap();
+    let mut worker = WorkerHandle::spawn(Arc::new(|| {})).unwrap();
+    let options = RunOptions {
+        threads,
+        ..RunOptions::default()
+    };
+    worker.start(Arc::new(scene), SolveSettings::draft(), options);
+    loop {
+        match worker.next_event(Duration::from_secs(60)) {
+            Some(Event::Finished(_)) => return worker.latest().unwrap(),
+            Some(Event::Failed(message)) => panic!("{message}"),
+            Some(_) => {}
+            None => panic!("the solve does not end"),
+        }
+    }
+}
+
+#[test]
+fn one_and_eight_threads_give_the_same_bits() {
+    let (one, eight) = (light(1), light(8));
+    let bits = |snapshot: &Snapshot| -> Vec<[u32; 3]> {
+        let irradiance = snapshot.light.irradiance.iter();
+        irradiance
+            .map(|light| light.to_array().map(f32::to_bits))
+            .collect()
+    };
+    assert_eq!(one.mesh, eight.mesh);
+    assert_eq!(bits(&one), bits(&eight));
+    assert!(
+        one.light
+            .irradiance
+            .iter()
+            .any(|light| light.max_element() > 0.0),
+        "there is light to compare"
+    );
+}

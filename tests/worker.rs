@@ -1,0 +1,391 @@
+//! The worker with a stand-in for the solver: cancelling, pausing, generations, panics, limits.
+
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicU32, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use glam::{DVec3, Vec3};
+use vecrad::{
+    scene::{Material, Scene, SceneBuilder, SceneOptions},
+    solver::{Cancel, Snapshot, SolveSettings, StepReport},
+    worker::{Effect, Event, Job, RunOptions, Stepper, StopReason, WorkerHandle},
+};
+
+/// Longer than any machine needs for what is waited for; only a failing test waits so long.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Slower than a test may last: such a step ends by being cancelled.
+const FOREVER: Duration = Duration::from_secs(600);
+
+/// What the fake solver does, and what it was seen doing.
+#[derive(Default)]
+struct Script {
+    /// Time that a step takes unless cancelled.
+    step_time: Duration,
+    /// Steps until the last.
+    steps: u32,
+    /// Step that panics, from 1; 0 for none.
+    panics_at: u32,
+    /// Memory that each step reports.
+    memory_bytes: u64,
+    /// How many steppers were made.
+    made: AtomicU32,
+    /// Numbers of the steps that began.
+    begun: Mutex<Vec<u32>>,
+    /// Steps that saw the cancellation.
+    cancelled: AtomicU32,
+    /// Steppers that were dropped.
+    dropped: AtomicU32,
+}
+
+struct FakeSolver {
+    script: Arc<Script>,
+    settings: SolveSettings,
+    step: u32,
+}
+
+impl Stepper for FakeSolver {
+    fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        self.script.begun.lock().unwrap().push(self.step + 1);
+        let begin = Instant::now();
+        while begin.elapsed() < self.script.step_time {
+            if cancel.is_cancelled() {
+                self.script.cancelled.fetch_add(1, Ordering::SeqCst);
+                return None;
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        self.step += 1;
+        assert!(self.step != self.script.panics_at, "the light went out");
+        Some(StepReport {
+            step: self.step,
+            memory_bytes: self.script.memory_bytes,
+            epsilon: self.settings.epsilon,
+            is_final: self.step >= self.script.steps.max(self.settings.max_steps),
+            ..StepReport::default()
+        })
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            step: self.step,
+            ..Snapshot::default()
+        }
+    }
+
+    fn change_settings(&mut self, settings: SolveSettings) {
+        self.settings = settings;
+    }
+}
+
+impl Drop for FakeSolver {
+    fn drop(&mut self) {
+        self.script.dropped.fetch_add(1, Ordering::SeqCst);
+    }
+}
+
+fn worker(script: &Arc<Script>) -> WorkerHandle {
+    let script = script.clone();
+    let make = move |job: Job| {
+        script.made.fetch_add(1, Ordering::SeqCst);
+        Box::new(FakeSolver {
+            script: script.clone(),
+            settings: job.settings,
+            step: 0,
+        }) as Box<dyn Stepper>
+    };
+    WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap()
+}
+
+fn triangle() -> Arc<Scene> {
+    let mut builder = SceneBuilder::default();
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|corner| builder.push_position(corner));
+    let material = builder.push_material(Material::plain("", Vec3::splat(0.5), Vec3::ONE));
+    builder.push_triangle(corners, material);
+    Arc::new(builder.finish(&SceneOptions::default()).unwrap())
+}
+
+fn short() -> SolveSettings {
+    SolveSettings {
+        max_steps: 1,
+        ..SolveSettings::default()
+    }
+}
+
+fn one_thread() -> RunOptions {
+    RunOptions {
+        threads: 1,
+        ..RunOptions::default()
+    }
+}
+
+fn wait_for(worker: &WorkerHandle, wanted: impl Fn(&Event) -> bool) -> Vec<Event> {
+    let mut seen = Vec::new();
+    let begin = Instant::now();
+    while begin.elapsed() < PATIENCE {
+        if let Some(event) = worker.next_event(PATIENCE) {
+            seen.push(event);
+            if wanted(&seen[seen.len() - 1]) {
+                return seen;
+            }
+        }
+    }
+    panic!("the event never came; seen: {seen:?}");
+}
+
+fn is_finished(event: &Event) -> bool {
+    matches!(event, Event::Finished(_))
+}
+
+/// Wait until the script has begun `count` steps.
+fn wait_for_steps(script: &Script, count: usize) {
+    let begin = Instant::now();
+    while script.begun.lock().unwrap().len() < count {
+        assert!(begin.elapsed() < PATIENCE, "no step began");
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn dropping_the_handle_cancels_within_one_step() {
+    let script = Arc::new(Script {
+        step_time: FOREVER,
+        steps: 9,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 1);
+    drop(worker);
+    assert_eq!(script.cancelled.load(Ordering::SeqCst), 1);
+    assert_eq!(
+        script.dropped.load(Ordering::SeqCst),
+        1,
+        "joined: nothing is left running"
+    );
+    assert_eq!(*script.begun.lock().unwrap(), [1]);
+}
+
+#[test]
+fn a_run_announces_each_step_and_publishes_its_light_first() {
+    let script = Arc::new(Script {
+        steps: 3,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    let events = wait_for(&worker, is_finished);
+    let steps: Vec<u32> = events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Stepped(report) => Some(report.step),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(events[0], Event::Started);
+    assert!(matches!(events[1], Event::Prepared { .. }));
+    assert_eq!(steps, [1, 2, 3]);
+    assert_eq!(events.last(), Some(&Event::Finished(StopReason::Converged)));
+    assert_eq!(worker.latest().map(|snapshot| snapshot.step), Some(3));
+}
+
+#[test]
+fn a_stale_generation_never_shows() {
+    let script = Arc::new(Script {
+        steps: 3,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    // The first run ends without anyone reading its events.
+    let begin = Instant::now();
+    while worker.latest().is_none_or(|snapshot| snapshot.step < 3) {
+        assert!(begin.elapsed() < PATIENCE);
+        thread::sleep(Duration::from_millis(1));
+    }
+    worker.start(triangle(), short(), one_thread());
+    assert!(
+        worker.latest().is_none_or(|snapshot| snapshot.step < 3)
+            || script.begun.lock().unwrap().len() > 3,
+        "the light of the first run must not show in the second"
+    );
+    let events = wait_for(&worker, is_finished);
+    let started = events.iter().filter(|&event| *event == Event::Started);
+    assert_eq!(started.count(), 1, "events of the first run: {events:?}");
+}
+
+#[test]
+fn a_new_start_cancels_the_run_before() {
+    let script = Arc::new(Script {
+        step_time: FOREVER,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 1);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 2);
+    assert_eq!(script.cancelled.load(Ordering::SeqCst), 1);
+    assert_eq!(
+        script.dropped.load(Ordering::SeqCst),
+        1,
+        "one solve at a time"
+    );
+}
+
+#[test]
+fn pause_stops_steps_and_continue_goes_on_without_a_restart() {
+    let script = Arc::new(Script {
+        step_time: Duration::from_millis(20),
+        steps: 4,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, |event| matches!(event, Event::Stepped(_)));
+    worker.pause();
+    wait_for(&worker, |event| *event == Event::Paused);
+    let begun = script.begun.lock().unwrap().len();
+    assert!(worker.next_event(Duration::from_millis(60)).is_none());
+    assert_eq!(script.begun.lock().unwrap().len(), begun, "it rests");
+
+    worker.resume();
+    let events = wait_for(&worker, is_finished);
+    assert_eq!(events[0], Event::Continued);
+    assert_eq!(script.made.load(Ordering::SeqCst), 1, "never made anew");
+    assert_eq!(worker.latest().map(|snapshot| snapshot.step), Some(4));
+}
+
+#[test]
+fn stop_interrupts_a_step_and_keeps_the_light() {
+    let script = Arc::new(Script {
+        step_time: FOREVER,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 1);
+    worker.stop();
+    let events = wait_for(&worker, is_finished);
+    assert_eq!(events.last(), Some(&Event::Finished(StopReason::Requested)));
+    assert!(worker.latest().is_some());
+}
+
+#[test]
+fn the_time_limit_interrupts_a_step_and_continue_grants_it_anew() {
+    let script = Arc::new(Script {
+        step_time: FOREVER,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    let options = RunOptions {
+        time_limit: Some(Duration::from_millis(30)),
+        ..one_thread()
+    };
+    worker.start(triangle(), short(), options);
+    for _ in 0..2 {
+        let events = wait_for(&worker, is_finished);
+        assert_eq!(events.last(), Some(&Event::Finished(StopReason::TimeLimit)));
+        worker.resume();
+    }
+    assert_eq!(script.made.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn the_memory_limit_ends_the_run() {
+    let script = Arc::new(Script {
+        steps: 9,
+        memory_bytes: 1000,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    let options = RunOptions {
+        memory_limit: Some(1000),
+        ..one_thread()
+    };
+    worker.start(triangle(), short(), options);
+    let events = wait_for(&worker, is_finished);
+    assert_eq!(
+        events.last(),
+        Some(&Event::Finished(StopReason::MemoryLimit))
+    );
+    assert_eq!(script.begun.lock().unwrap().len(), 1);
+}
+
+#[test]
+fn a_panic_becomes_a_message_and_a_following_start_works() {
+    let script = Arc::new(Script {
+        steps: 2,
+        panics_at: 2,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    let events = wait_for(&worker, |event| matches!(event, Event::Failed(_)));
+    assert_eq!(
+        events.last(),
+        Some(&Event::Failed("the light went out".to_owned()))
+    );
+    worker.resume();
+    worker.start(triangle(), short(), one_thread());
+    let events = wait_for(&worker, |event| matches!(event, Event::Stepped(_)));
+    assert_eq!(events[0], Event::Started);
+}
+
+#[test]
+fn changed_settings_refine_a_finished_run_or_restart_it() {
+    let script = Arc::new(Script {
+        steps: 1,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+
+    let more = SolveSettings {
+        max_steps: 3,
+        ..short()
+    };
+    assert_eq!(worker.change_settings(more.clone()), Effect::Refines);
+    let events = wait_for(&worker, is_finished);
+    assert_eq!(events[0], Event::Continued);
+    assert_eq!(worker.latest().map(|snapshot| snapshot.step), Some(3));
+    assert_eq!(script.made.load(Ordering::SeqCst), 1);
+
+    let reseeded = SolveSettings { seed: 2, ..more };
+    assert_eq!(worker.change_settings(reseeded), Effect::Restarts);
+    let events = wait_for(&worker, is_finished);
+    assert_eq!(events[0], Event::Started);
+    assert_eq!(script.made.load(Ordering::SeqCst), 2);
+    assert_eq!(worker.settings().seed, 2);
+}
+
+#[test]
+fn every_event_wakes_the_owner() {
+    let script = Arc::new(Script::default());
+    let wakes = Arc::new(AtomicU32::new(0));
+    let counter = wakes.clone();
+    let make_script = script.clone();
+    let mut worker = WorkerHandle::with_steppers(
+        Arc::new(move || {
+            counter.fetch_add(1, Ordering::SeqCst);
+        }),
+        Arc::new(move |job: Job| {
+            Box::new(FakeSolver {
+                script: make_script.clone(),
+                settings: job.settings,
+                step: 0,
+            }) as Box<dyn Stepper>
+        }),
+    )
+    .unwrap();
+    worker.start(triangle(), short(), one_thread());
+    let events = wait_for(&worker, is_finished);
+    drop(worker);
+    assert_eq!(wakes.load(Ordering::SeqCst) as usize, events.len());
+}
