@@ -3,10 +3,13 @@
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
+use super::sidedness::{self, Shells};
+use super::texture::{TextureAverage, cured};
 use super::{
-    Frame, Material, MaterialId, Object, Scene, Surface, Texture, Triangle, TriangleId, Warning,
-    WarningKind,
+    Frame, Material, MaterialId, Object, Scene, Surface, Texture, TextureId, Triangle, TriangleId,
+    Warning, WarningKind,
 };
 
 /// Which sides of a triangle reflect and emit.
@@ -141,45 +144,34 @@ impl SceneBuilder {
                 limit: LIMIT,
             });
         }
-        let dropped = self.drop_unusable_faces();
+        let unusable = self.drop_unusable_faces();
         if self.faces.is_empty() {
-            let detail = if dropped > 0 {
-                format!(": all {dropped} were skipped")
-            } else {
-                String::new()
-            };
-            return Err(BuildError::NoFaces { detail });
+            return Err(no_faces(&unusable));
         }
+        self.sanitise_textures();
         self.sanitise_materials(options);
         let frame = self.frame();
         let (positions, corner_of) = self.weld(&frame);
-        let mut triangles = Vec::with_capacity(self.faces.len());
-        for face in &self.faces {
-            triangles.push(Triangle {
-                corners: face.corners.map(|corner| corner_of[corner as usize]),
-                material: face.material,
-                two_sided: false,
-            });
+        let vanished = self.drop_vanished_faces(&frame, &corner_of);
+        if self.faces.is_empty() {
+            return Err(no_faces(&vanished));
         }
-        let sides = super::sidedness::two_sided(&triangles, positions.len(), options.sides);
-        for (triangle, two_sided) in triangles.iter_mut().zip(sides) {
-            triangle.two_sided = two_sided;
-        }
-        let surfaces = self.surfaces(&frame);
+        let triangles = self.triangles(&corner_of, &positions, options);
+        let surfaces = self.surfaces(&frame, options);
         let mut scene = Scene {
             name: self.source.name,
             frame,
             positions,
-            triangles,
+            triangles: triangles.list,
             surfaces,
             texcoords: corner_values(&self.faces, |face| face.texcoords),
             normals: corner_values(&self.faces, |face| face.normals),
             materials: self.materials,
             textures: self.textures,
-            objects: Vec::new(),
+            objects: object_ranges(&self.objects, self.faces.len()),
             warnings: self.warnings,
         };
-        scene.objects = object_ranges(&self.objects, scene.triangles.len());
+        warn_of_orientation(&mut scene, &triangles.shells, options.sides);
         if !scene.has_emitter() {
             scene.warnings.push(Warning {
                 kind: WarningKind::NoEmitter,
@@ -193,37 +185,208 @@ impl SceneBuilder {
     }
 }
 
+/// Triangles with the shells they form.
+struct ShelledTriangles {
+    list: Vec<Triangle>,
+    shells: Shells,
+}
+
+/// The error for faces that were all skipped.
+fn no_faces(skipped: &[Skipped]) -> BuildError {
+    let count: usize = skipped.iter().map(|skipped| skipped.count).sum();
+    let detail = match skipped.first() {
+        Some(first) => format!(": all {count} were skipped ({})", first.reason),
+        None => String::new(),
+    };
+    BuildError::NoFaces { detail }
+}
+
+/// Say so when a room's faces look away from its light.
+fn warn_of_orientation(scene: &mut Scene, shells: &Shells, sides: Sides) {
+    if sides == Sides::Two {
+        return;
+    }
+    let emits = |triangle: usize| scene.surfaces[triangle].emission != Vec3::ZERO;
+    let count = sidedness::inverted_shell_count(&scene.triangles, &scene.positions, emits, shells);
+    if count > 0 {
+        scene.warnings.push(Warning {
+            kind: WarningKind::Orientation,
+            message: "the faces of a closed shell with a light inside look outward, so the light falls on their \
+                      black backs; flip them or use --sides two"
+                .to_owned(),
+            count,
+            place: None,
+        });
+    }
+}
+
+/// Largest emission of a channel: beyond any light there is (the sun's surface has 2e7), small enough that products
+/// with textures and sums over a scene stay finite in single precision.
+pub(super) const MAX_EMISSION: f32 = 1e12;
+
+/// Faces left out for one reason.
+struct Skipped {
+    reason: &'static str,
+    count: usize,
+    /// Line of the first.
+    line: u32,
+}
+
 /// Area below this fraction of the squared longest edge counts as zero: the rounding of decimal digits in a file
 /// leaves about 1e-16, a needle of aspect one in a million has 1e-6.
 const DEGENERATE_AREA: f64 = 1e-12;
 
 impl SceneBuilder {
-    /// Remove faces with bad indices, non-finite corners or no area; returns how many went.
-    fn drop_unusable_faces(&mut self) -> usize {
-        let mut skipped: Vec<(&'static str, usize, u32)> = Vec::new();
-        let positions = &self.positions;
+    /// Remove faces with bad indices, non-finite corners or no area.
+    fn drop_unusable_faces(&mut self) -> Vec<Skipped> {
+        let positions = std::mem::take(&mut self.positions);
         let material_count = self.materials.len().max(1);
-        self.faces.retain(|face| {
-            let reason = unusable(face, positions, material_count);
-            if let Some(reason) = reason {
-                match skipped.iter_mut().find(|(known, ..)| *known == reason) {
-                    Some((_, count, _)) => *count += 1,
-                    None => skipped.push((reason, 1, face.line)),
-                }
-            }
-            reason.is_none()
+        let skipped = self.drop_faces(|face| unusable(face, &positions, material_count));
+        self.positions = positions;
+        skipped
+    }
+
+    /// Remove faces that shrink to a line or a point in the frame's single precision.
+    fn drop_vanished_faces(&mut self, frame: &Frame, corner_of: &[u32]) -> Vec<Skipped> {
+        let positions = std::mem::take(&mut self.positions);
+        let skipped = self.drop_faces(|face| {
+            let [a, b, c] = face.corners.map(|corner| corner_of[corner as usize]);
+            let area = area_vector(face.corners.map(|corner| positions[corner as usize]), frame);
+            let vanished = a == b || b == c || c == a || area == Vec3::ZERO;
+            vanished.then_some("too small next to the size of the scene")
         });
-        for &(reason, count, line) in &skipped {
-            let place = (line > 0).then(|| (self.source.file.clone(), line as usize));
-            let message = format!("skipped a face: {reason}");
-            self.warnings.push(Warning {
-                kind: WarningKind::FaceSkipped,
-                message,
-                count,
-                place,
-            });
+        self.positions = positions;
+        skipped
+    }
+
+    /// Remove the faces for which there is a reason, count them by reason, and keep objects at their first faces.
+    fn drop_faces(&mut self, reason: impl Fn(&Face) -> Option<&'static str>) -> Vec<Skipped> {
+        let mut skipped: Vec<Skipped> = Vec::new();
+        let (mut index, mut kept) = (0, 0);
+        let objects = &mut self.objects;
+        let mut next_object = 0;
+        self.faces.retain(|face| {
+            while objects
+                .get(next_object)
+                .is_some_and(|object| object.1 <= index)
+            {
+                objects[next_object].1 = kept;
+                next_object += 1;
+            }
+            index += 1;
+            let Some(reason) = reason(face) else {
+                kept += 1;
+                return true;
+            };
+            match skipped.iter_mut().find(|known| known.reason == reason) {
+                Some(known) => known.count += 1,
+                None => skipped.push(Skipped {
+                    reason,
+                    count: 1,
+                    line: face.line,
+                }),
+            }
+            false
+        });
+        for object in &mut objects[next_object..] {
+            object.1 = kept;
         }
-        skipped.iter().map(|(_, count, _)| count).sum()
+        for skipped in &skipped {
+            self.warn_of_skipped(skipped);
+        }
+        skipped
+    }
+
+    /// Add to the warning that the reader may have given for the same reason.
+    fn warn_of_skipped(&mut self, skipped: &Skipped) {
+        let message = format!("skipped a face: {}", skipped.reason);
+        let known = self
+            .warnings
+            .iter_mut()
+            .find(|known| known.message == message);
+        if let Some(known) = known {
+            known.count += skipped.count;
+            return;
+        }
+        self.warnings.push(Warning {
+            kind: WarningKind::FaceSkipped,
+            message,
+            count: skipped.count,
+            place: (skipped.line > 0).then(|| (self.source.file.clone(), skipped.line as usize)),
+        });
+    }
+
+    /// Make every texture safe to look up, and those that reflect at most 1.
+    fn sanitise_textures(&mut self) {
+        for texture in &mut self.textures {
+            for pixel in &mut texture.pixels {
+                *pixel = pixel.map(cured);
+            }
+        }
+        let textures = &mut self.textures;
+        let mut limited: HashMap<TextureId, TextureId> = HashMap::new();
+        for material in &mut self.materials {
+            let usable = |texture: &TextureId| {
+                textures
+                    .get(texture.index())
+                    .is_some_and(Texture::is_consistent)
+            };
+            material.emission_texture = material.emission_texture.filter(usable);
+            material.reflectance_texture = material.reflectance_texture.filter(usable);
+            let Some(original) = material.reflectance_texture else {
+                continue;
+            };
+            let id = *limited.entry(original).or_insert_with(|| {
+                let texture = &textures[original.index()];
+                if texture
+                    .pixels
+                    .iter()
+                    .all(|pixel| pixel.max_element() <= 1.0)
+                {
+                    return original;
+                }
+                // The original may emit elsewhere.
+                let mut copy = texture.clone();
+                for pixel in &mut copy.pixels {
+                    *pixel = pixel.min(Vec3::ONE);
+                }
+                let message = format!(
+                    "texture '{}': reflectance above 1 was clamped to 1",
+                    copy.name
+                );
+                self.warnings.push(Warning {
+                    kind: WarningKind::ValueClamped,
+                    message,
+                    count: 1,
+                    place: None,
+                });
+                textures.push(copy);
+                TextureId(textures.len() as u32 - 1)
+            });
+            material.reflectance_texture = Some(id);
+        }
+    }
+
+    /// Triangles in the frame with their sidedness.
+    fn triangles(
+        &self,
+        corner_of: &[u32],
+        positions: &[Vec3],
+        options: &SceneOptions,
+    ) -> ShelledTriangles {
+        let make = |face: &Face| Triangle {
+            corners: face.corners.map(|corner| corner_of[corner as usize]),
+            material: face.material,
+            two_sided: false,
+        };
+        let mut list: Vec<Triangle> = self.faces.iter().map(make).collect();
+        debug_assert!(positions.iter().all(|position| position.is_finite()));
+        let shells = Shells::of(&list);
+        let flags = sidedness::two_sided(&shells, options.sides);
+        for (triangle, two_sided) in list.iter_mut().zip(flags) {
+            triangle.two_sided = two_sided;
+        }
+        ShelledTriangles { list, shells }
     }
 
     /// Bring reflectance and emission into their ranges; give the scene a material if it has none.
@@ -242,9 +405,7 @@ impl SceneBuilder {
                     0.0
                 }
             });
-            let emission = material
-                .emission
-                .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 });
+            let emission = material.emission.map(super::texture::cured);
             if material.reflectance.cmpgt(Vec3::splat(max)).any() {
                 clamped.push(material.name.clone());
             }
@@ -267,7 +428,8 @@ impl SceneBuilder {
             ),
             (
                 cured,
-                "reflectance or emission that was negative or not finite was set to 0".to_owned(),
+                "reflectance or emission that was negative, not finite or beyond reason was brought into range"
+                    .to_owned(),
             ),
         ] {
             if let Some(first) = names.first() {
@@ -315,21 +477,48 @@ impl SceneBuilder {
     }
 
     /// Area vectors from the file's own digits, and the means of reflectance and emission.
-    fn surfaces(&self, frame: &Frame) -> Vec<Surface> {
-        let area_scale = frame.scale * frame.scale;
+    fn surfaces(&self, frame: &Frame, options: &SceneOptions) -> Vec<Surface> {
+        let max = Vec3::splat(options.max_reflectance.clamp(0.0, 1.0));
+        let averages = self.texture_averages();
+        let mean = |texture: Option<TextureId>, face: &Face| match (texture, face.texcoords) {
+            (Some(texture), Some(uv)) => averages
+                .get(&texture)
+                .map_or(Vec3::ONE, |average| average.over(uv)),
+            _ => Vec3::ONE,
+        };
         self.faces
-            .iter()
+            .par_iter()
             .map(|face| {
-                let [a, b, c] = face.corners.map(|corner| self.positions[corner as usize]);
+                let corners = face.corners.map(|corner| self.positions[corner as usize]);
                 let material = &self.materials[face.material.index()];
+                let reflectance = material.reflectance * mean(material.reflectance_texture, face);
                 Surface {
-                    area_vector: ((b - a).cross(c - a) * 0.5 * area_scale).as_vec3(),
-                    reflectance: material.reflectance,
-                    emission: material.emission,
+                    area_vector: area_vector(corners, frame),
+                    reflectance: reflectance.clamp(Vec3::ZERO, max),
+                    emission: material.emission * mean(material.emission_texture, face),
                 }
             })
             .collect()
     }
+
+    /// The textures in use, ready for means over triangles.
+    fn texture_averages(&self) -> HashMap<TextureId, TextureAverage<'_>> {
+        let mut averages = HashMap::new();
+        for material in &self.materials {
+            let textures = [material.reflectance_texture, material.emission_texture];
+            for texture in textures.into_iter().flatten() {
+                averages
+                    .entry(texture)
+                    .or_insert_with(|| TextureAverage::new(&self.textures[texture.index()]));
+            }
+        }
+        averages
+    }
+}
+
+/// Area times unit normal in frame units.
+fn area_vector([a, b, c]: [DVec3; 3], frame: &Frame) -> Vec3 {
+    ((b - a).cross(c - a) * (0.5 * frame.scale * frame.scale)).as_vec3()
 }
 
 /// Why a face cannot be used, if it cannot.
@@ -348,17 +537,18 @@ fn unusable(face: &Face, positions: &[DVec3], material_count: usize) -> Option<&
     if !(a.is_finite() && b.is_finite() && c.is_finite()) {
         return Some("a corner is not a finite number");
     }
+    is_degenerate([a, b, c]).then_some("no area")
+}
+
+/// Whether a triangle has no area but for rounding.
+pub(super) fn is_degenerate([a, b, c]: [DVec3; 3]) -> bool {
     let longest = (b - a)
         .length_squared()
         .max((c - b).length_squared())
         .max((a - c).length_squared());
     let area = (b - a).cross(c - a).length();
     // Written so that a NaN from overflow counts as degenerate, too.
-    if area > DEGENERATE_AREA * longest && area.is_finite() {
-        None
-    } else {
-        Some("no area")
-    }
+    !(area > DEGENERATE_AREA * longest && area.is_finite())
 }
 
 /// Corner values of all faces if any face has them, else nothing.
@@ -376,12 +566,164 @@ fn corner_values<T: Copy + Default>(
     }
 }
 
-/// Runs of triangles from the first faces of objects.
+/// Runs of triangles from the first faces of objects; together they cover all triangles, and none is empty.
 fn object_ranges(starts: &[(String, usize)], triangle_count: usize) -> Vec<Object> {
-    let _ = starts;
-    vec![Object {
-        name: String::new(),
-        start: TriangleId(0),
-        end: TriangleId(triangle_count as u32),
-    }]
+    let mut objects: Vec<Object> = Vec::new();
+    let mut push = |name: &str, start: usize, end: usize| {
+        if start >= end {
+            return;
+        }
+        match objects.last_mut() {
+            Some(last) if last.name == name => last.end = TriangleId(end as u32),
+            _ => objects.push(Object {
+                name: name.to_owned(),
+                start: TriangleId(start as u32),
+                end: TriangleId(end as u32),
+            }),
+        }
+    };
+    let first = starts.first().map_or(triangle_count, |(_, start)| *start);
+    push("", 0, first.min(triangle_count));
+    for (index, (name, start)) in starts.iter().enumerate() {
+        let end = starts
+            .get(index + 1)
+            .map_or(triangle_count, |(_, next)| *next);
+        push(name, *start, end.min(triangle_count));
+    }
+    objects
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn builder_of(points: &[[f64; 3]]) -> SceneBuilder {
+        let mut builder = SceneBuilder::default();
+        for &point in points {
+            builder.push_position(DVec3::from_array(point));
+        }
+        builder
+    }
+
+    const TRIANGLE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    fn checkerboard() -> Texture {
+        let pixels = [Vec3::ZERO, Vec3::ONE, Vec3::ONE, Vec3::ZERO].to_vec();
+        Texture {
+            name: "checker".to_owned(),
+            width: 2,
+            height: 2,
+            pixels,
+        }
+    }
+
+    #[test]
+    fn objects_follow_their_faces_when_others_are_dropped() {
+        let mut builder = builder_of(&TRIANGLE);
+        for (name, corners) in [
+            ("a", [0, 0, 1]),
+            ("b", [0, 1, 2]),
+            ("c", [1, 1, 2]),
+            ("d", [0, 1, 2]),
+        ] {
+            builder.objects.push((name.to_owned(), builder.faces.len()));
+            builder.push_triangle(corners, MaterialId(0));
+        }
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        let objects = scene.objects.iter().map(|o| (&*o.name, o.start.0, o.end.0));
+        assert_eq!(objects.collect::<Vec<_>>(), [("b", 0, 1), ("d", 1, 2)]);
+        assert_eq!(scene.warnings[0].count, 2);
+    }
+
+    #[test]
+    fn faces_before_the_first_object_have_a_nameless_one() {
+        let objects = object_ranges(&[("a".to_owned(), 2)], 3);
+        assert_eq!(objects.len(), 2);
+        assert_eq!(
+            (objects[0].end, objects[1].end),
+            (TriangleId(2), TriangleId(3))
+        );
+        assert_eq!(object_ranges(&[], 3).len(), 1);
+    }
+
+    #[test]
+    fn textured_reflectance_is_the_area_mean() {
+        let mut builder = builder_of(&TRIANGLE);
+        builder.textures.push(checkerboard());
+        let mut material = Material::plain("m", Vec3::splat(0.8), Vec3::splat(3.0));
+        material.reflectance_texture = Some(TextureId(0));
+        material.emission_texture = Some(TextureId(0));
+        builder.push_material(material);
+        let uv = [Vec2::ZERO, Vec2::new(8.0, 0.0), Vec2::new(0.0, 8.0)];
+        builder.push_triangle([0, 1, 2], MaterialId(0));
+        builder.faces[0].texcoords = Some(uv);
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        assert!((scene.surfaces[0].reflectance - 0.4).abs().max_element() < 0.01);
+        assert!((scene.surfaces[0].emission - 1.5).abs().max_element() < 0.04);
+    }
+
+    #[test]
+    fn bright_reflectance_texture_is_clamped_but_still_emits() {
+        let mut builder = builder_of(&TRIANGLE);
+        let mut texture = checkerboard();
+        texture.pixels.fill(Vec3::splat(40.0));
+        builder.textures.push(texture);
+        let mut material = Material::plain("m", Vec3::ONE, Vec3::ONE);
+        material.reflectance_texture = Some(TextureId(0));
+        material.emission_texture = Some(TextureId(0));
+        builder.push_material(material);
+        builder.push_triangle([0, 1, 2], MaterialId(0));
+        builder.faces[0].texcoords = Some([Vec2::ZERO, Vec2::X, Vec2::Y]);
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        assert!(scene.surfaces[0].reflectance.max_element() <= 0.98);
+        assert!((scene.surfaces[0].emission - 40.0).abs().max_element() < 1e-3);
+    }
+
+    #[test]
+    fn faces_that_vanish_in_single_precision_are_dropped() {
+        let mut points = TRIANGLE.to_vec();
+        points.extend([[1e12, 0.0, 0.0], [0.0, 1e12, 0.0]]);
+        let mut builder = builder_of(&points);
+        builder.push_triangle([0, 1, 2], MaterialId(0));
+        builder.push_triangle([0, 3, 4], MaterialId(0));
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        assert_eq!(scene.triangles.len(), 1);
+        assert!(
+            scene.warnings[0]
+                .message
+                .contains("too small next to the size")
+        );
+    }
+
+    #[test]
+    fn outward_room_with_a_light_inside_is_named() {
+        let mut builder = builder_of(&[
+            [0.0, 0.0, 0.0],
+            [9.0, 0.0, 0.0],
+            [0.0, 9.0, 0.0],
+            [0.0, 0.0, 9.0],
+            [1.0, 1.0, 1.0],
+            [2.0, 1.0, 1.0],
+            [1.0, 2.0, 1.0],
+        ]);
+        let wall = builder.push_material(Material::plain("wall", Vec3::splat(0.5), Vec3::ZERO));
+        let light = builder.push_material(Material::plain("light", Vec3::ZERO, Vec3::ONE));
+        for corners in [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]] {
+            builder.push_triangle(corners, wall);
+        }
+        builder.push_triangle([4, 5, 6], light);
+        let orientation = |sides| {
+            let options = SceneOptions {
+                sides,
+                ..SceneOptions::default()
+            };
+            let scene = builder.clone().finish(&options).unwrap();
+            let kinds = scene.warnings.iter().map(|warning| warning.kind);
+            kinds
+                .filter(|&kind| kind == WarningKind::Orientation)
+                .count()
+        };
+        assert_eq!(orientation(Sides::Auto), 1);
+        assert_eq!(orientation(Sides::Two), 0);
+    }
 }

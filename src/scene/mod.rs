@@ -6,13 +6,20 @@
 //! Units: radiance in W·sr⁻¹·m⁻², lengths in units of the frame (see [`Frame`]).
 
 mod build;
+mod clean;
 mod frame;
+mod lines;
+mod locate;
+mod mtl;
+mod obj;
 mod sidedness;
 mod texture;
+mod triangulate;
 mod warning;
 
 pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use frame::Frame;
+pub use obj::{ReadError, read_obj};
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
 

@@ -1,9 +1,244 @@
-//! Which faces are two-sided: sheets are, faces of a consistently wound closed shell are not.
+//! Which faces are two-sided: sheets are, faces of a consistently wound closed shell are not. And whether a shell
+//! around a light looks the wrong way.
+//!
+//! A shell is a set of triangles connected by shared edges. It is closed and consistently wound when every directed
+//! edge meets its opposite exactly once.
+
+use std::f32::consts::PI;
+
+use glam::{DVec3, Vec3};
 
 use super::{Sides, Triangle};
 
-/// One flag per triangle. `position_count` bounds the corner indices.
-pub(super) fn two_sided(triangles: &[Triangle], position_count: usize, sides: Sides) -> Vec<bool> {
-    let _ = position_count;
-    vec![sides == Sides::Two; triangles.len()]
+/// The shells of a scene.
+#[derive(Clone, Debug)]
+pub(super) struct Shells {
+    /// Shell of each triangle.
+    pub(super) of_triangle: Vec<u32>,
+    /// By shell: whether it is closed and consistently wound.
+    pub(super) closed: Vec<bool>,
+}
+
+/// One flag per triangle.
+pub(super) fn two_sided(shells: &Shells, sides: Sides) -> Vec<bool> {
+    let flag = |&shell: &u32| match sides {
+        Sides::Auto => !shells.closed[shell as usize],
+        Sides::One => false,
+        Sides::Two => true,
+    };
+    shells.of_triangle.iter().map(flag).collect()
+}
+
+impl Shells {
+    /// Find the shells; takes the time of sorting the edges.
+    pub(super) fn of(triangles: &[Triangle]) -> Self {
+        let edges = sorted_edges(triangles);
+        // Connect triangles over shared edges.
+        let mut forest = Forest::new(triangles.len());
+        let mut open = Vec::new();
+        for group in edges.chunk_by(|a, b| a.ends == b.ends) {
+            for pair in group.windows(2) {
+                forest.join(pair[0].triangle, pair[1].triangle);
+            }
+            if group.len() != 2 || group[0].forward == group[1].forward {
+                open.push(group[0].triangle);
+            }
+        }
+        // Number the shells in the order of their first triangles.
+        let mut number = vec![u32::MAX; triangles.len()];
+        let mut count = 0;
+        let mut of_triangle = Vec::with_capacity(triangles.len());
+        for triangle in 0..triangles.len() as u32 {
+            let root = forest.root(triangle) as usize;
+            if number[root] == u32::MAX {
+                number[root] = count;
+                count += 1;
+            }
+            of_triangle.push(number[root]);
+        }
+        let mut closed = vec![true; count as usize];
+        for triangle in open {
+            closed[of_triangle[triangle as usize] as usize] = false;
+        }
+        Self {
+            of_triangle,
+            closed,
+        }
+    }
+}
+
+/// An edge of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Edge {
+    /// Smaller and larger corner.
+    ends: (u32, u32),
+    triangle: u32,
+    /// Whether the triangle runs from the smaller to the larger.
+    forward: bool,
+}
+
+fn sorted_edges(triangles: &[Triangle]) -> Vec<Edge> {
+    let mut edges = Vec::with_capacity(triangles.len() * 3);
+    for (number, triangle) in triangles.iter().enumerate() {
+        let [a, b, c] = triangle.corners;
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            edges.push(Edge {
+                ends: (from.min(to), from.max(to)),
+                triangle: number as u32,
+                forward: from < to,
+            });
+        }
+    }
+    edges.sort_unstable();
+    edges
+}
+
+/// Disjoint sets with path halving.
+struct Forest {
+    parent: Vec<u32>,
+}
+
+impl Forest {
+    fn new(count: usize) -> Self {
+        Self {
+            parent: (0..count as u32).collect(),
+        }
+    }
+
+    fn root(&mut self, mut item: u32) -> u32 {
+        while self.parent[item as usize] != item {
+            let grandparent = self.parent[self.parent[item as usize] as usize];
+            self.parent[item as usize] = grandparent;
+            item = grandparent;
+        }
+        item
+    }
+
+    /// Join two sets; the smaller root stays, so that the outcome does not depend on anything else.
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+}
+
+/// Lights that are looked at; each costs a pass over the triangles.
+const MAX_LIGHTS: usize = 16;
+
+/// How many closed shells hold a light of another shell inside while their faces look outward, so that its light
+/// falls on their black backs. A shell that is the whole scene and emits outward counts, too.
+pub(super) fn inverted_shell_count(
+    triangles: &[Triangle],
+    positions: &[Vec3],
+    emits: impl Fn(usize) -> bool,
+    shells: &Shells,
+) -> usize {
+    let emitters = (0..triangles.len()).filter(|&triangle| emits(triangle));
+    let emitters = emitters.collect::<Vec<_>>();
+    let corners = |triangle: usize| triangles[triangle].corners.map(|i| positions[i as usize]);
+    if shells.closed == [true] && !emitters.is_empty() {
+        let volume: f64 = (0..triangles.len())
+            .map(|triangle| {
+                let [a, b, c] = corners(triangle).map(Vec3::as_dvec3);
+                a.dot(b.cross(c))
+            })
+            .sum();
+        return usize::from(volume > 0.0);
+    }
+    let mut inverted = vec![false; shells.closed.len()];
+    let step = emitters.len().div_ceil(MAX_LIGHTS).max(1);
+    for &light in emitters.iter().step_by(step) {
+        let [a, b, c] = corners(light);
+        let point = (a + b + c) / 3.0;
+        let own = shells.of_triangle[light] as usize;
+        // The solid angle under which a closed shell is seen from inside is the full sphere, signed by its winding.
+        let mut solid_angle = vec![0.0_f64; shells.closed.len()];
+        for triangle in 0..triangles.len() {
+            let shell = shells.of_triangle[triangle] as usize;
+            if shells.closed[shell] && shell != own {
+                solid_angle[shell] += signed_solid_angle(corners(triangle), point);
+            }
+        }
+        for (inverted, angle) in inverted.iter_mut().zip(solid_angle) {
+            *inverted |= angle > f64::from(2.0 * PI);
+        }
+    }
+    inverted.iter().filter(|&&inverted| inverted).count()
+}
+
+/// Solid angle of a triangle (Van Oosterom and Strackee 1983), positive where its back is seen.
+fn signed_solid_angle(corners: [Vec3; 3], point: Vec3) -> f64 {
+    let [a, b, c]: [DVec3; 3] = corners.map(|corner| (corner - point).as_dvec3());
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let triple = a.dot(b.cross(c));
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * triple.atan2(denominator)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::MaterialId;
+
+    fn triangles(corners: &[[u32; 3]]) -> Vec<Triangle> {
+        let make = |&corners: &[u32; 3]| Triangle {
+            corners,
+            material: MaterialId(0),
+            two_sided: false,
+        };
+        corners.iter().map(make).collect()
+    }
+
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+
+    fn flags(corners: &[[u32; 3]]) -> Vec<bool> {
+        two_sided(&Shells::of(&triangles(corners)), Sides::Auto)
+    }
+
+    #[test]
+    fn closed_shells_are_one_sided_and_sheets_are_not() {
+        assert_eq!(flags(&TETRAHEDRON), [false; 4]);
+        assert_eq!(flags(&TETRAHEDRON[..3]), [true; 3]);
+        let mut with_sheet = TETRAHEDRON.to_vec();
+        with_sheet.push([4, 5, 6]);
+        assert_eq!(flags(&with_sheet), [false, false, false, false, true]);
+        assert!(flags(&[]).is_empty());
+    }
+
+    #[test]
+    fn one_flipped_or_doubled_face_opens_the_shell() {
+        let mut flipped = TETRAHEDRON;
+        flipped[2].swap(0, 1);
+        assert_eq!(flags(&flipped), [true; 4]);
+        let mut doubled = TETRAHEDRON.to_vec();
+        doubled.push(TETRAHEDRON[0]);
+        assert_eq!(flags(&doubled), [true; 5]);
+    }
+
+    #[test]
+    fn shells_that_look_outward_around_a_light_are_found() {
+        let mut positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let inner = [
+            Vec3::splat(0.1),
+            Vec3::new(0.2, 0.1, 0.1),
+            Vec3::new(0.1, 0.2, 0.1),
+        ];
+        positions.extend(inner);
+        let mut corners = TETRAHEDRON.to_vec();
+        corners.push([4, 5, 6]);
+        let count = |corners: &[[u32; 3]], positions: &[Vec3]| {
+            let triangles = triangles(corners);
+            let shells = Shells::of(&triangles);
+            inverted_shell_count(&triangles, positions, |triangle| triangle == 4, &shells)
+        };
+        assert_eq!(count(&corners, &positions), 1);
+        let inward = corners
+            .iter()
+            .map(|&[a, b, c]| [a, c, b])
+            .collect::<Vec<_>>();
+        assert_eq!(count(&inward, &positions), 0);
+        for position in &mut positions[4..] {
+            *position += 5.0;
+        }
+        assert_eq!(count(&corners, &positions), 0);
+    }
 }

@@ -50,3 +50,100 @@ impl fmt::Display for Warning {
         Ok(())
     }
 }
+
+/// Warnings as they are met: equal ones are counted, and their number is bounded.
+#[derive(Clone, Debug, Default)]
+pub(super) struct WarningLog {
+    warnings: Vec<Warning>,
+}
+
+/// Distinct warnings kept. Fewer would hide causes, many more would bury the reader and slow a hostile file down.
+const MAX_DISTINCT: usize = 64;
+
+impl WarningLog {
+    /// Count one more of this kind and message; `line` 0 means that no line is known.
+    pub(super) fn note(&mut self, kind: WarningKind, message: &str, file: &str, line: usize) {
+        self.note_times(kind, message, 1, file, line);
+    }
+
+    /// Count `count` more of this kind and message.
+    pub(super) fn note_times(
+        &mut self,
+        kind: WarningKind,
+        message: &str,
+        count: usize,
+        file: &str,
+        line: usize,
+    ) {
+        const OVERFLOW: &str = "more of this kind, not listed one by one";
+        let message = if self.find(kind, message).is_none() && self.warnings.len() >= MAX_DISTINCT {
+            OVERFLOW
+        } else {
+            message
+        };
+        match self.find(kind, message) {
+            Some(index) => self.warnings[index].count += count,
+            None => self.warnings.push(Warning {
+                kind,
+                message: message.to_owned(),
+                count,
+                place: (line > 0).then(|| (file.to_owned(), line)),
+            }),
+        }
+    }
+
+    /// The warnings in the order in which each was first met.
+    pub(super) fn into_warnings(self) -> Vec<Warning> {
+        self.warnings
+    }
+
+    fn find(&self, kind: WarningKind, message: &str) -> Option<usize> {
+        self.warnings
+            .iter()
+            .position(|known| known.kind == kind && known.message == message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_warnings_are_counted_at_their_first_place() {
+        let mut log = WarningLog::default();
+        log.note(
+            WarningKind::FaceSkipped,
+            "skipped a face: no area",
+            "a.obj",
+            3,
+        );
+        log.note(
+            WarningKind::FaceSkipped,
+            "skipped a face: no area",
+            "a.obj",
+            9,
+        );
+        let warnings = log.into_warnings();
+        assert_eq!(warnings.len(), 1);
+        assert_eq!(
+            warnings[0].to_string(),
+            "a.obj:3: skipped a face: no area (2 times)"
+        );
+    }
+
+    #[test]
+    fn distinct_warnings_are_bounded() {
+        let mut log = WarningLog::default();
+        for number in 0..10_000 {
+            log.note(
+                WarningKind::TextureMissing,
+                &format!("texture {number}"),
+                "",
+                0,
+            );
+        }
+        let warnings = log.into_warnings();
+        assert!(warnings.len() <= MAX_DISTINCT + 9);
+        assert_eq!(warnings.iter().map(|w| w.count).sum::<usize>(), 10_000);
+    }
+}

@@ -1,0 +1,533 @@
+//! An OBJ file on its way to the parser: every statement is checked, bad ones become harmless ones so that indices
+//! keep their meaning, and what only this program understands (objects, materials, lines of faces) is noted aside.
+//!
+//! The parser reads nothing but ASCII `v`, `vt`, `vn`, `f` and `o` statements. Its `o` names are numbers of
+//! [`Segment`]s. The first `vt` and the first `vn` it sees are not numbers: they stand for "none".
+
+use std::collections::HashMap;
+use std::io::{self, BufRead, Read};
+use std::sync::Arc;
+
+use super::lines::{LogicalLines, Number, decode, split_keyword, words};
+use super::warning::{WarningKind, WarningLog};
+
+/// Faces that share an object name and a material.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    /// Name of the last `o` or `g`.
+    pub(super) object: Arc<str>,
+    /// Index into [`Notes::materials`].
+    pub(super) material: Option<usize>,
+}
+
+/// A name with the line where it was first met and how often.
+#[derive(Clone, Debug)]
+pub(super) struct Mention {
+    /// The name as in the file, decoded.
+    pub(super) name: String,
+    /// The first line.
+    pub(super) line: usize,
+    /// How often.
+    pub(super) count: usize,
+}
+
+/// What was noted beside the text.
+#[derive(Debug, Default)]
+pub(super) struct Notes {
+    /// Segments by the number that the parser sees as their name.
+    pub(super) segments: Vec<Segment>,
+    /// Line of each face that the parser sees, in order.
+    pub(super) face_lines: Vec<u32>,
+    /// Names of `usemtl`, in order of first use.
+    pub(super) materials: Vec<Mention>,
+    /// What follows `mtllib`, each once.
+    pub(super) libraries: Vec<Mention>,
+    /// Faces that were left out.
+    pub(super) skipped_faces: usize,
+    /// OBJ statements that were understood.
+    pub(super) statements: usize,
+    /// Whether the file holds anything but white space.
+    pub(super) any_text: bool,
+    /// The error that ended reading.
+    pub(super) failure: Option<String>,
+    /// What was cured or skipped.
+    pub(super) log: WarningLog,
+}
+
+/// Text handed to the parser at once.
+const CHUNK: usize = 64 << 10;
+
+/// A clean view of an OBJ file.
+#[derive(Debug)]
+pub(super) struct ObjCleaner<R> {
+    lines: LogicalLines<R>,
+    file: String,
+    clean: Vec<u8>,
+    position: usize,
+    at_end: bool,
+    /// What was found.
+    pub(super) notes: Notes,
+    position_count: i64,
+    texcoord_count: i64,
+    normal_count: i64,
+    /// Numbers of positions that are no points, ascending from 1.
+    bad_positions: Vec<i64>,
+    object: Arc<str>,
+    group: Arc<str>,
+    material: Option<usize>,
+    material_index: HashMap<String, usize>,
+    segment_is_new: bool,
+    corners: Vec<[i64; 3]>,
+    /// Whether the last face had texture coordinates or normals: the parser repeats the last one where there is none.
+    last_had_attributes: bool,
+}
+
+/// One statement's trouble that costs the face.
+type Reason = &'static str;
+
+impl<R: BufRead> ObjCleaner<R> {
+    /// Start at the beginning of a file; `file` is its name for messages.
+    pub(super) fn new(source: R, file: &str) -> Self {
+        Self {
+            lines: LogicalLines::new(source),
+            file: file.to_owned(),
+            clean: b"vt nan nan\nvn nan nan nan\n".to_vec(),
+            position: 0,
+            at_end: false,
+            notes: Notes::default(),
+            position_count: 0,
+            texcoord_count: 0,
+            normal_count: 0,
+            bad_positions: Vec::new(),
+            object: Arc::from(""),
+            group: Arc::from(""),
+            material: None,
+            material_index: HashMap::new(),
+            segment_is_new: true,
+            corners: Vec::new(),
+            last_had_attributes: false,
+        }
+    }
+
+    /// Clean one chunk of lines.
+    fn refill(&mut self) -> io::Result<()> {
+        self.clean.clear();
+        self.position = 0;
+        while self.clean.len() < CHUNK {
+            let line = self.lines.advance(&mut self.notes.log, &self.file);
+            let line = line.inspect_err(|error| self.notes.failure = Some(error.to_string()))?;
+            let Some(line) = line else {
+                self.at_end = true;
+                break;
+            };
+            let text = std::mem::take(&mut self.lines.text);
+            self.statement(&text, line);
+            self.lines.text = text;
+        }
+        Ok(())
+    }
+
+    fn statement(&mut self, text: &[u8], line: usize) {
+        let (keyword, rest) = split_keyword(text);
+        self.notes.any_text |= !keyword.is_empty();
+        match keyword {
+            b"v" => self.position_statement(rest, line),
+            b"vt" => self.texcoord_statement(rest, line),
+            b"vn" => self.normal_statement(rest, line),
+            b"f" | b"fo" => self.face_statement(rest, line),
+            b"o" => {
+                self.object = Arc::from(&*decode(rest));
+                self.group = Arc::from("");
+                self.segment_is_new = true;
+            }
+            b"g" => {
+                self.group = Arc::from(&*decode(rest));
+                self.segment_is_new = true;
+            }
+            b"usemtl" => self.material_statement(rest, line),
+            b"mtllib" => self.library_statement(rest, line),
+            _ => return self.other_statement(keyword, line),
+        }
+        self.notes.statements += 1;
+    }
+
+    fn other_statement(&mut self, keyword: &[u8], line: usize) {
+        let (kind, message) = match keyword {
+            b"" | [b'#', ..] => return,
+            b"l" | b"p" => (
+                WarningKind::Unsupported,
+                "lines and points have no surface and were left out",
+            ),
+            b"curv" | b"curv2" | b"surf" => (
+                WarningKind::Unsupported,
+                "free-form curves and surfaces (NURBS) were left out; export them as polygons",
+            ),
+            b"call" | b"csh" => (
+                WarningKind::Unsupported,
+                "calls of other files and commands were left out",
+            ),
+            // Smoothing, display hints and the details of free-form surfaces change nothing here.
+            b"s" | b"mg" | b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"parm" | b"trim"
+            | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"bevel" | b"c_interp"
+            | b"d_interp" | b"lod" | b"shadow_obj" | b"trace_obj" | b"ctech" | b"stech"
+            | b"maplib" | b"usemap" => return,
+            _ => (
+                WarningKind::LineSkipped,
+                "skipped a line that is no OBJ statement",
+            ),
+        };
+        self.note(kind, message, line);
+    }
+
+    fn note(&mut self, kind: WarningKind, message: &str, line: usize) {
+        self.notes.log.note(kind, message, &self.file, line);
+    }
+
+    fn position_statement(&mut self, rest: &[u8], line: usize) {
+        self.position_count += 1;
+        let mut rest = words(rest);
+        if let Err(trouble) = self.copy_numbers(b"v", &mut rest, 3) {
+            self.clean.extend_from_slice(b"v 0 0 0\n");
+            self.bad_positions.push(self.position_count);
+            let message = match trouble {
+                Number::NotFinite => {
+                    "vertex that is not a finite number; faces that use it are left out"
+                }
+                _ => "vertex without three numbers; faces that use it are left out",
+            };
+            self.note(WarningKind::LineSkipped, message, line);
+        } else if rest.nth(2).is_some() {
+            // One more value is a weight for free-form surfaces, three are a colour.
+            let message = "vertex colours are not used; give the material Kd or map_Kd";
+            self.note(WarningKind::Unsupported, message, line);
+        }
+    }
+
+    fn texcoord_statement(&mut self, rest: &[u8], line: usize) {
+        self.texcoord_count += 1;
+        // One value is legal, the other is then 0.
+        let second: &[u8] = if words(rest).nth(1).is_some() {
+            b""
+        } else {
+            b"0"
+        };
+        let mut values = words(rest).chain(words(second));
+        if words(rest).next().is_none() || self.copy_numbers(b"vt", &mut values, 2).is_err() {
+            self.clean.extend_from_slice(b"vt nan nan\n");
+            let message = "texture coordinate that is not a number was ignored";
+            self.note(WarningKind::LineSkipped, message, line);
+        }
+    }
+
+    fn normal_statement(&mut self, rest: &[u8], line: usize) {
+        self.normal_count += 1;
+        if self.copy_numbers(b"vn", &mut words(rest), 3).is_err() {
+            self.clean.extend_from_slice(b"vn nan nan nan\n");
+            let message = "normal that is not a number was ignored";
+            self.note(WarningKind::LineSkipped, message, line);
+        }
+    }
+
+    /// Copy a statement of `count` finite numbers, or nothing if one of them is not.
+    fn copy_numbers<'a>(
+        &mut self,
+        keyword: &[u8],
+        values: &mut impl Iterator<Item = &'a [u8]>,
+        count: usize,
+    ) -> Result<(), Number> {
+        let start = self.clean.len();
+        self.clean.extend_from_slice(keyword);
+        for _ in 0..count {
+            let word = values.next().unwrap_or_default();
+            let number = Number::of(word);
+            if number != Number::Finite {
+                self.clean.truncate(start);
+                return Err(number);
+            }
+            self.clean.push(b' ');
+            self.clean.extend_from_slice(word);
+        }
+        self.clean.push(b'\n');
+        Ok(())
+    }
+
+    fn material_statement(&mut self, rest: &[u8], line: usize) {
+        let name = decode(rest);
+        if name.is_empty() {
+            let message = "skipped a usemtl without a name";
+            return self.note(WarningKind::LineSkipped, message, line);
+        }
+        let index = match self.material_index.get(&*name) {
+            Some(&index) => index,
+            None => {
+                let index = self.notes.materials.len();
+                self.material_index.insert(name.clone().into_owned(), index);
+                self.notes.materials.push(Mention {
+                    name: name.into_owned(),
+                    line,
+                    count: 0,
+                });
+                index
+            }
+        };
+        self.notes.materials[index].count += 1;
+        self.segment_is_new |= self.material != Some(index);
+        self.material = Some(index);
+    }
+
+    fn library_statement(&mut self, rest: &[u8], line: usize) {
+        let name = decode(rest);
+        if name.is_empty() {
+            let message = "skipped an mtllib without a name";
+            return self.note(WarningKind::LineSkipped, message, line);
+        }
+        if let Some(known) = self
+            .notes
+            .libraries
+            .iter_mut()
+            .find(|known| known.name == name)
+        {
+            known.count += 1;
+        } else if self.notes.libraries.len() < MAX_LIBRARIES {
+            self.notes.libraries.push(Mention {
+                name: name.into_owned(),
+                line,
+                count: 1,
+            });
+        } else {
+            let message = "skipped an mtllib beyond the first thousand";
+            self.note(WarningKind::LineSkipped, message, line);
+        }
+    }
+
+    fn face_statement(&mut self, rest: &[u8], line: usize) {
+        match self.read_corners(rest, line) {
+            Ok(()) => self.write_face(line),
+            Err(reason) => {
+                self.notes.skipped_faces += 1;
+                let message = format!("skipped a face: {reason}");
+                self.note(WarningKind::FaceSkipped, &message, line);
+            }
+        }
+    }
+
+    /// Fill [`Self::corners`] with absolute indices from 1, 0 where a texture coordinate or normal is missing.
+    fn read_corners(&mut self, rest: &[u8], line: usize) -> Result<(), Reason> {
+        self.corners.clear();
+        let mut ignored = false;
+        for word in words(rest) {
+            let [position, texcoord, normal] = parse_corner(word)?;
+            let position = resolve(position, self.position_count)?;
+            if !self.bad_positions.is_empty() && self.bad_positions.binary_search(&position).is_ok()
+            {
+                return Err("a corner is not a finite number");
+            }
+            let mut optional = |index: Option<i64>, count: i64| match index {
+                None => 0,
+                index => resolve(index, count).unwrap_or_else(|_| {
+                    ignored = true;
+                    0
+                }),
+            };
+            self.corners.push([
+                position,
+                optional(texcoord, self.texcoord_count),
+                optional(normal, self.normal_count),
+            ]);
+        }
+        if ignored {
+            let message =
+                "texture coordinates or normals of a face with an index out of range were ignored";
+            self.note(WarningKind::LineSkipped, message, line);
+        }
+        if self.corners.len() < 3 {
+            return Err("fewer than three corners");
+        }
+        Ok(())
+    }
+
+    fn write_face(&mut self, line: usize) {
+        if std::mem::take(&mut self.segment_is_new) {
+            self.write_segment();
+        }
+        let corners = std::mem::take(&mut self.corners);
+        // The parser has its "none" at 1, so all indices move up by one.
+        let [with_texcoords, with_normals] =
+            [1, 2].map(|which| corners.iter().all(|corner| corner[which] > 0));
+        let with_attributes = with_texcoords || with_normals;
+        self.clean.push(b'f');
+        for &[position, texcoord, normal] in &corners {
+            self.clean.push(b' ');
+            push_integer(&mut self.clean, position);
+            if with_attributes || self.last_had_attributes {
+                self.clean.push(b'/');
+                push_integer(
+                    &mut self.clean,
+                    if with_texcoords { texcoord + 1 } else { 1 },
+                );
+                self.clean.push(b'/');
+                push_integer(&mut self.clean, if with_normals { normal + 1 } else { 1 });
+            }
+        }
+        self.clean.push(b'\n');
+        self.last_had_attributes = with_attributes;
+        self.corners = corners;
+        self.notes.face_lines.push(u32::try_from(line).unwrap_or(0));
+    }
+
+    /// Start a segment with the names in force.
+    fn write_segment(&mut self) {
+        let object = if self.group.is_empty() {
+            &self.object
+        } else {
+            &self.group
+        };
+        self.clean.extend_from_slice(b"o ");
+        push_integer(&mut self.clean, self.notes.segments.len() as i64);
+        self.clean.push(b'\n');
+        self.notes.segments.push(Segment {
+            object: Arc::clone(object),
+            material: self.material,
+        });
+    }
+}
+
+/// Material files that are looked at: searching a list of names must not take longer than reading the file.
+const MAX_LIBRARIES: usize = 1000;
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn` as they stand.
+fn parse_corner(word: &[u8]) -> Result<[Option<i64>; 3], Reason> {
+    const MALFORMED: Reason = "a corner is no vertex index";
+    let mut corner = [None; 3];
+    for (slot, part) in word.split(|&byte| byte == b'/').enumerate() {
+        let target = corner.get_mut(slot).ok_or(MALFORMED)?;
+        if !part.is_empty() {
+            *target = Some(parse_integer(part).ok_or(MALFORMED)?);
+        }
+    }
+    Ok(corner)
+}
+
+/// A decimal integer; beyond 18 digits it saturates, which is out of every range.
+fn parse_integer(word: &[u8]) -> Option<i64> {
+    let (negative, digits) = match word {
+        [b'-', digits @ ..] => (true, digits),
+        [b'+', digits @ ..] => (false, digits),
+        digits => (false, digits),
+    };
+    if digits.is_empty() {
+        return None;
+    }
+    let mut value = 0_i64;
+    for &digit in digits {
+        if !digit.is_ascii_digit() {
+            return None;
+        }
+        value = value
+            .saturating_mul(10)
+            .saturating_add(i64::from(digit - b'0'));
+    }
+    Some(if negative { -value } else { value })
+}
+
+/// The absolute index from 1 of what an index of the file means when `count` elements have been read.
+fn resolve(index: Option<i64>, count: i64) -> Result<i64, Reason> {
+    let absolute = match index {
+        None => return Err("a corner is no vertex index"),
+        Some(0) => return Err("index 0 (indices count from 1)"),
+        Some(index) if index < 0 => index.saturating_add(count + 1),
+        Some(index) => index,
+    };
+    if (1..=count).contains(&absolute) {
+        Ok(absolute)
+    } else {
+        Err("vertex index out of range")
+    }
+}
+
+/// Append a non-negative integer in decimal.
+fn push_integer(text: &mut Vec<u8>, mut value: i64) {
+    let start = text.len();
+    loop {
+        text.push(b'0' + (value % 10) as u8);
+        value /= 10;
+        if value <= 0 {
+            break;
+        }
+    }
+    text[start..].reverse();
+}
+
+impl<R: BufRead> Read for ObjCleaner<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let available = self.fill_buf()?;
+        let count = available.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&available[..count]);
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+impl<R: BufRead> BufRead for ObjCleaner<R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        while self.position >= self.clean.len() && !self.at_end {
+            self.refill()?;
+        }
+        Ok(&self.clean[self.position.min(self.clean.len())..])
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.position += count;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clean(text: &str) -> (String, Notes) {
+        let mut cleaner = ObjCleaner::new(text.as_bytes(), "x.obj");
+        let mut out = String::new();
+        cleaner.read_to_string(&mut out).unwrap();
+        (out, cleaner.notes)
+    }
+
+    #[test]
+    fn bad_vertices_keep_their_number_and_lose_their_faces() {
+        let (text, notes) = clean("v 0 0 nan\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 2 3 4\n");
+        assert!(text.contains("v 0 0 0\nv 1 0 0\n"));
+        assert!(text.ends_with("o 0\nf 2 3 4\n"));
+        assert_eq!(notes.face_lines, [6]);
+        assert_eq!(notes.skipped_faces, 1);
+    }
+
+    #[test]
+    fn relative_indices_become_absolute() {
+        let (text, _) = clean("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n");
+        assert!(text.ends_with("f 1 2 3\n"));
+    }
+
+    #[test]
+    fn faces_without_attributes_refer_to_none_after_faces_with_them() {
+        let (text, _) =
+            clean("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\nf 1 2 3\nf 1 2 3\n");
+        assert!(text.ends_with("f 1/2/1 2/2/1 3/2/1\nf 1/1/1 2/1/1 3/1/1\nf 1 2 3\n"));
+    }
+
+    #[test]
+    fn indices_beyond_all_range_are_refused() {
+        for corner in [
+            "0",
+            "4",
+            "-4",
+            "99999999999999999999999",
+            "1/2/3/4",
+            "x",
+            "1.0",
+            "/1",
+        ] {
+            let (_, notes) = clean(&format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {corner}\n"));
+            assert_eq!(notes.skipped_faces, 1, "{corner}");
+        }
+    }
+}
