@@ -6,6 +6,7 @@
 //! Units: radiance in W·sr⁻¹·m⁻², lengths in units of the frame (see [`Frame`]).
 
 mod build;
+pub mod builtin;
 mod clean;
 mod frame;
 mod lines;
@@ -16,12 +17,14 @@ mod sidedness;
 mod texture;
 mod triangulate;
 mod warning;
+mod write;
 
 pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
+pub use write::{write_builtin, write_obj};
 
 use glam::{Vec2, Vec3};
 

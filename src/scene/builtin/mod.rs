@@ -1,0 +1,156 @@
+//! Scenes generated in code, for trying the program, for tests and for measurements. The same bits on every run.
+//!
+//! Rooms are closed shells that face inward, with their light cut into the ceiling and their fixtures welded into the
+//! floor; what stands in them is closed and faces outward, sunk a little into what carries it. Y is up.
+
+mod cornell;
+mod furnace;
+mod gallery;
+mod palette;
+mod pictures;
+mod plates;
+mod room;
+mod shapes;
+mod soup;
+mod tiled_room;
+
+pub use furnace::furnace;
+pub use plates::{perpendicular_plates, plates};
+
+use glam::DVec3;
+
+use super::{BuildError, Scene, SceneBuilder, SceneOptions};
+
+/// Where to look at a scene from, in world units, with y up and a vertical field of view of about 45°.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// The eye.
+    pub position: DVec3,
+    /// The point in the middle of the picture.
+    pub target: DVec3,
+}
+
+/// A scene that needs no file.
+#[derive(Clone, Copy, Debug)]
+pub struct Builtin {
+    /// What to ask for it by.
+    pub name: &'static str,
+    /// What it shows, in a line.
+    pub summary: &'static str,
+    /// A view of it that looks good.
+    pub viewpoint: Viewpoint,
+    faces: fn() -> SceneBuilder,
+}
+
+impl Builtin {
+    /// Its faces and materials, not yet cleaned and scaled.
+    pub fn builder(&self) -> SceneBuilder {
+        let mut builder = (self.faces)();
+        builder.source.name = self.name.to_owned();
+        builder
+    }
+
+    /// The finished scene.
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::finish`]; not for the scenes in this module.
+    pub fn scene(&self, options: &SceneOptions) -> Result<Scene, BuildError> {
+        self.builder().finish(options)
+    }
+}
+
+/// All built-in scenes, those for looking at first.
+pub fn builtins() -> &'static [Builtin] {
+    &BUILTINS
+}
+
+/// The names of all built-in scenes.
+pub fn builtin_names() -> impl ExactSizeIterator<Item = &'static str> {
+    BUILTINS.iter().map(|builtin| builtin.name)
+}
+
+/// The built-in scene of this name.
+pub fn find_builtin(name: &str) -> Option<&'static Builtin> {
+    BUILTINS.iter().find(|builtin| builtin.name == name)
+}
+
+/// Generate the built-in scene of this name.
+pub fn builtin(name: &str, options: &SceneOptions) -> Option<Result<Scene, BuildError>> {
+    find_builtin(name).map(|builtin| builtin.scene(options))
+}
+
+const fn view(position: [f64; 3], target: [f64; 3]) -> Viewpoint {
+    Viewpoint {
+        position: DVec3::from_array(position),
+        target: DVec3::from_array(target),
+    }
+}
+
+static BUILTINS: [Builtin; 11] = [
+    Builtin {
+        name: "gallery",
+        summary: "a hall with columns, a staircase, furniture and pictures, lit by windows and warm spots",
+        viewpoint: view([7.3, 1.7, 0.7], [4.3, 1.75, 9.0]),
+        faces: gallery::gallery,
+    },
+    Builtin {
+        name: "cornell",
+        summary: "the Cornell box by its published measurements, in millimetres",
+        viewpoint: view([278.0, 273.0, -800.0], [278.0, 273.0, 279.6]),
+        faces: cornell::cornell,
+    },
+    Builtin {
+        name: "room-1022",
+        summary: "a coloured room with two organic bodies and one small light, 1,022 triangles",
+        viewpoint: room::VIEWPOINT,
+        faces: room::room_1022,
+    },
+    Builtin {
+        name: "room-8621",
+        summary: "the same room in 8,621 triangles",
+        viewpoint: room::VIEWPOINT,
+        faces: room::room_8621,
+    },
+    Builtin {
+        name: "room-42879",
+        summary: "the same room in 42,879 triangles",
+        viewpoint: room::VIEWPOINT,
+        faces: room::room_42879,
+    },
+    Builtin {
+        name: "room-1m",
+        summary: "the same room in 1,000,000 triangles",
+        viewpoint: room::VIEWPOINT,
+        faces: room::room_1m,
+    },
+    Builtin {
+        name: "tiled-room",
+        summary: "a small room with textures: floor tiles, a poster and a patterned light",
+        viewpoint: view([2.6, 1.5, 0.25], [1.1, 1.0, 3.0]),
+        faces: tiled_room::tiled_room,
+    },
+    Builtin {
+        name: "soup",
+        summary: "20,000 small triangles and quadrilaterals of any orientation in a room",
+        viewpoint: view([3.8, 1.7, 0.2], [1.4, 1.4, 3.0]),
+        faces: soup::soup,
+    },
+    Builtin {
+        name: "plates",
+        summary: "two unit squares that face each other at distance 1; the upper one emits",
+        viewpoint: view([2.6, 1.1, 2.3], [0.5, 0.45, 0.5]),
+        faces: || plates(1.0),
+    },
+    Builtin {
+        name: "perpendicular-plates",
+        summary: "two unit squares that share an edge at a right angle; the upright one emits",
+        viewpoint: view([2.4, 1.3, 2.1], [0.4, 0.35, 0.5]),
+        faces: perpendicular_plates,
+    },
+    Builtin {
+        name: "furnace",
+        summary: "a closed cube that glows and reflects alike everywhere: every point has radiance 1",
+        viewpoint: view([0.9, 0.55, 0.9], [0.2, 0.45, 0.2]),
+        faces: || furnace(0.5, 0.5, 4),
+    },
+];

@@ -1,0 +1,290 @@
+//! A scene as OBJ, MTL and texture files, in world units.
+//!
+//! Coordinates have the fewest digits that lead back to the same position in the frame. Files are written aside and
+//! renamed, the OBJ last, so that no half of a scene is ever found under its name. What OBJ cannot say (that a closed
+//! shell is two-sided) is left out.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, BufWriter, Cursor, Write as _};
+use std::path::{Path, PathBuf};
+
+use glam::{DVec3, Vec3};
+use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbImage};
+
+use super::{Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin};
+
+/// Write `scene` to `path`, its materials beside it under the same stem, and its textures beside both.
+///
+/// # Errors
+/// When the folder cannot be written to or `path` names no file.
+pub fn write_obj(scene: &Scene, path: &Path) -> io::Result<()> {
+    let no_name = || io::Error::new(io::ErrorKind::InvalidInput, "the path names no file");
+    let stem = path.file_stem().ok_or_else(no_name)?.to_string_lossy();
+    let stem = token(&stem);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let textures: Vec<String> = scene
+        .textures
+        .iter()
+        .map(|texture| texture_file_name(&stem, texture))
+        .collect();
+    for (texture, file) in scene.textures.iter().zip(&textures) {
+        let encoded = encoded_texture(texture)?;
+        write_whole(&folder.join(file), |out| out.write_all(&encoded))?;
+    }
+    let names = material_names(&scene.materials);
+    let library = format!("{stem}.mtl");
+    write_whole(&folder.join(&library), |out| {
+        for (material, name) in scene.materials.iter().zip(&names) {
+            out.write_all(material_text(material, name, &textures).as_bytes())?;
+        }
+        Ok(())
+    })?;
+    write_whole(path, |out| write_geometry(scene, &library, &names, out))
+}
+
+/// Write a built-in scene to `folder/NAME.obj`, making the folder if need be; returns the path of the OBJ file.
+///
+/// # Errors
+/// [`io::ErrorKind::NotFound`] where no built-in scene has this name; otherwise as [`write_obj`].
+pub fn write_builtin(name: &str, folder: &Path) -> io::Result<PathBuf> {
+    let unknown = || {
+        let message = format!("no built-in scene is named '{name}'");
+        io::Error::new(io::ErrorKind::NotFound, message)
+    };
+    let scene = builtin::builtin(name, &SceneOptions::default())
+        .ok_or_else(unknown)?
+        .map_err(io::Error::other)?;
+    fs::create_dir_all(folder)?;
+    let path = folder.join(format!("{name}.obj"));
+    write_obj(&scene, &path)?;
+    Ok(path)
+}
+
+/// Fill a file beside `path` and rename it when it is whole.
+fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    // Readable by whom the umask allows, as other files are, not by the owner alone.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder)?;
+    let mut out = BufWriter::new(&mut file);
+    fill(&mut out)?;
+    out.flush()?;
+    drop(out);
+    file.persist(path)?;
+    Ok(())
+}
+
+/// Vertices, texture coordinates, normals, objects and faces.
+fn write_geometry(
+    scene: &Scene,
+    library: &str,
+    material_names: &[String],
+    out: &mut dyn io::Write,
+) -> io::Result<()> {
+    writeln!(out, "mtllib {library}")?;
+    for &position in &scene.positions {
+        let [x, y, z] = coordinates(&scene.frame, position);
+        writeln!(out, "v {x} {y} {z}")?;
+    }
+    let texcoords = Numbering::of(&scene.texcoords, |uv| [uv.x, uv.y]);
+    for [u, v] in &texcoords.values {
+        writeln!(out, "vt {u} {v}")?;
+    }
+    let normals = Numbering::of(&scene.normals, |n| n.to_array());
+    for [x, y, z] in &normals.values {
+        writeln!(out, "vn {x} {y} {z}")?;
+    }
+    let mut objects = scene.objects.iter().peekable();
+    let mut material = None;
+    for id in scene.triangle_ids() {
+        if let Some(object) = objects.next_if(|object| object.start <= id)
+            && !object.name.is_empty()
+        {
+            writeln!(out, "o {}", object.name)?;
+        }
+        let triangle = &scene.triangles[id.index()];
+        if material != Some(triangle.material) {
+            material = Some(triangle.material);
+            writeln!(out, "usemtl {}", material_names[triangle.material.index()])?;
+        }
+        let mut line = String::from("f");
+        for (k, corner) in triangle.corners.into_iter().enumerate() {
+            let texcoord = texcoords.number(id.index(), k);
+            let normal = normals.number(id.index(), k);
+            // Writing to a string cannot fail.
+            let _ = match (texcoord, normal) {
+                (None, None) => write!(line, " {}", corner + 1),
+                (Some(vt), None) => write!(line, " {}/{vt}", corner + 1),
+                (None, Some(vn)) => write!(line, " {}//{vn}", corner + 1),
+                (Some(vt), Some(vn)) => write!(line, " {}/{vt}/{vn}", corner + 1),
+            };
+        }
+        writeln!(out, "{line}")?;
+    }
+    Ok(())
+}
+
+/// Equal corner values under one number, counted from 1 as OBJ does.
+struct Numbering<const N: usize> {
+    values: Vec<[f32; N]>,
+    of_corner: Vec<[usize; 3]>,
+}
+
+impl<const N: usize> Numbering<N> {
+    fn of<T: Copy>(corners: &[[T; 3]], value: impl Fn(T) -> [f32; N]) -> Self {
+        let mut known = HashMap::new();
+        let mut values = Vec::new();
+        let of_corner = corners
+            .iter()
+            .map(|corners| {
+                corners.map(|corner| {
+                    // Adding 0 turns −0 into 0.
+                    let value = value(corner).map(|x| x + 0.0);
+                    *known.entry(value.map(f32::to_bits)).or_insert_with(|| {
+                        values.push(value);
+                        values.len()
+                    })
+                })
+            })
+            .collect();
+        Self { values, of_corner }
+    }
+
+    fn number(&self, triangle: usize, corner: usize) -> Option<usize> {
+        self.of_corner.get(triangle).map(|numbers| numbers[corner])
+    }
+}
+
+/// World coordinates in the fewest decimals that lead back to the same frame position.
+fn coordinates(frame: &Frame, position: Vec3) -> [String; 3] {
+    /// An f64 has no more digits to give.
+    const MOST_DECIMALS: usize = 17;
+    let world = frame.to_world(position);
+    [0, 1, 2].map(|axis| {
+        let leads_back = |text: &str| {
+            text.parse().is_ok_and(|value: f64| {
+                let mut point = DVec3::ZERO;
+                point[axis] = value;
+                frame.from_world(point)[axis] == position[axis]
+            })
+        };
+        let text = (0..MOST_DECIMALS)
+            .map(|decimals| format!("{:.decimals$}", world[axis]))
+            .find(|text| leads_back(text))
+            .unwrap_or_else(|| format!("{}", world[axis]));
+        // Rounding leaves "-0" of tiny negative numbers.
+        if text.parse() == Ok(0.0) {
+            "0".to_owned()
+        } else {
+            text
+        }
+    })
+}
+
+/// A material in MTL.
+fn material_text(material: &Material, name: &str, textures: &[String]) -> String {
+    let triple = |c: Vec3| format!("{} {} {}", c.x, c.y, c.z);
+    let mut text = format!("newmtl {name}\nKd {}\n", triple(material.reflectance));
+    if material.emission != Vec3::ZERO {
+        text += &format!("Ke {}\n", triple(material.emission));
+    }
+    let mut map = |keyword: &str, texture: Option<TextureId>| {
+        if let Some(texture) = texture {
+            text += &format!("{keyword} {}\n", textures[texture.index()]);
+        }
+    };
+    map("map_Kd", material.reflectance_texture);
+    map("map_Ke", material.emission_texture);
+    text + "illum 1\n\n"
+}
+
+/// One word for each material, all different: readers cut names at blanks.
+fn material_names(materials: &[Material]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for material in materials {
+        let base = token(&material.name);
+        let mut name = base.clone();
+        let mut number = 2;
+        while names.contains(&name) {
+            name = format!("{base}_{number}");
+            number += 1;
+        }
+        names.push(name);
+    }
+    names
+}
+
+/// A name without blanks and separators, and never empty.
+fn token(name: &str) -> String {
+    let is_unsafe = |c: char| c.is_whitespace() || c.is_control() || "/\\:".contains(c);
+    let text = name.replace(is_unsafe, "_");
+    if text.is_empty() {
+        "unnamed".to_owned()
+    } else {
+        text
+    }
+}
+
+/// The file a texture goes to: a PNG, or OpenEXR where it is brighter than a PNG can hold.
+fn texture_file_name(stem: &str, texture: &Texture) -> String {
+    let name = Path::new(&texture.name);
+    let name = name.file_stem().unwrap_or_default().to_string_lossy();
+    let name = token(&name);
+    let extension = if is_bright(texture) { "exr" } else { "png" };
+    if name.starts_with(stem) {
+        format!("{name}.{extension}")
+    } else {
+        format!("{stem}-{name}.{extension}")
+    }
+}
+
+fn is_bright(texture: &Texture) -> bool {
+    texture.pixels.iter().any(|pixel| pixel.max_element() > 1.0)
+}
+
+fn encoded_texture(texture: &Texture) -> io::Result<Vec<u8>> {
+    let (width, height) = (texture.width, texture.height);
+    let (picture, format) = if is_bright(texture) {
+        let values = texture.pixels.iter().flat_map(|p| p.to_array()).collect();
+        let picture = Rgb32FImage::from_raw(width, height, values);
+        (picture.map(DynamicImage::ImageRgb32F), ImageFormat::OpenExr)
+    } else {
+        let codes = texture
+            .pixels
+            .iter()
+            .flat_map(|p| p.to_array().map(srgb_code));
+        let picture = RgbImage::from_raw(width, height, codes.collect());
+        (picture.map(DynamicImage::ImageRgb8), ImageFormat::Png)
+    };
+    let wrong_size = || {
+        let message = format!("texture '{}' has too few pixels", texture.name);
+        io::Error::new(io::ErrorKind::InvalidData, message)
+    };
+    let mut bytes = Cursor::new(Vec::new());
+    picture
+        .ok_or_else(wrong_size)?
+        .write_to(&mut bytes, format)
+        .map_err(io::Error::other)?;
+    Ok(bytes.into_inner())
+}
+
+/// The 8-bit sRGB code of a linear value (IEC 61966-2-1).
+fn srgb_code(linear: f32) -> u8 {
+    let linear = linear.clamp(0.0, 1.0);
+    let encoded = if linear <= 0.003_130_8 {
+        linear * 12.92
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    };
+    (encoded * 255.0).round() as u8
+}
