@@ -92,3 +92,12 @@ pub fn apply(ctx: &egui::Context) {
         style.visuals.indent_has_left_vline = false;
     });
 }
+
+/// Colour of an axis in the window: x red, y green, z blue.
+pub fn axis_color(axis: usize) -> Color32 {
+    [
+        Color32::from_rgb(0xec, 0x5b, 0x56),
+        Color32::from_rgb(0x6c, 0xbf, 0x4c),
+        Color32::from_rgb(0x5b, 0x8f, 0xf5),
+    ][axis.min(2)]
+}
