@@ -125,7 +125,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     item(ui, table, actions, "Full screen", Action::ToggleFullScreen);
     ui.menu_button("Theme", |ui| {
         let mut preference = ui.ctx().options(|options| options.theme_preference);
-        preference.radio_buttons(ui);
+        preference.buttons(ui);
         ui.ctx().set_theme(preference);
     });
 }
