@@ -6,7 +6,7 @@ use std::{
     process::{Command, Output},
 };
 
-const SCENE: &str = "quads";
+const SCENE: &str = "plates";
 
 fn vecrad(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_vecrad"))

@@ -11,7 +11,7 @@ use vecrad::{
 
 fn light(threads: usize) -> Arc<Snapshot> {
     let none: Option<&Path> = None;
-    let scene = cli::load(none, Some("quads"), &SceneOptions::default()).unwrap();
+    let scene = cli::load(none, Some("plates"), &SceneOptions::default()).unwrap();
     let mut worker = WorkerHandle::spawn(Arc::new(|| {})).unwrap();
     let options = RunOptions {
         threads,

@@ -8,6 +8,7 @@ mod load;
 mod output;
 mod progress;
 mod report;
+mod scenes;
 mod solve;
 mod truth;
 
@@ -34,6 +35,8 @@ pub struct Arguments {
 pub enum Command {
     /// Light a scene without a window and write what is asked for
     Solve(Box<solve::SolveArguments>),
+    /// List the built-in scenes, or write them as OBJ and MTL
+    Scenes(scenes::ScenesArguments),
 }
 
 /// A usage error that clap cannot see.
@@ -55,6 +58,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command {
         Some(Command::Solve(solve)) => solve::solve(&solve),
+        Some(Command::Scenes(scenes)) => scenes::scenes(&scenes),
         None => Err(UsageError(
             "this build has no window; use 'vecrad solve SCENE.obj --export lit.ply'".to_owned(),
         )

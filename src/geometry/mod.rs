@@ -46,3 +46,36 @@ pub fn barycentric_in_plane(point: Vec3, [a, b, c]: [Vec3; 3]) -> Vec3 {
     let third = (b - a).cross(from_a).dot(normal) / scale;
     Vec3::new(1.0 - second - third, second, third)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNERS: [Vec3; 3] = [
+        Vec3::new(1.0, 0.0, 2.0),
+        Vec3::new(3.0, 0.0, 2.0),
+        Vec3::new(1.0, 4.0, 2.0),
+    ];
+
+    #[test]
+    fn area_vector_points_to_the_front() {
+        assert_eq!(area_vector(CORNERS), Vec3::new(0.0, 0.0, 4.0));
+        let [a, b, c] = CORNERS;
+        assert_eq!(area_vector([a, c, b]), Vec3::new(0.0, 0.0, -4.0));
+        assert_eq!(area_vector([a, a, b]), Vec3::ZERO);
+    }
+
+    #[test]
+    fn barycentric_inverts_interpolation() {
+        let place = Vec3::new(0.2, 0.3, 0.5);
+        let point = CORNERS[0] * place.x + CORNERS[1] * place.y + CORNERS[2] * place.z;
+        assert!((barycentric(point + Vec3::Z, CORNERS) - place).length() < 1e-6);
+        assert!(barycentric_in_plane(Vec3::ZERO, CORNERS).min_element() < 0.0);
+        assert_eq!(
+            barycentric(CORNERS[1] + Vec3::X, CORNERS).min_element(),
+            0.0
+        );
+        let flat = [Vec3::ZERO, Vec3::X, Vec3::X * 2.0];
+        assert_eq!(barycentric(Vec3::X, flat), Vec3::splat(1.0 / 3.0));
+    }
+}

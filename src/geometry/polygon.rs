@@ -74,3 +74,106 @@ fn edge_sum(corners: &[Vec3]) -> Vec3 {
     }
     sum / TAU
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Random, cosine_direction};
+
+    /// A triangle above the origin whose front looks down.
+    const CEILING: [Vec3; 3] = [
+        Vec3::new(-1.0, -0.5, 1.0),
+        Vec3::new(0.5, 2.0, 1.0),
+        Vec3::new(2.0, -1.0, 1.0),
+    ];
+
+    /// Whether a ray from the origin passes through a triangle, by the signs of three volumes.
+    fn passes(direction: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
+        let signs = [(a, b), (b, c), (c, a)].map(|(p, q)| p.cross(q).dot(direction) > 0.0);
+        signs.iter().all(|&sign| sign == signs[0])
+            && (b - a).cross(c - a).dot(direction) * (b - a).cross(c - a).dot(a) > 0.0
+    }
+
+    /// Share of cosine-weighted rays from the origin that meet the triangle.
+    fn sampled(normal: Vec3, corners: [Vec3; 3]) -> f32 {
+        const COUNT: u32 = 40_000;
+        let mut random = Random::new(5, 0);
+        let met = (0..COUNT)
+            .filter(|_| passes(cosine_direction(normal, random.uniform_2d()), corners))
+            .count();
+        met as f32 / COUNT as f32
+    }
+
+    #[test]
+    fn agrees_with_sampling_above_and_across_the_horizon() {
+        for normal in [
+            Vec3::Z,
+            Vec3::new(0.6, 0.0, 0.8),
+            Vec3::X,
+            Vec3::new(-0.8, 0.6, 0.0),
+            Vec3::new(0.0, 0.8, -0.6),
+        ] {
+            let exact = point_irradiance(Vec3::ZERO, normal, CEILING);
+            let found = sampled(normal, CEILING);
+            // Four standard deviations of a share p of 40,000, at most 4·√(p/40,000).
+            let tolerance = 4.0 * (exact.max(1e-3) / 40_000.0).sqrt();
+            assert!(
+                (exact - found).abs() < tolerance,
+                "{normal}: {exact} {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn agrees_with_the_closed_form_of_a_rectangle() {
+        // Howell B-3 with a = b = c: 2 · (1/√2) atan(1/√2) / 2π for a square whose corner is straight above.
+        let expected = (0.5_f32.sqrt() * 0.5_f32.sqrt().atan()) / std::f32::consts::PI;
+        let corners = [
+            Vec3::new(0.0, 0.0, 1.0),
+            Vec3::new(0.0, 1.0, 1.0),
+            Vec3::new(1.0, 1.0, 1.0),
+            Vec3::new(1.0, 0.0, 1.0),
+        ];
+        let [a, b, c, d] = corners;
+        let sum = point_irradiance(Vec3::ZERO, Vec3::Z, [a, b, c])
+            + point_irradiance(Vec3::ZERO, Vec3::Z, [a, c, d]);
+        assert!((sum - expected).abs() < 1e-6, "{sum} {expected}");
+        let vector =
+            irradiance_vector(Vec3::ZERO, [a, b, c]) + irradiance_vector(Vec3::ZERO, [a, c, d]);
+        assert!((vector.z - expected).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_back_and_what_lies_below_the_horizon_give_nothing() {
+        let [a, b, c] = CEILING;
+        assert_eq!(point_irradiance(Vec3::ZERO, Vec3::Z, [a, c, b]), 0.0);
+        assert_eq!(point_irradiance(Vec3::ZERO, -Vec3::Z, CEILING), 0.0);
+        assert_eq!(irradiance_vector(Vec3::ZERO, [a, c, b]), Vec3::ZERO);
+    }
+
+    #[test]
+    fn points_on_the_plane_edges_and_corners_stay_finite() {
+        let [a, b, c] = CEILING;
+        let flat = [a, b, a.lerp(b, 0.5)];
+        for point in [a, b, c, a.lerp(b, 0.3), (a + b + c) / 3.0, a * 2.0 - b] {
+            for shift in [Vec3::ZERO, Vec3::Z * 1e-7, Vec3::Z * -1e-7, Vec3::Z * 1e-20] {
+                for normal in [Vec3::Z, -Vec3::Z, Vec3::X] {
+                    for corners in [CEILING, flat] {
+                        let value = point_irradiance(point - shift, normal, corners);
+                        assert!((0.0..=1.0).contains(&value), "{point} {normal}: {value}");
+                        assert!(irradiance_vector(point - shift, corners).is_finite());
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_touching_point_sees_half_or_all() {
+        let below = (CEILING[0] + CEILING[1] + CEILING[2]) / 3.0 - Vec3::Z * 1e-4;
+        let facing = point_irradiance(below, Vec3::Z, CEILING);
+        assert!((facing - 1.0).abs() < 1e-3, "{facing}");
+        let across = point_irradiance(below, Vec3::X, CEILING);
+        assert!((across - 0.5).abs() < 1e-3, "{across}");
+    }
+}

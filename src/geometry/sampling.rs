@@ -83,3 +83,100 @@ pub fn cosine_direction(normal: Vec3, square: Vec2) -> Vec3 {
     let height = (1.0 - square.x).max(0.0).sqrt();
     (tangent * (radius * cos) + bitangent * (radius * sin) + normal * height).normalize_or(normal)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: u32 = 50_000;
+
+    /// Standard error of the mean of numbers in 0…1, at most `0.5/√COUNT`, four times.
+    const TOLERANCE: f32 = 0.01;
+
+    fn mean(of: impl Fn(&mut Random) -> Vec3) -> Vec3 {
+        let mut random = Random::new(42, 7);
+        (0..COUNT).map(|_| of(&mut random)).sum::<Vec3>() / COUNT as f32
+    }
+
+    #[test]
+    fn random_numbers_are_uniform() {
+        let mut random = Random::new(1, 2);
+        let mut bins = [0_u32; 16];
+        for _ in 0..COUNT {
+            let x = random.uniform();
+            assert!((0.0..1.0).contains(&x));
+            bins[(x * 16.0) as usize] += 1;
+        }
+        // χ² of 15 degrees of freedom exceeds 37.7 once in a thousand.
+        let expected = f64::from(COUNT) / 16.0;
+        let chi_squared: f64 = bins
+            .iter()
+            .map(|&n| (f64::from(n) - expected).powi(2) / expected)
+            .sum();
+        assert!(chi_squared < 37.7, "{chi_squared}");
+        assert!((0..1000).all(|_| random.below(3) < 3));
+        assert_eq!(random.below(1), 0);
+    }
+
+    #[test]
+    fn streams_of_neighbours_are_unrelated() {
+        let products = |step: u64| {
+            let sum: f32 = (0..10_000)
+                .map(|i| {
+                    let [a, b] = [i, i + step].map(|stream| Random::new(0, stream).uniform() - 0.5);
+                    a * b
+                })
+                .sum();
+            sum / 10_000.0
+        };
+        // Products of independent numbers scatter by 1/12, their mean by 1/1200.
+        for step in [1, 2, 1 << 32] {
+            assert!(products(step).abs() < 4.0 / 1200.0, "{step}");
+        }
+        let [mut a, mut b] = [Random::new(3, 4), Random::new(3, 4)];
+        assert!((0..10).all(|_| a.next_u32() == b.next_u32()));
+    }
+
+    #[test]
+    fn low_discrepancy_points_fill_the_square_evenly() {
+        let shift = Vec2::new(0.9, 0.3);
+        let mut bins = [0_u32; 64];
+        for index in 0..6400 {
+            let point = low_discrepancy_2d(index, shift);
+            assert!(point.min_element() >= 0.0 && point.max_element() < 1.0);
+            bins[(point.x * 8.0) as usize * 8 + (point.y * 8.0) as usize] += 1;
+        }
+        // 100 a cell; random points would scatter by 10.
+        assert!(bins.iter().all(|n| n.abs_diff(100) < 8), "{bins:?}");
+    }
+
+    #[test]
+    fn triangle_points_are_uniform() {
+        let first = mean(|random| triangle_point(random.uniform_2d()));
+        assert!(
+            (first - Vec3::splat(1.0 / 3.0)).abs().max_element() < TOLERANCE,
+            "{first}"
+        );
+        // E[u²] = 1/6 for a uniform point of a triangle.
+        let second = mean(|random| triangle_point(random.uniform_2d()).powf(2.0));
+        assert!(
+            (second - Vec3::splat(1.0 / 6.0)).abs().max_element() < TOLERANCE,
+            "{second}"
+        );
+    }
+
+    #[test]
+    fn cosine_directions_lean_to_the_normal() {
+        let normal = Vec3::new(0.48, -0.6, 0.64);
+        let sum = mean(|random| {
+            let direction = cosine_direction(normal, random.uniform_2d());
+            assert!((direction.length() - 1.0).abs() < 1e-5 && direction.dot(normal) > -1e-6);
+            direction
+        });
+        // The mean of a cosine-weighted direction is 2/3 of the normal.
+        assert!(
+            (sum - normal * (2.0 / 3.0)).length() < 1.5 * TOLERANCE,
+            "{sum}"
+        );
+    }
+}
