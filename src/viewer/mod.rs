@@ -22,4 +22,4 @@ pub mod theme;
 pub mod view;
 pub mod viewport;
 
-pub use start::{Options, ViewerError, run};
+pub use start::{CameraRequest, Options, ViewerError, run};
