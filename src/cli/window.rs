@@ -5,11 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 
-use super::{
-    LoadError, Outcome, RunFlags, SceneFlags, SettingFlags, UsageError, picture::ViewFlags,
-};
+use super::{LoadError, Outcome, RunFlags, SceneFlags, SettingFlags, picture::ViewFlags};
 use crate::{
-    scene::builtin,
+    scene::{ReadError, builtin},
     viewer::{self, loader::SceneSource},
 };
 
@@ -52,8 +50,9 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
     if let Some(path) = source.path()
         && !path.is_file()
     {
-        let message = format!("there is no such file; check the name: {}", path.display());
-        bail!(UsageError(message));
+        bail!(LoadError::Read(ReadError::NotFound {
+            path: path.to_owned(),
+        }));
     }
     viewer::run(viewer::Options {
         source: Some(source),

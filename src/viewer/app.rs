@@ -606,15 +606,15 @@ impl eframe::App for App {
             egui::Panel::top("menu").show(ui, |ui| {
                 panels::menu::menu_ui(ui, &mut self.state, &self.table, &mut actions);
             });
-            egui::Panel::bottom("status").show(ui, |ui| {
-                panels::status::status_ui(ui, &mut self.state);
-            });
-            self.side_panels(ui, &mut actions);
             egui::Panel::top("toolbar").show(ui, |ui| {
                 ui.add_space(2.0);
                 panels::toolbar::toolbar_ui(ui, &mut self.state, &mut actions);
                 ui.add_space(2.0);
             });
+            egui::Panel::bottom("status").show(ui, |ui| {
+                panels::status::status_ui(ui, &mut self.state);
+            });
+            self.side_panels(ui, &mut actions);
         }
         let picked = egui::CentralPanel::no_frame()
             .show(ui, |ui| {

@@ -80,6 +80,15 @@ fn encoded(linear: f32) -> f32 {
     }
 }
 
+/// Colour of names beside figures: quieter than the figures, but easy to read.
+pub fn secondary_text(visuals: &egui::Visuals) -> Color32 {
+    if visuals.dark_mode {
+        Color32::from_gray(158)
+    } else {
+        Color32::from_gray(88)
+    }
+}
+
 /// Spacing and corners, for both themes.
 pub fn apply(ctx: &egui::Context) {
     ctx.all_styles_mut(|style| {
@@ -89,6 +98,7 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.interact_size.y = 22.0;
         style.spacing.indent = 14.0;
         style.visuals.striped = false;
+        style.visuals.weak_text_color = Some(secondary_text(&style.visuals));
         style.visuals.indent_has_left_vline = false;
     });
 }

@@ -26,7 +26,9 @@ pub fn figure(value: f64) -> String {
     } else if !(1e-3..1e6).contains(&size) {
         format!("{value:.2e}")
     } else {
-        let decimals = (2 - size.log10().floor() as i32).max(0) as usize;
+        // A setting of 0.01 is a little less than that in single precision.
+        let magnitude = (size * (1.0 + 1e-6)).log10().floor() as i32;
+        let decimals = (2 - magnitude).max(0) as usize;
         format!("{value:.decimals$}")
     }
 }
@@ -76,6 +78,7 @@ mod tests {
         let cases = [
             (0.0, "0"),
             (1.234_56, "1.23"),
+            (f64::from(0.01_f32), "0.0100"),
             (12.3456, "12.3"),
             (1234.5, "1234"),
             (0.012_345, "0.0123"),

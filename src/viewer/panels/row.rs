@@ -2,10 +2,14 @@
 
 use eframe::egui::{self, RichText};
 
+use crate::viewer::theme;
+
 /// Width of the labels of settings, in points. Narrower cuts them off, wider leaves no room for the values.
 const LABEL_WIDTH: f32 = 118.0;
 /// Width of the button that resets a setting.
 const RESET_WIDTH: f32 = 24.0;
+/// Width of a slider's value with the gap before it, for figures of seven characters.
+const VALUE_WIDTH: f32 = 72.0;
 
 /// A setting: label, widget, and a reset that appears when the value is not the default.
 /// `widget` gets the label to be named by. Returns whether the value changed.
@@ -35,6 +39,8 @@ pub fn setting<T: PartialEq + Clone>(
             egui::Layout::left_to_right(egui::Align::Center),
             |ui| {
                 ui.set_min_width(room);
+                // The value of a slider stands behind it.
+                ui.spacing_mut().slider_width = (room - VALUE_WIDTH).max(40.0);
                 widget(ui, value)
                     .labelled_by(name.id)
                     .on_hover_text(explanation);
@@ -77,8 +83,8 @@ pub fn choice<T: PartialEq + Copy>(
 
 /// A figure with its name, in a grid of two columns.
 pub fn figure(ui: &mut egui::Ui, name: &str, value: impl Into<String>, explanation: &str) {
-    let weak = ui.visuals().weak_text_color();
-    let label = ui.label(RichText::new(name).color(weak));
+    let name = RichText::new(name).color(theme::secondary_text(ui.visuals()));
+    let label = ui.label(name);
     ui.label(value.into());
     if !explanation.is_empty() {
         label.on_hover_text(explanation);
