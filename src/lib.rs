@@ -13,6 +13,7 @@
 //! * [`metrics`]: error measures and reports;
 //! * [`export`]: files;
 //! * [`worker`]: the solver thread;
+//! * `viewer`: the window and its pictures;
 //! * [`cli`]: flags to settings, headless commands.
 
 pub mod cli;
@@ -24,4 +25,6 @@ pub mod reference;
 pub mod scene;
 pub mod solver;
 pub mod transport;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 pub mod worker;

@@ -128,9 +128,9 @@ pub struct RunFlags {
     /// Solver threads, by default one for each core
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Limits")]
     pub threads: Option<u16>,
-    /// Exposure of the byte colours in stops
-    #[arg(long, value_name = "EV", default_value = "0", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
-    pub exposure: f32,
+    /// Exposure in stops; by default 0 in files, and automatic in pictures and the window
+    #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
+    pub exposure: Option<f32>,
     /// Tone curve of the byte colours
     #[arg(long, value_enum, default_value = "neutral", help_heading = "Output")]
     pub tonemap: ToneMapFlag,
@@ -150,7 +150,7 @@ impl RunFlags {
     pub fn export(&self, up: UpFlag) -> PlyOptions {
         PlyOptions {
             color: ColorOptions {
-                exposure_ev: self.exposure,
+                exposure_ev: self.exposure.unwrap_or(0.0),
                 tone_map: match self.tonemap {
                     ToneMapFlag::None => ToneMap::None,
                     ToneMapFlag::Neutral => ToneMap::Neutral,

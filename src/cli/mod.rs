@@ -6,11 +6,15 @@
 mod flags;
 mod load;
 mod output;
+#[cfg(feature = "viewer")]
+mod picture;
 mod progress;
 mod report;
 mod scenes;
 mod solve;
 mod truth;
+#[cfg(feature = "viewer")]
+mod window;
 
 use std::{io, path::PathBuf, process::ExitCode};
 
@@ -26,8 +30,12 @@ pub struct Arguments {
     /// What to do instead of opening the window
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Scene to open in the window
-    pub scene: Option<PathBuf>,
+    /// OBJ file to open in the window
+    pub path: Option<PathBuf>,
+    /// Flags of the window
+    #[cfg(feature = "viewer")]
+    #[command(flatten)]
+    pub window: window::WindowFlags,
 }
 
 /// The headless commands.
@@ -59,6 +67,9 @@ pub fn run() -> ExitCode {
     let result = match arguments.command {
         Some(Command::Solve(solve)) => solve::solve(&solve),
         Some(Command::Scenes(scenes)) => scenes::scenes(&scenes),
+        #[cfg(feature = "viewer")]
+        None => window::open(arguments.path, &arguments.window),
+        #[cfg(not(feature = "viewer"))]
         None => Err(UsageError(
             "this build has no window; use 'vecrad solve SCENE.obj --export lit.ply'".to_owned(),
         )
@@ -81,9 +92,24 @@ fn exit_code_of(error: &anyhow::Error) -> ExitCode {
         ExitCode::from(2)
     } else if error.is::<LoadError>() {
         ExitCode::from(3)
+    } else if needs_graphics(error) {
+        ExitCode::from(5)
     } else {
         ExitCode::FAILURE
     }
+}
+
+/// Whether a graphics adapter or a display was missing.
+#[cfg(feature = "viewer")]
+fn needs_graphics(error: &anyhow::Error) -> bool {
+    error.is::<crate::viewer::ViewerError>()
+        || error.is::<crate::viewer::render::headless::HeadlessError>()
+}
+
+/// Whether a graphics adapter or a display was missing: this build never asks for one.
+#[cfg(not(feature = "viewer"))]
+fn needs_graphics(_error: &anyhow::Error) -> bool {
+    false
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

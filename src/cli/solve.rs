@@ -48,6 +48,10 @@ pub struct SolveArguments {
     /// Measure the error of every step: paths or paths=SAMPLES
     #[arg(long, value_name = "HOW", help_heading = "Output")]
     pub reference: Option<Reference>,
+    /// Pictures
+    #[cfg(feature = "viewer")]
+    #[command(flatten)]
+    pub picture: super::picture::PictureFlags,
     /// No progress line
     #[arg(long, short, help_heading = "Output")]
     pub quiet: bool,
@@ -102,6 +106,14 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         ..Totals::default()
     };
     write_outputs(arguments, &scene, &run, &errors, totals)?;
+    #[cfg(feature = "viewer")]
+    arguments.picture.write(
+        &scene,
+        arguments.scene.as_deref(),
+        &run.snapshot,
+        &arguments.run_flags,
+        arguments.scene_flags.up,
+    )?;
     Ok(match run.stop_reason {
         StopReason::Converged => Outcome::Done,
         _ => Outcome::StoppedEarly,
@@ -120,6 +132,8 @@ fn check_outputs(arguments: &SolveArguments) -> Result<()> {
         }
         output::check(path)?;
     }
+    #[cfg(feature = "viewer")]
+    arguments.picture.check()?;
     arguments.report.as_deref().map_or(Ok(()), output::check)
 }
 

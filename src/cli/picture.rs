@@ -1,0 +1,250 @@
+//! `--screenshot` and what it shows: the window's own picture, drawn without a window.
+
+use std::{path::PathBuf, str::FromStr, sync::Arc};
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use glam::DVec3;
+
+use super::{
+    RunFlags, UsageError,
+    flags::{ToneMapFlag, UpFlag},
+    output,
+};
+use crate::{
+    scene::{Scene, builtin},
+    solver::Snapshot,
+    viewer::{
+        CameraRequest,
+        camera::{Camera, UpAxis},
+        loader,
+        render::headless,
+        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+    },
+};
+
+/// What a picture shows, and from where.
+#[derive(Clone, Debug, Args)]
+pub struct ViewFlags {
+    /// What the surfaces show
+    #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = view_mode(), help_heading = "Picture")]
+    pub view: String,
+    /// Draw the cluster boxes of a level of the tree
+    #[arg(long, value_name = "LEVEL", help_heading = "Picture")]
+    pub clusters: Option<u32>,
+    /// Draw the edges of the elements
+    #[arg(long, help_heading = "Picture")]
+    pub edges: bool,
+    /// Space false colours logarithmically
+    #[arg(long, help_heading = "Picture")]
+    pub logarithmic: bool,
+    /// Ends of the false colours
+    #[arg(long, value_name = "LOW,HIGH", help_heading = "Picture")]
+    pub range: Option<Range>,
+    /// Eye in the file's units
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        allow_hyphen_values = true,
+        help_heading = "Picture"
+    )]
+    pub camera_position: Option<Point>,
+    /// Point that is looked at, in the file's units
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        allow_hyphen_values = true,
+        help_heading = "Picture"
+    )]
+    pub camera_focal_point: Option<Point>,
+    /// Vertical angle of view in degrees, 1 to 170
+    #[arg(long, value_name = "DEGREES", help_heading = "Picture")]
+    pub camera_view_angle: Option<f32>,
+}
+
+/// Names of the view modes.
+fn view_mode() -> clap::builder::PossibleValuesParser {
+    ViewMode::ALL.map(ViewMode::name).into()
+}
+
+impl ViewFlags {
+    /// How the light is shown.
+    pub fn view_settings(&self, run_flags: &RunFlags) -> ViewSettings {
+        ViewSettings {
+            mode: ViewMode::from_name(&self.view).unwrap_or_default(),
+            exposure: run_flags.exposure.unwrap_or(0.0),
+            auto_exposure: run_flags.exposure.is_none(),
+            tone_map: match run_flags.tonemap {
+                ToneMapFlag::None => ToneMap::None,
+                ToneMapFlag::Neutral => ToneMap::Neutral,
+            },
+            logarithmic: self.logarithmic,
+            fixed_range: self.range.map(|range| range.0),
+            edges: self.edges,
+            clusters: ClusterOverlay {
+                shown: self.clusters.is_some(),
+                level: self
+                    .clusters
+                    .unwrap_or_else(|| ClusterOverlay::default().level),
+                ..ClusterOverlay::default()
+            },
+            ..ViewSettings::default()
+        }
+    }
+
+    /// From where.
+    pub fn camera(&self, up: UpFlag) -> CameraRequest {
+        CameraRequest {
+            position: self.camera_position.map(|point| point.0),
+            focal_point: self.camera_focal_point.map(|point| point.0),
+            view_angle_degrees: self.camera_view_angle,
+            up: match up {
+                UpFlag::Y => UpAxis::Y,
+                UpFlag::Z => UpAxis::Z,
+            },
+        }
+    }
+}
+
+/// Flags of the picture that `solve` writes.
+#[derive(Clone, Debug, Args)]
+pub struct PictureFlags {
+    /// Draw a picture of the light (.png as seen, .exr with linear radiance)
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub screenshot: Option<PathBuf>,
+    /// Size of the picture in pixels
+    #[arg(
+        long,
+        value_name = "WxH",
+        default_value = "1280x720",
+        help_heading = "Picture"
+    )]
+    pub size: Size,
+    /// What it shows
+    #[command(flatten)]
+    pub view: ViewFlags,
+}
+
+impl PictureFlags {
+    /// Refuse what cannot be written.
+    pub fn check(&self) -> Result<()> {
+        let Some(path) = &self.screenshot else {
+            return Ok(());
+        };
+        let known = path.extension().is_some_and(|ending| {
+            ["png", "exr"]
+                .iter()
+                .any(|known| ending.eq_ignore_ascii_case(known))
+        });
+        if !known {
+            let message = format!("the picture must end in .png or .exr: {}", path.display());
+            bail!(UsageError(message));
+        }
+        output::check(path)
+    }
+
+    /// Draw and write the picture, if one is asked for.
+    pub fn write(
+        &self,
+        scene: &Arc<Scene>,
+        builtin_name: Option<&str>,
+        snapshot: &Snapshot,
+        run_flags: &RunFlags,
+        up: UpFlag,
+    ) -> Result<()> {
+        let Some(path) = &self.screenshot else {
+            return Ok(());
+        };
+        let Size(size) = self.size;
+        let opening = match builtin_name.and_then(builtin::find_builtin) {
+            Some(found) => loader::builtin_camera(found, scene),
+            None => {
+                let (min, max) = loader::bounds(scene);
+                let mut camera = Camera::default();
+                camera.frame_box(min, max, size[0] as f32 / size[1] as f32);
+                camera
+            }
+        };
+        let camera = self.view.camera(up).apply(opening, &scene.frame);
+        let view = self.view.view_settings(run_flags);
+        let picture = headless::picture(scene, snapshot, &camera, &view, size)?;
+        picture
+            .save(path)
+            .with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+/// A point in the file's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point(pub DVec3);
+
+impl FromStr for Point {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers::<3>(text)
+            .map(|numbers| Self(DVec3::from_array(numbers)))
+            .ok_or_else(|| "expected three numbers such as 1,2,3".to_owned())
+    }
+}
+
+/// Ends of the false colours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range(pub [f32; 2]);
+
+impl FromStr for Range {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers::<2>(text)
+            .filter(|[low, high]| *low >= 0.0 && high > low)
+            .map(|ends| Self(ends.map(|end| end as f32)))
+            .ok_or_else(|| "expected two rising numbers such as 0,10".to_owned())
+    }
+}
+
+/// Width and height in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size(pub [u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split_once('x')
+            .and_then(|(width, height)| Some(Self([width.parse().ok()?, height.parse().ok()?])))
+            .filter(|Self(size)| size.iter().all(|side| (1..=32768).contains(side)))
+            .ok_or_else(|| "expected a size such as 1280x720".to_owned())
+    }
+}
+
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let values: Vec<f64> = text
+        .split(',')
+        .map(|part| {
+            part.trim()
+                .parse()
+                .ok()
+                .filter(|value: &f64| value.is_finite())
+        })
+        .collect::<Option<_>>()?;
+    values.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_and_sizes_are_read() {
+        assert_eq!("1,-2,3.5".parse(), Ok(Point(DVec3::new(1.0, -2.0, 3.5))));
+        assert_eq!("640x480".parse(), Ok(Size([640, 480])));
+        for wrong in ["", "1,2", "1,2,nan", "a,b,c"] {
+            assert!(wrong.parse::<Point>().is_err(), "{wrong}");
+        }
+        for wrong in ["640", "0x2", "99999x1", "axb"] {
+            assert!(wrong.parse::<Size>().is_err(), "{wrong}");
+        }
+        assert!("3,1".parse::<Range>().is_err());
+    }
+}

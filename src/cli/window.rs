@@ -1,0 +1,67 @@
+//! `vecrad [SCENE.obj]`: open the window.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+
+use super::{LoadError, Outcome, RunFlags, SceneFlags, SettingFlags, picture::ViewFlags};
+use crate::{
+    scene::{ReadError, builtin},
+    viewer::{self, loader::SceneSource},
+};
+
+/// Shown where no scene is named.
+const FIRST_SCENE: &str = "cornell";
+
+/// Flags of the window.
+#[derive(Clone, Debug, Args)]
+pub struct WindowFlags {
+    /// Built-in scene to open
+    #[arg(long, value_name = "NAME", conflicts_with = "path")]
+    pub scene: Option<String>,
+    /// What it shows
+    #[command(flatten)]
+    pub view: ViewFlags,
+    /// Scene
+    #[command(flatten)]
+    pub scene_flags: SceneFlags,
+    /// Settings
+    #[command(flatten)]
+    pub setting_flags: SettingFlags,
+    /// Limits
+    #[command(flatten)]
+    pub run_flags: RunFlags,
+}
+
+/// Open the window and stay until it is closed.
+pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome> {
+    let source = match (path, &flags.scene) {
+        (Some(path), _) => SceneSource::File(path),
+        (None, name) => {
+            let name = name.as_deref().unwrap_or(FIRST_SCENE);
+            if builtin::find_builtin(name).is_none() {
+                bail!(LoadError::Unknown(name.to_owned()));
+            }
+            SceneSource::Builtin(name.to_owned())
+        }
+    };
+    // A name that is mistyped is better said here than in an empty window.
+    if let Some(path) = source.path()
+        && !path.is_file()
+    {
+        bail!(LoadError::Read(ReadError::NotFound {
+            path: path.to_owned(),
+        }));
+    }
+    viewer::run(viewer::Options {
+        source: Some(source),
+        scene_options: flags.scene_flags.options(),
+        settings: flags.setting_flags.settings(),
+        run: flags.run_flags.options(),
+        view: flags.view.view_settings(&flags.run_flags),
+        exposure: flags.run_flags.exposure,
+        camera: flags.view.camera(flags.scene_flags.up),
+    })?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,88 @@
+//! What the user asks for: keys, menus, buttons and panels all end here.
+
+use std::path::PathBuf;
+
+use super::{
+    camera::{AxisView, UpAxis},
+    loader::SceneSource,
+    view::ViewMode,
+};
+use crate::{scene::Sides, solver::SolveSettings, worker::RunOptions};
+
+/// One wish, carried out by the window after the panels are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    /// Ask for a file.
+    OpenDialog,
+    /// Read a scene.
+    Load(SceneSource),
+    /// Read the present scene again, keeping camera and settings.
+    Reload,
+    /// Run, rest or go on, whichever comes next.
+    PauseContinue,
+    /// End the run.
+    Stop,
+    /// Light the scene from the beginning.
+    Reset,
+    /// Put settings in force.
+    Settings(SolveSettings),
+    /// Put limits in force.
+    Options(RunOptions),
+    /// Read the scene again with other sidedness.
+    Sides(Sides),
+    /// Show something else.
+    Mode(ViewMode),
+    /// Brighter or darker, in EV.
+    ExposureBy(f32),
+    /// Let the exposure follow the light.
+    AutoExposure,
+    /// The other tone map.
+    ToggleToneMap,
+    /// Element edges on or off.
+    ToggleEdges,
+    /// Cluster boxes on or off.
+    ToggleClusters,
+    /// Another level of cluster boxes.
+    ClusterLevelBy(i32),
+    /// Backs of one-sided faces on or off.
+    ToggleBacks,
+    /// Show the whole scene.
+    FrameAll,
+    /// Show the selected object or cluster.
+    FrameSelected,
+    /// Look along an axis.
+    LookFrom(AxisView),
+    /// Parallel or central projection.
+    ToggleProjection,
+    /// Which axis is up.
+    Up(UpAxis),
+    /// Select nothing.
+    ClearSelection,
+    /// Select a cluster.
+    SelectCluster(usize),
+    /// Save the window as a picture.
+    ScreenshotWithWindow,
+    /// Save the viewport as a picture.
+    Screenshot,
+    /// Ask for size and place of a picture.
+    PictureDialog,
+    /// Save a picture of a size in pixels.
+    SavePicture {
+        /// Where to; the ending names the format.
+        path: PathBuf,
+        /// Width and height.
+        size: [u32; 2],
+    },
+    /// Write settings and camera beside the scene.
+    SaveSidecar,
+    /// Panels on or off.
+    TogglePanels,
+    /// Whole screen on or off.
+    ToggleFullScreen,
+    /// The key sheet on or off.
+    ToggleHelp,
+    /// Forget the list of recent files.
+    ClearRecent,
+    /// Close the window.
+    Quit,
+}

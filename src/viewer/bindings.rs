@@ -1,0 +1,316 @@
+//! Keys and what they do: one table, read by the window and by the key sheet.
+
+use eframe::egui::{InputState, Key, Modifiers};
+
+use super::{
+    action::Action,
+    camera::{AxisView, UpAxis},
+    view::ViewMode,
+};
+
+/// Where a binding stands on the key sheet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// Moving the camera.
+    Camera,
+    /// What is shown.
+    View,
+    /// The solve.
+    Solve,
+    /// Files, pictures and the window.
+    File,
+}
+
+impl Group {
+    /// All, in the order of the sheet.
+    pub const ALL: [Self; 4] = [Self::Camera, Self::View, Self::Solve, Self::File];
+
+    /// Heading.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Camera => "Camera",
+            Self::View => "View",
+            Self::Solve => "Light",
+            Self::File => "Files and window",
+        }
+    }
+}
+
+/// A key with modifiers, and what it does.
+pub struct Binding {
+    /// The key.
+    pub key: Key,
+    /// Modifiers that must be held.
+    pub modifiers: Modifiers,
+    /// Whether Shift is looked at: `?` is typed with it on some keyboards.
+    pub ignores_shift: bool,
+    /// Where it stands on the sheet.
+    pub group: Group,
+    /// What it does, in a few words.
+    pub text: &'static str,
+    /// What it does.
+    pub action: Action,
+}
+
+impl Binding {
+    /// The key as people write it.
+    pub fn keys(&self) -> String {
+        let mut text = String::new();
+        for (held, name) in [
+            (self.modifiers.command, "Ctrl+"),
+            (self.modifiers.alt, "Alt+"),
+            (self.modifiers.shift, "Shift+"),
+        ] {
+            if held {
+                text.push_str(name);
+            }
+        }
+        text + key_name(self.key)
+    }
+}
+
+/// What the mouse does in the viewport, for the key sheet.
+pub const MOUSE: [(&str, &str); 10] = [
+    ("Left drag", "Orbit"),
+    ("Middle drag, Shift+left drag", "Pan"),
+    ("Wheel, pinch, Ctrl+right drag", "Zoom to the cursor"),
+    ("Right drag", "Look around"),
+    ("Right drag + W A S D Q E", "Fly; Shift faster, Ctrl slower"),
+    ("Wheel while flying", "Flying speed"),
+    ("Click", "Pick a surface"),
+    ("Double-click a surface", "Turn around that point"),
+    ("Double-click the background", "Show the whole scene"),
+    ("Drop a file", "Open it"),
+];
+
+/// All bindings.
+pub fn bindings() -> Vec<Binding> {
+    use Group::{Camera, File, Solve, View};
+    let plain = |key, group, text, action| bind(Modifiers::NONE, key, group, text, action);
+    let command = |key, group, text, action| bind(Modifiers::COMMAND, key, group, text, action);
+    let alt =
+        |key, mode: ViewMode| bind(Modifiers::ALT, key, View, mode.label(), Action::Mode(mode));
+    let mut all = vec![
+        plain(Key::Home, Camera, "Show the whole scene", Action::FrameAll),
+        plain(Key::Enter, Camera, "Show the whole scene", Action::FrameAll),
+        plain(Key::F, Camera, "Show the selection", Action::FrameSelected),
+        plain(
+            Key::Period,
+            Camera,
+            "Show the selection",
+            Action::FrameSelected,
+        ),
+        plain(
+            Key::Num1,
+            Camera,
+            "From the front",
+            Action::LookFrom(AxisView::Front),
+        ),
+        plain(
+            Key::Num3,
+            Camera,
+            "From the right",
+            Action::LookFrom(AxisView::Right),
+        ),
+        plain(
+            Key::Num7,
+            Camera,
+            "From above",
+            Action::LookFrom(AxisView::Top),
+        ),
+        plain(
+            Key::Num9,
+            Camera,
+            "Isometric",
+            Action::LookFrom(AxisView::Isometric),
+        ),
+        plain(
+            Key::Num5,
+            Camera,
+            "Perspective or parallel",
+            Action::ToggleProjection,
+        ),
+        command(Key::Y, Camera, "Y is up", Action::Up(UpAxis::Y)),
+        command(Key::Z, Camera, "Z is up", Action::Up(UpAxis::Z)),
+        plain(
+            Key::M,
+            View,
+            "Element mesh over the light",
+            Action::ToggleEdges,
+        ),
+        plain(Key::B, View, "Cluster boxes", Action::ToggleClusters),
+        plain(
+            Key::OpenBracket,
+            View,
+            "Larger clusters",
+            Action::ClusterLevelBy(-1),
+        ),
+        plain(
+            Key::CloseBracket,
+            View,
+            "Smaller clusters",
+            Action::ClusterLevelBy(1),
+        ),
+        plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
+        plain(Key::Minus, View, "Darker by ½ EV", Action::ExposureBy(-0.5)),
+        plain(
+            Key::Equals,
+            View,
+            "Brighter by ½ EV",
+            Action::ExposureBy(0.5),
+        ),
+        plain(Key::Num0, View, "Automatic exposure", Action::AutoExposure),
+        plain(Key::T, View, "Tone map", Action::ToggleToneMap),
+        plain(
+            Key::Space,
+            Solve,
+            "Pause or continue",
+            Action::PauseContinue,
+        ),
+        plain(
+            Key::Escape,
+            Solve,
+            "Stop; without a run, select nothing",
+            Action::Stop,
+        ),
+        command(Key::R, Solve, "Begin again", Action::Reset),
+        command(Key::O, File, "Open…", Action::OpenDialog),
+        plain(
+            Key::F5,
+            File,
+            "Reload, keeping camera and settings",
+            Action::Reload,
+        ),
+        command(
+            Key::S,
+            File,
+            "Save camera and settings beside the scene",
+            Action::SaveSidecar,
+        ),
+        plain(
+            Key::F12,
+            File,
+            "Picture of the window",
+            Action::ScreenshotWithWindow,
+        ),
+        command(
+            Key::F12,
+            File,
+            "Picture without the window",
+            Action::Screenshot,
+        ),
+        command(Key::P, File, "Picture of any size…", Action::PictureDialog),
+        plain(
+            Key::Tab,
+            File,
+            "Hide or show the panels",
+            Action::TogglePanels,
+        ),
+        plain(Key::F11, File, "Full screen", Action::ToggleFullScreen),
+        plain(Key::F1, File, "This sheet", Action::ToggleHelp),
+        plain(Key::Questionmark, File, "This sheet", Action::ToggleHelp),
+        command(Key::Q, File, "Quit", Action::Quit),
+    ];
+    const DIGITS: [Key; 9] = [
+        Key::Num1,
+        Key::Num2,
+        Key::Num3,
+        Key::Num4,
+        Key::Num5,
+        Key::Num6,
+        Key::Num7,
+        Key::Num8,
+        Key::Num9,
+    ];
+    all.extend(
+        DIGITS
+            .into_iter()
+            .zip(ViewMode::ALL)
+            .map(|(key, mode)| alt(key, mode)),
+    );
+    all
+}
+
+/// The actions whose keys were pressed; the keys are used up.
+pub fn pressed(input: &mut InputState, table: &[Binding]) -> Vec<Action> {
+    table
+        .iter()
+        .filter(|binding| {
+            let mut modifiers = binding.modifiers;
+            if binding.ignores_shift {
+                modifiers.shift = input.modifiers.shift;
+            }
+            // Exactly these modifiers: Ctrl+F12 is not F12.
+            input.modifiers.matches_exact(modifiers) && input.consume_key(modifiers, binding.key)
+        })
+        .map(|binding| binding.action.clone())
+        .collect()
+}
+
+/// The key of an action as a hint for menus, empty where it has none.
+pub fn hint(table: &[Binding], action: &Action) -> String {
+    table
+        .iter()
+        .find(|binding| binding.action == *action)
+        .map(Binding::keys)
+        .unwrap_or_default()
+}
+
+fn bind(
+    modifiers: Modifiers,
+    key: Key,
+    group: Group,
+    text: &'static str,
+    action: Action,
+) -> Binding {
+    Binding {
+        key,
+        modifiers,
+        ignores_shift: key == Key::Questionmark,
+        group,
+        text,
+        action,
+    }
+}
+
+fn key_name(key: Key) -> &'static str {
+    match key {
+        Key::OpenBracket => "[",
+        Key::CloseBracket => "]",
+        Key::Minus => "-",
+        Key::Equals => "=",
+        Key::Period => ".",
+        Key::Questionmark => "?",
+        Key::Escape => "Esc",
+        _ => key.name(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_does_two_things() {
+        let table = bindings();
+        for (index, one) in table.iter().enumerate() {
+            for other in &table[index + 1..] {
+                assert!(
+                    one.key != other.key || one.modifiers != other.modifiers,
+                    "{} is both '{}' and '{}'",
+                    one.keys(),
+                    one.text,
+                    other.text
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn flying_keys_are_free() {
+        for binding in bindings() {
+            let flies = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E].contains(&binding.key);
+            assert!(!flies || binding.modifiers.command, "{}", binding.keys());
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Where the light of a snapshot lies: automatic exposure, and the ends of automatic false colours.
+
+use glam::Vec3;
+
+use super::view::{ViewMode, ViewSettings};
+use crate::solver::Snapshot;
+
+/// Vertices looked at. Fewer miss small bright spots; more take longer than a frame of a large scene may.
+const SAMPLES: usize = 20_000;
+/// Display value that the middle of the light is exposed to. Brighter washes out, darker hides the corners.
+const MIDDLE_GRAY: f32 = 0.2;
+/// Display value that the bright end of the light stays below.
+const BRIGHT_END: f32 = 0.9;
+/// Below this nothing counts as light, in W/(sr·m²).
+const DARKNESS: f32 = 1e-12;
+
+/// Luminance of linear RGB.
+pub fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// Exposure in EV that shows the reflected light well, or `None` while nothing is lit.
+pub fn auto_exposure(snapshot: &Snapshot) -> Option<f32> {
+    let mut lit: Vec<f32> = sampled(snapshot)
+        .map(|vertex| reflected(snapshot, vertex))
+        .filter(|radiance| *radiance > DARKNESS)
+        .collect();
+    if lit.is_empty() {
+        // Only emitters: show the brightest just below white.
+        let brightest = sampled(snapshot)
+            .map(|vertex| luminance(snapshot.mesh.emission[vertex]))
+            .fold(0.0, f32::max);
+        return (brightest > DARKNESS).then(|| -brightest.log2());
+    }
+    lit.sort_by(f32::total_cmp);
+    let middle = quantile(&lit, 0.5);
+    let bright = quantile(&lit, 0.95);
+    let exposure = (MIDDLE_GRAY / middle).min(BRIGHT_END / bright).log2();
+    // Tenths of EV: exposure should not creep while the light settles.
+    Some((exposure * 10.0).round() / 10.0)
+}
+
+/// Ends of the false colours of a mode: the fixed ones, or those of the light.
+pub fn false_color_range(snapshot: &Snapshot, view: &ViewSettings) -> [f32; 2] {
+    if let Some([low, high]) = view.fixed_range {
+        return [low, high.max(low + f32::MIN_POSITIVE)];
+    }
+    if view.mode.false_color_unit().is_none() {
+        return [0.0, 1.0];
+    }
+    let mut values: Vec<f32> = sampled(snapshot)
+        .map(|vertex| value(snapshot, view.mode, vertex))
+        .filter(|value| *value > DARKNESS)
+        .collect();
+    values.sort_by(f32::total_cmp);
+    if values.is_empty() {
+        return if view.logarithmic {
+            [1e-3, 1.0]
+        } else {
+            [0.0, 1.0]
+        };
+    }
+    let high = quantile(&values, 0.99);
+    let low = quantile(&values, 0.01);
+    if view.logarithmic {
+        [low.min(0.5 * high), high]
+    } else {
+        [0.0, high]
+    }
+}
+
+/// What false colours show at a vertex.
+fn value(snapshot: &Snapshot, mode: ViewMode, vertex: usize) -> f32 {
+    let light = &snapshot.light;
+    match mode {
+        ViewMode::FalseRadiance => {
+            luminance(snapshot.mesh.emission[vertex]) + reflected(snapshot, vertex)
+        }
+        ViewMode::Uncertainty => light.uncertainty.get(vertex).copied().unwrap_or(0.0),
+        _ => luminance(light.irradiance[vertex]),
+    }
+}
+
+/// Luminance of the reflected radiance at a vertex.
+fn reflected(snapshot: &Snapshot, vertex: usize) -> f32 {
+    let reflectance = snapshot.mesh.reflectance[vertex];
+    luminance(reflectance * snapshot.light.irradiance[vertex]) / std::f32::consts::PI
+}
+
+/// Evenly spread vertices.
+fn sampled(snapshot: &Snapshot) -> impl Iterator<Item = usize> + use<> {
+    let count = snapshot
+        .mesh
+        .positions
+        .len()
+        .min(snapshot.light.irradiance.len());
+    (0..count).step_by((count / SAMPLES).max(1))
+}
+
+fn quantile(sorted: &[f32], share: f32) -> f32 {
+    let last = sorted.len() - 1;
+    sorted[((share * last as f32) as usize).min(last)]
+}

@@ -1,0 +1,156 @@
+//! Scenes read on a thread of their own, so that the window never waits for a file.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        mpsc::{self, Receiver, TryRecvError},
+    },
+    thread,
+};
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::camera::{Camera, UpAxis};
+use crate::{
+    geometry::RayTree,
+    scene::{self, Scene, SceneOptions, builtin},
+    worker::Wake,
+};
+
+/// Where a scene comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SceneSource {
+    /// An OBJ file.
+    File(PathBuf),
+    /// A built-in scene.
+    Builtin(String),
+}
+
+impl SceneSource {
+    /// What to call it in lists and titles.
+    pub fn label(&self) -> String {
+        match self {
+            Self::File(path) => path
+                .file_name()
+                .unwrap_or(path.as_os_str())
+                .to_string_lossy()
+                .into_owned(),
+            Self::Builtin(name) => name.clone(),
+        }
+    }
+
+    /// The file, where there is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Builtin(_) => None,
+        }
+    }
+}
+
+/// A scene with what the window needs to show it.
+pub struct LoadedScene {
+    /// Where it came from.
+    pub source: SceneSource,
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// For picking.
+    pub rays: RayTree,
+    /// Lower corner in frame units.
+    pub min: Vec3,
+    /// Upper corner in frame units.
+    pub max: Vec3,
+    /// A view that the scene brings along.
+    pub viewpoint: Option<Camera>,
+}
+
+/// A scene on its way.
+pub struct Loader {
+    source: SceneSource,
+    receiver: Receiver<Result<LoadedScene, String>>,
+}
+
+impl Loader {
+    /// Begin to read.
+    ///
+    /// # Errors
+    /// When the system refuses a thread.
+    pub fn start(source: SceneSource, options: SceneOptions, wake: Wake) -> std::io::Result<Self> {
+        let (sender, receiver) = mpsc::channel();
+        let wanted = source.clone();
+        thread::Builder::new()
+            .name("loader".to_owned())
+            .spawn(move || {
+                // Nobody listens when another scene was asked for meanwhile.
+                let _ = sender.send(load(wanted, &options));
+                wake();
+            })?;
+        Ok(Self { source, receiver })
+    }
+
+    /// What is being read.
+    pub fn source(&self) -> &SceneSource {
+        &self.source
+    }
+
+    /// The scene or one sentence, once it is there.
+    pub fn poll(&self) -> Option<Result<LoadedScene, String>> {
+        match self.receiver.try_recv() {
+            Ok(outcome) => Some(outcome),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(Err(format!(
+                "reading {} failed inside the program; please report this file",
+                self.source.label()
+            ))),
+        }
+    }
+}
+
+/// Read a scene and make it ready to show.
+///
+/// # Errors
+/// One sentence for people.
+pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, String> {
+    let (scene, viewpoint) = match &source {
+        SceneSource::File(path) => {
+            let scene = scene::read_obj(path, options).map_err(|error| error.to_string())?;
+            (scene, None)
+        }
+        SceneSource::Builtin(name) => {
+            let found = builtin::find_builtin(name)
+                .ok_or_else(|| format!("there is no built-in scene named '{name}'"))?;
+            let scene = found.scene(options).map_err(|error| error.to_string())?;
+            let viewpoint = builtin_camera(found, &scene);
+            (scene, Some(viewpoint))
+        }
+    };
+    let (min, max) = bounds(&scene);
+    Ok(LoadedScene {
+        rays: RayTree::new(&scene),
+        scene: Arc::new(scene),
+        source,
+        min,
+        max,
+        viewpoint,
+    })
+}
+
+/// The view that a built-in scene brings along.
+pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
+    let eye = scene.frame.from_world(builtin.viewpoint.position);
+    let target = scene.frame.from_world(builtin.viewpoint.target);
+    Camera::looking(eye, target, UpAxis::Y)
+}
+
+/// Box around a scene in frame units.
+pub fn bounds(scene: &Scene) -> (Vec3, Vec3) {
+    scene
+        .positions
+        .iter()
+        .fold((Vec3::MAX, Vec3::MIN), |(min, max), position| {
+            (min.min(*position), max.max(*position))
+        })
+}

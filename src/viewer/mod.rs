@@ -1,0 +1,25 @@
+//! The window: watch the light arrive, look inside the method, take the picture.
+//!
+//! [`run`] opens it. [`app`] drains the loader and the worker, [`panels`] turn state into widgets and clicks into
+//! [`action`]s, [`viewport`] shows what [`render`] draws. Nothing here calls the solver: the worker does.
+
+pub mod action;
+pub mod app;
+pub mod bindings;
+pub mod camera;
+pub mod clusters;
+pub mod light_range;
+pub mod loader;
+pub mod navigation;
+pub mod panels;
+pub mod pick;
+pub mod render;
+pub mod saver;
+pub mod session;
+pub mod start;
+pub mod state;
+pub mod theme;
+pub mod view;
+pub mod viewport;
+
+pub use start::{CameraRequest, Options, ViewerError, run};

@@ -1,0 +1,139 @@
+//! Cluster boxes: which level, which colour, and the path to the selected cluster.
+
+use eframe::egui::{self, Slider};
+
+use super::{count, figure, row};
+use crate::{
+    solver::ClusterBox,
+    viewer::{
+        action::Action,
+        clusters::{at_level, deepest_level, path_to},
+        state::State,
+        theme,
+        view::ClusterColor,
+    },
+};
+
+/// Show the controls; wishes go into `actions`.
+pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
+    let snapshot = state.run.snapshot.clone();
+    let clusters: &[ClusterBox] = snapshot.as_ref().map_or(&[], |snapshot| &snapshot.clusters);
+    let overlay = &mut state.view.clusters;
+    ui.checkbox(&mut overlay.shown, "Show boxes")
+        .on_hover_text("Boxes of the cluster tree over the light (B)");
+    if clusters.is_empty() {
+        ui.weak("There are no clusters yet.");
+        return;
+    }
+    let deepest = deepest_level(clusters);
+    let label = ui
+        .label("Level")
+        .on_hover_text("[ for larger, ] for smaller clusters");
+    ui.add(Slider::new(&mut overlay.level, 0..=deepest))
+        .labelled_by(label.id);
+    let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
+    let label = ui.label("Colour");
+    row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);
+    let shown = at_level(clusters, overlay.level).count();
+    ui.weak(format!(
+        "{} boxes of {} clusters; dark is little, red is much.",
+        count(shown as u64),
+        count(clusters.len() as u64)
+    ));
+    match state
+        .cluster
+        .and_then(|index| clusters.get(index).map(|cluster| (index, cluster)))
+    {
+        Some((index, cluster)) => {
+            selected_ui(ui, state, cluster);
+            path_ui(ui, clusters, index, actions);
+        }
+        None => {
+            ui.weak("Click a surface to select the cluster around it at this level.");
+        }
+    }
+}
+
+fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
+    let Some(loaded) = &state.loaded else { return };
+    let frame = &loaded.scene.frame;
+    // Lists of figures are in world units; the cluster is in frame units.
+    let area_scale = frame.area_to_world(1.0);
+    let size = (cluster.max - cluster.min).as_dvec3() / frame.scale;
+    let power = |value: f32| figure(f64::from(value) * area_scale);
+    ui.add_space(4.0);
+    ui.colored_label(
+        theme::SELECTED,
+        format!("Cluster at level {}", cluster.level),
+    );
+    row::figures(ui, "cluster", |ui| {
+        row::figure(ui, "Patches", count(u64::from(cluster.patch_count)), "");
+        row::figure(
+            ui,
+            "Size",
+            format!(
+                "{} × {} × {}",
+                figure(size.x),
+                figure(size.y),
+                figure(size.z)
+            ),
+            "In the file's units",
+        );
+        row::figure(ui, "Area", power(cluster.area), "Of its patches");
+        row::figure(
+            ui,
+            "Power",
+            format!("{} W", power(cluster.power)),
+            "Luminance of the light that leaves",
+        );
+        row::figure(
+            ui,
+            "Direction spread",
+            figure(f64::from(cluster.direction_spread)),
+            "0 when all normals agree, 1 when they cancel",
+        );
+        row::figure(
+            ui,
+            "Links received",
+            count(u64::from(cluster.link_count)),
+            "",
+        );
+        row::figure(
+            ui,
+            "Estimated error",
+            format!("{} W/m²", figure(f64::from(cluster.error))),
+            "Of these links",
+        );
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let [plus, minus] = [
+                cluster.face_power[2 * axis],
+                cluster.face_power[2 * axis + 1],
+            ];
+            row::figure(
+                ui,
+                &format!("Power +{name} / −{name}"),
+                format!("{} / {} W", power(plus), power(minus)),
+                "Along the box normals; drawn as arrows",
+            );
+        }
+    });
+}
+
+fn path_ui(ui: &mut egui::Ui, clusters: &[ClusterBox], index: usize, actions: &mut Vec<Action>) {
+    ui.add_space(4.0);
+    ui.weak("Path from the root");
+    let path = path_to(clusters, index);
+    for node in path {
+        let cluster = &clusters[node];
+        let text = format!(
+            "Level {} · {} patches · power {} · links {}",
+            cluster.level,
+            count(u64::from(cluster.patch_count)),
+            figure(f64::from(cluster.power)),
+            count(u64::from(cluster.link_count)),
+        );
+        if ui.selectable_label(node == index, text).clicked() {
+            actions.push(Action::SelectCluster(node));
+        }
+    }
+}

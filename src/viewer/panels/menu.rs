@@ -1,0 +1,182 @@
+//! The menu bar.
+
+use eframe::egui;
+
+use super::scene;
+use crate::viewer::{
+    action::Action,
+    bindings::{Binding, hint},
+    camera::{AxisView, UpAxis},
+    loader::SceneSource,
+    state::State,
+    view::ViewMode,
+};
+
+/// Show the bar; wishes go into `actions`.
+pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
+    egui::MenuBar::new().ui(ui, |ui| {
+        ui.menu_button("File", |ui| file_menu(ui, state, table, actions));
+        ui.menu_button("Scenes", |ui| scene::builtin_menu(ui, actions));
+        ui.menu_button("View", |ui| view_menu(ui, state, table, actions));
+        ui.menu_button("Camera", |ui| camera_menu(ui, state, table, actions));
+        ui.menu_button("Light", |ui| {
+            item(
+                ui,
+                table,
+                actions,
+                "Pause or continue",
+                Action::PauseContinue,
+            );
+            item(ui, table, actions, "Stop", Action::Stop);
+            item(ui, table, actions, "Begin again", Action::Reset);
+        });
+        ui.menu_button("Help", |ui| {
+            item(ui, table, actions, "Keys and mouse", Action::ToggleHelp);
+            ui.separator();
+            ui.weak(concat!("vecrad ", env!("CARGO_PKG_VERSION")));
+        });
+        if let Some(loaded) = &state.loaded {
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.add_space(4.0);
+                ui.weak(loaded.source.label());
+            });
+        }
+    });
+}
+
+fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
+    item(ui, table, actions, "Open…", Action::OpenDialog);
+    if ui.button("Open by path…").clicked() {
+        state.panels.path = true;
+        ui.close();
+    }
+    ui.add_enabled_ui(!state.recent.files.is_empty(), |ui| {
+        ui.menu_button("Open recent", |ui| {
+            for path in &state.recent.files {
+                let source = SceneSource::File(path.clone());
+                let button = ui.button(source.label());
+                if button.on_hover_text(path.display().to_string()).clicked() {
+                    actions.push(Action::Load(source));
+                    ui.close();
+                }
+            }
+            ui.separator();
+            item(ui, table, actions, "Forget these", Action::ClearRecent);
+        });
+    });
+    item(ui, table, actions, "Reload", Action::Reload);
+    ui.separator();
+    item(
+        ui,
+        table,
+        actions,
+        "Save camera and settings",
+        Action::SaveSidecar,
+    );
+    item(ui, table, actions, "Save picture", Action::Screenshot);
+    item(
+        ui,
+        table,
+        actions,
+        "Save picture of the window",
+        Action::ScreenshotWithWindow,
+    );
+    item(
+        ui,
+        table,
+        actions,
+        "Save picture as…",
+        Action::PictureDialog,
+    );
+    ui.separator();
+    item(ui, table, actions, "Quit", Action::Quit);
+}
+
+fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
+    for mode in ViewMode::ALL {
+        let action = Action::Mode(mode);
+        let keys = hint(table, &action);
+        let button =
+            egui::Button::selectable(mode == state.view.mode, mode.label()).shortcut_text(keys);
+        if ui.add(button).on_hover_text(mode.explanation()).clicked() {
+            actions.push(action);
+            ui.close();
+        }
+    }
+    ui.separator();
+    item(
+        ui,
+        table,
+        actions,
+        "Element mesh over the light",
+        Action::ToggleEdges,
+    );
+    item(ui, table, actions, "Cluster boxes", Action::ToggleClusters);
+    item(ui, table, actions, "Backs of faces", Action::ToggleBacks);
+    item(
+        ui,
+        table,
+        actions,
+        "Automatic exposure",
+        Action::AutoExposure,
+    );
+    ui.separator();
+    item(ui, table, actions, "Panels", Action::TogglePanels);
+    item(ui, table, actions, "Full screen", Action::ToggleFullScreen);
+    ui.menu_button("Theme", |ui| {
+        let mut preference = ui.ctx().options(|options| options.theme_preference);
+        preference.buttons(ui);
+        ui.ctx().set_theme(preference);
+    });
+}
+
+fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
+    item(ui, table, actions, "Show the whole scene", Action::FrameAll);
+    item(
+        ui,
+        table,
+        actions,
+        "Show the selection",
+        Action::FrameSelected,
+    );
+    ui.separator();
+    for (label, view) in [
+        ("From the front", AxisView::Front),
+        ("From the right", AxisView::Right),
+        ("From above", AxisView::Top),
+        ("Isometric", AxisView::Isometric),
+    ] {
+        item(ui, table, actions, label, Action::LookFrom(view));
+    }
+    item(
+        ui,
+        table,
+        actions,
+        "Perspective or parallel",
+        Action::ToggleProjection,
+    );
+    ui.separator();
+    for (label, up) in [("Y is up", UpAxis::Y), ("Z is up", UpAxis::Z)] {
+        let button = egui::Button::selectable(state.rig.target.up == up, label)
+            .shortcut_text(hint(table, &Action::Up(up)));
+        if ui.add(button).clicked() {
+            actions.push(Action::Up(up));
+            ui.close();
+        }
+    }
+}
+
+/// An entry with its key.
+fn item(
+    ui: &mut egui::Ui,
+    table: &[Binding],
+    actions: &mut Vec<Action>,
+    label: &str,
+    action: Action,
+) {
+    let button = egui::Button::new(label).shortcut_text(hint(table, &action));
+    if ui.add(button).clicked() {
+        actions.push(action);
+        ui.close();
+    }
+}

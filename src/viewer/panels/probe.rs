@@ -1,0 +1,151 @@
+//! The picked point: position, surface, light, and the light over its object.
+
+use eframe::egui;
+use glam::Vec3;
+
+use super::{figure, row};
+use crate::viewer::{action::Action, light_range::luminance, state::State};
+
+/// Show the picked point; wishes go into `actions`.
+pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let (Some(selection), Some(loaded)) = (&state.selection, &state.loaded) else {
+        ui.weak("Click a surface to see its light.");
+        return;
+    };
+    let scene = &loaded.scene;
+    let pick = &selection.pick;
+    let triangle = scene.triangles[pick.triangle.index()];
+    let surface = scene.surfaces[pick.triangle.index()];
+    let world = scene.frame.to_world(pick.point);
+    let material = &scene.materials[triangle.material.index()];
+    row::figures(ui, "probe", |ui| {
+        let place = format!(
+            "{}  {}  {}",
+            figure(world.x),
+            figure(world.y),
+            figure(world.z)
+        );
+        row::figure(ui, "Position", place, "In the file's units");
+        let side = if pick.is_back { "back" } else { "front" };
+        row::figure(ui, "Triangle", format!("{} ({side})", pick.triangle.0), "");
+        let name = if material.name.is_empty() {
+            "default"
+        } else {
+            &material.name
+        };
+        row::figure(ui, "Material", name, "");
+        row::figure(
+            ui,
+            "Reflectance",
+            rgb(surface.reflectance),
+            "Red, green, blue",
+        );
+        if surface.emission != Vec3::ZERO {
+            row::figure(
+                ui,
+                "Emission",
+                format!("{} W/(sr·m²)", rgb(surface.emission)),
+                "Emitted radiance",
+            );
+        }
+        if let Some(probe) = &selection.probe {
+            row::figure(
+                ui,
+                "Element",
+                probe.element.to_string(),
+                "Node of the hierarchy",
+            );
+            row::figure(
+                ui,
+                "Irradiance",
+                format!("{} W/m²", figure(f64::from(luminance(probe.irradiance)))),
+                "Luminance of the light that arrives",
+            );
+            row::figure(ui, "", rgb(probe.irradiance), "");
+            row::figure(
+                ui,
+                "Direct",
+                format!("{} W/m²", figure(f64::from(luminance(probe.direct)))),
+                "Straight from emitters",
+            );
+            row::figure(
+                ui,
+                "Radiance",
+                format!("{} W/(sr·m²)", figure(f64::from(luminance(probe.radiance)))),
+                "Luminance of the light that leaves",
+            );
+            row::figure(ui, "", rgb(probe.radiance), "");
+            row::figure(
+                ui,
+                "Radiosity",
+                format!(
+                    "{} W/m²",
+                    figure(f64::from(luminance(probe.radiance) * std::f32::consts::PI))
+                ),
+                "π times the radiance",
+            );
+            row::figure(
+                ui,
+                "Uncertainty",
+                format!("± {} W/m²", figure(f64::from(probe.uncertainty))),
+                "Estimated error of the irradiance",
+            );
+        }
+    });
+    if selection.probe.is_none() {
+        ui.weak("This side is the back of a one-sided face: it reflects nothing.");
+    }
+    object_ui(ui, state);
+    ui.horizontal(|ui| {
+        if ui
+            .button("Show it")
+            .on_hover_text("Bring the object into view (F)")
+            .clicked()
+        {
+            actions.push(Action::FrameSelected);
+        }
+        if ui.button("Clear").on_hover_text("Select nothing").clicked() {
+            actions.push(Action::ClearSelection);
+        }
+    });
+}
+
+fn object_ui(ui: &mut egui::Ui, state: &State) {
+    let (Some(selection), Some(loaded)) = (&state.selection, &state.loaded) else {
+        return;
+    };
+    let Some(object) = selection
+        .object
+        .and_then(|index| loaded.scene.objects.get(index))
+    else {
+        return;
+    };
+    let light = selection.object_light;
+    let area = loaded.scene.frame.area_to_world(f64::from(light.area));
+    let name = if object.name.is_empty() {
+        "whole scene"
+    } else {
+        &object.name
+    };
+    ui.add_space(4.0);
+    row::figures(ui, "object", |ui| {
+        row::figure(ui, "Object", name, "");
+        row::figure(ui, "Area", figure(area), "In square units of the file");
+        row::figure(
+            ui,
+            "Irradiance",
+            format!(
+                "{} … {} … {}",
+                figure(f64::from(light.min)),
+                figure(f64::from(light.mean)),
+                figure(f64::from(light.max))
+            ),
+            "Smallest, mean and largest luminance over the object, in W/m²",
+        );
+    });
+}
+
+fn rgb(color: Vec3) -> String {
+    let [red, green, blue] = color.to_array().map(|channel| figure(f64::from(channel)));
+    format!("{red}  {green}  {blue}")
+}

@@ -1,0 +1,93 @@
+//! Scenes to open: what an empty window says, the list of built-in scenes, the field for a path.
+
+use std::path::PathBuf;
+
+use eframe::egui::{self, RichText};
+
+use crate::{
+    scene::builtin::builtins,
+    viewer::{action::Action, loader::SceneSource, state::State},
+};
+
+/// What the viewport says while there is no scene.
+pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions: &mut Vec<Action>) {
+    let width = 460.0_f32.min(rect.width() - 24.0);
+    let area = egui::Rect::from_center_size(rect.center(), egui::vec2(width, 330.0));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(area), |ui| {
+        ui.vertical_centered(|ui| {
+            ui.label(RichText::new("Open a scene to light it").heading());
+            ui.add_space(6.0);
+            ui.label("Drop an OBJ file here, choose one, or type its path.");
+            ui.add_space(8.0);
+            if ui
+                .add(egui::Button::new("Open…").min_size(egui::vec2(120.0, 28.0)))
+                .clicked()
+            {
+                actions.push(Action::OpenDialog);
+            }
+            ui.add_space(8.0);
+            path_ui(ui, state, actions);
+            ui.add_space(14.0);
+            ui.weak("Or begin with a built-in scene");
+            ui.add_space(2.0);
+            for builtin in builtins().iter().take(4) {
+                if ui
+                    .link(format!("{}: {}", builtin.name, builtin.summary))
+                    .clicked()
+                {
+                    actions.push(Action::Load(SceneSource::Builtin(builtin.name.to_owned())));
+                }
+            }
+            ui.add_space(14.0);
+            ui.weak("Left drag orbits, middle drag pans, the wheel zooms. F1 shows all keys.");
+        });
+    });
+}
+
+/// A field for a path, for when there is no file dialog.
+pub fn path_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let label = ui.label("Path");
+        let field = egui::TextEdit::singleline(&mut state.panels.path_text)
+            .hint_text("/home/me/scene.obj")
+            .desired_width(ui.available_width() - 70.0);
+        let response = ui.add(field).labelled_by(label.id);
+        let entered =
+            response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        let text = state.panels.path_text.trim();
+        let pressed = ui
+            .add_enabled(!text.is_empty(), egui::Button::new("Read"))
+            .clicked();
+        if (entered || pressed) && !text.is_empty() {
+            actions.push(Action::Load(SceneSource::File(PathBuf::from(text))));
+            state.panels.path = false;
+        }
+    });
+}
+
+/// The window with the field for a path.
+pub fn path_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
+    let mut open = state.panels.path;
+    egui::Window::new("Open by path")
+        .open(&mut open)
+        .collapsible(false)
+        .resizable(false)
+        .default_width(420.0)
+        .anchor(egui::Align2::CENTER_CENTER, [0.0, -60.0])
+        .show(ctx, |ui| path_ui(ui, state, actions));
+    state.panels.path &= open;
+}
+
+/// The menu of built-in scenes.
+pub fn builtin_menu(ui: &mut egui::Ui, actions: &mut Vec<Action>) {
+    for builtin in builtins() {
+        if ui
+            .button(builtin.name)
+            .on_hover_text(builtin.summary)
+            .clicked()
+        {
+            actions.push(Action::Load(SceneSource::Builtin(builtin.name.to_owned())));
+            ui.close();
+        }
+    }
+}

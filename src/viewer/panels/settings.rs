@@ -1,0 +1,381 @@
+//! Settings of the solve: presets, thresholds, method, limits.
+
+use std::time::Duration;
+
+use eframe::egui::{self, DragValue, Slider};
+
+use super::row;
+use crate::{
+    scene::Sides,
+    solver::{Direct, Method, Oracle, Push, SolveSettings},
+    viewer::{action::Action, state::State},
+    worker::Effect,
+};
+
+/// Show the settings; wishes go into `actions`.
+pub fn settings_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let mut settings = state.settings.clone();
+    presets_ui(ui, &mut settings);
+    ui.add_space(4.0);
+    quality_ui(ui, &mut settings);
+    method_ui(ui, &mut settings);
+    if settings != state.settings {
+        actions.push(Action::Settings(settings));
+    }
+    limits_ui(ui, state, actions);
+    if let Some(text) = state.run.last_effect.and_then(effect_text) {
+        ui.add_space(4.0);
+        ui.weak(text);
+    }
+}
+
+/// What the last change did.
+fn effect_text(effect: Effect) -> Option<&'static str> {
+    match effect {
+        Effect::Nothing => None,
+        Effect::Continues => Some("The change holds from the next step on; nothing is lost."),
+        Effect::Refines => Some("The light is refined further; nothing is lost."),
+        Effect::Restarts => Some("The change began the light again."),
+    }
+}
+
+fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
+    const PRESETS: [(&str, SolveSettings, &str); 3] = [
+        (
+            "Draft",
+            SolveSettings::draft(),
+            "Seconds to a first impression",
+        ),
+        ("Normal", SolveSettings::normal(), "About 5 % error"),
+        (
+            "Final",
+            SolveSettings::finest(),
+            "For the bake that is kept: about 2 % error, many times the time",
+        ),
+    ];
+    ui.horizontal(|ui| {
+        let width = (ui.available_width() - 2.0 * ui.spacing().item_spacing.x) / 3.0;
+        for (label, preset, explanation) in PRESETS {
+            // A preset sets the quality; seed and method stay as they are.
+            let with_preset = SolveSettings {
+                method: settings.method,
+                oracle: settings.oracle,
+                direct: settings.direct,
+                push: settings.push,
+                seed: settings.seed,
+                ..preset
+            };
+            let button = egui::Button::selectable(*settings == with_preset, label)
+                .min_size(egui::vec2(width, 24.0))
+                .frame_when_inactive(true);
+            if ui.add(button).on_hover_text(explanation).clicked() {
+                *settings = with_preset;
+            }
+        }
+    });
+}
+
+fn quality_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
+    let default = SolveSettings::normal();
+    row::setting(
+        ui,
+        "Link threshold ε",
+        "Largest error of one link, relative to the mean light. Lower is better and slower: links grow about as 1/ε. \
+         Values beyond the slider may be typed.",
+        &mut settings.epsilon,
+        &default.epsilon,
+        |ui, value| ui.add(slider(value, 0.001..=0.3)),
+    );
+    row::setting(
+        ui,
+        "Mesh tolerance",
+        "Elements are divided where light errs by more than this between their corners, relative to the mean light. \
+         Lower draws sharper shadows and costs vertices and shadow rays.",
+        &mut settings.mesh_tolerance,
+        &default.mesh_tolerance,
+        |ui, value| ui.add(slider(value, 0.0005..=0.2)),
+    );
+    row::setting(
+        ui,
+        "Smallest element",
+        "Elements are not divided below this fraction of the scene's area. Lower allows finer shadows and more memory.",
+        &mut settings.min_area,
+        &default.min_area,
+        |ui, value| ui.add(slider(value, 1e-8..=1e-3)),
+    );
+    row::setting(
+        ui,
+        "Shadow rays",
+        "Rays from a vertex towards the lights. More makes penumbrae smoother; the time for direct light grows with it.",
+        &mut settings.shadow_samples,
+        &default.shadow_samples,
+        |ui, value| {
+            ui.add(
+                Slider::new(value, 1..=256)
+                    .logarithmic(true)
+                    .clamping(egui::SliderClamping::Edits),
+            )
+        },
+    );
+    row::setting(
+        ui,
+        "Steps",
+        "The threshold falls to ε over this many steps. More steps show the first picture earlier.",
+        &mut settings.max_steps,
+        &default.max_steps,
+        |ui, value| ui.add(DragValue::new(value).range(1..=64).speed(0.1)),
+    );
+}
+
+fn method_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
+    row::section(ui, "Method", false, |ui| {
+        let default = SolveSettings::normal();
+        row::setting(
+            ui,
+            "Clusters",
+            "How a cluster keeps its power and area by direction. Changing it begins again.",
+            &mut settings.method,
+            &default.method,
+            |ui, value| {
+                row::choice(
+                    ui,
+                    "method",
+                    value,
+                    &[
+                        (
+                            Method::Bounded,
+                            "Bounded",
+                            "Spherical harmonics kept within guaranteed bounds",
+                        ),
+                        (
+                            Method::SixFace,
+                            "Six faces",
+                            "Six vectors along the box normals, as in the paper; too bright at coarse links",
+                        ),
+                        (
+                            Method::Single,
+                            "One vector",
+                            "One vector; opposite faces cancel",
+                        ),
+                        (Method::Exact, "Exact sum", "The sum over all patches; slow"),
+                        (
+                            Method::Isotropic,
+                            "Isotropic",
+                            "The same in every direction",
+                        ),
+                    ],
+                )
+            },
+        );
+        row::setting(
+            ui,
+            "Link error",
+            "How the error of a link is judged. Changing it begins again.",
+            &mut settings.oracle,
+            &default.oracle,
+            |ui, value| {
+                row::choice(
+                    ui,
+                    "oracle",
+                    value,
+                    &[
+                        (
+                            Oracle::Interval,
+                            "Interval bounds",
+                            "Bounds over both boxes",
+                        ),
+                        (
+                            Oracle::Samples,
+                            "p samples",
+                            "Largest minus smallest of p sample pairs, as in the paper",
+                        ),
+                    ],
+                )
+            },
+        );
+        row::setting(
+            ui,
+            "Samples p",
+            "Sample pairs of a link. The cost of judging a link grows with it.",
+            &mut settings.samples,
+            &default.samples,
+            |ui, value| {
+                ui.add_enabled(
+                    settings.oracle == Oracle::Samples,
+                    DragValue::new(value).range(1..=4096).speed(0.2),
+                )
+            },
+        );
+        row::setting(
+            ui,
+            "Direct light",
+            "How light straight from emitters is computed. Changing it begins again.",
+            &mut settings.direct,
+            &default.direct,
+            |ui, value| {
+                row::choice(
+                    ui,
+                    "direct",
+                    value,
+                    &[
+                        (
+                            Direct::Auto,
+                            "Automatic",
+                            "Sampled where emitters are few or small, linked where they are many",
+                        ),
+                        (
+                            Direct::Sampled,
+                            "Shadow rays",
+                            "From every vertex to every light: sharp shadows",
+                        ),
+                        (
+                            Direct::Linked,
+                            "Links",
+                            "Through links, as all other light; the paper's way",
+                        ),
+                    ],
+                )
+            },
+        );
+        row::setting(
+            ui,
+            "Push",
+            "How the light of several links reaches the faces of a cluster. Changing it begins again.",
+            &mut settings.push,
+            &default.push,
+            |ui, value| {
+                row::choice(
+                    ui,
+                    "push",
+                    value,
+                    &[
+                        (Push::Combined, "Once a sweep", "Combined first"),
+                        (
+                            Push::AtOnce,
+                            "Link by link",
+                            "To every face at once; slow on large clusters",
+                        ),
+                    ],
+                )
+            },
+        );
+        row::setting(
+            ui,
+            "Crease angle",
+            "Edges sharper than this are shaded as edges. Changing it begins again.",
+            &mut settings.crease_degrees,
+            &default.crease_degrees,
+            |ui, value| {
+                ui.add(
+                    DragValue::new(value)
+                        .range(0.0..=180.0)
+                        .suffix("°")
+                        .speed(0.5),
+                )
+            },
+        );
+        row::setting(
+            ui,
+            "Convergence",
+            "Sweeps stop when the change is below this fraction of the power.",
+            &mut settings.tolerance,
+            &default.tolerance,
+            |ui, value| ui.add(slider(value, 1e-6..=1e-1)),
+        );
+        row::setting(
+            ui,
+            "Seed",
+            "Of every random choice. The same seed gives the same light. Changing it begins again.",
+            &mut settings.seed,
+            &default.seed,
+            |ui, value| ui.add(DragValue::new(value).speed(0.1)),
+        );
+    });
+}
+
+fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    row::section(ui, "Limits and scene", false, |ui| {
+        let mut options = state.options.clone();
+        let mut time = options.time_limit.map_or(0.0, |limit| limit.as_secs_f64());
+        row::setting(
+            ui,
+            "Time limit",
+            "The run stops after this; continue grants it anew. 0 is no limit.",
+            &mut time,
+            &0.0,
+            |ui, value| {
+                ui.add(
+                    DragValue::new(value)
+                        .range(0.0..=1e6)
+                        .suffix(" s")
+                        .speed(1.0),
+                )
+            },
+        );
+        options.time_limit = (time > 0.0).then(|| Duration::from_secs_f64(time));
+        let mut memory = options.memory_limit.map_or(0, |limit| limit >> 20);
+        row::setting(
+            ui,
+            "Memory limit",
+            "The run stops when the solver holds this much. 0 is no limit.",
+            &mut memory,
+            &0,
+            |ui, value| {
+                ui.add(
+                    DragValue::new(value)
+                        .range(0..=1 << 20)
+                        .suffix(" MiB")
+                        .speed(16.0),
+                )
+            },
+        );
+        options.memory_limit = (memory > 0).then_some(memory << 20);
+        row::setting(
+            ui,
+            "Threads",
+            "Solver threads; 0 takes one for each core. The result is the same.",
+            &mut options.threads,
+            &0,
+            |ui, value| ui.add(DragValue::new(value).range(0..=256).speed(0.1)),
+        );
+        if options != state.options {
+            actions.push(Action::Options(options));
+        }
+        let mut sides = state.scene_options.sides;
+        row::setting(
+            ui,
+            "Sides",
+            "Which sides of faces reflect and emit. Changing it reads the scene again.",
+            &mut sides,
+            &Sides::Auto,
+            |ui, value| {
+                row::choice(
+                    ui,
+                    "sides",
+                    value,
+                    &[
+                        (
+                            Sides::Auto,
+                            "Automatic",
+                            "Closed shells one-sided, sheets two-sided",
+                        ),
+                        (Sides::One, "One-sided", "Counter-clockwise is the front"),
+                        (Sides::Two, "Two-sided", "Both sides reflect and emit"),
+                    ],
+                )
+            },
+        );
+        if sides != state.scene_options.sides {
+            actions.push(Action::Sides(sides));
+        }
+    });
+}
+
+/// A logarithmic slider whose typed value may leave its range, but not go to 0 or below.
+fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> Slider<'_> {
+    Slider::new(value, range)
+        .logarithmic(true)
+        .clamping(egui::SliderClamping::Never)
+        .custom_formatter(|value, _| super::figure(value))
+        .custom_parser(|text| text.trim().parse().ok().filter(|value: &f64| *value > 0.0))
+}

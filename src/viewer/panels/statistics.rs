@@ -1,0 +1,105 @@
+//! Counts of the scene, the solve and the machine.
+
+use eframe::egui;
+
+use super::{count, figure, row, seconds};
+use crate::viewer::state::State;
+
+/// Show the counts.
+pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
+    row::figures(ui, "statistics", |ui| {
+        if let Some(loaded) = &state.loaded {
+            let scene = &loaded.scene;
+            let size = (loaded.max - loaded.min).as_dvec3() / scene.frame.scale;
+            row::figure(
+                ui,
+                "Triangles",
+                count(scene.triangles.len() as u64),
+                "Of the scene as read",
+            );
+            row::figure(ui, "Materials", count(scene.materials.len() as u64), "");
+            row::figure(ui, "Textures", count(scene.textures.len() as u64), "");
+            row::figure(
+                ui,
+                "Objects",
+                count(scene.objects.len() as u64),
+                "Named runs of triangles",
+            );
+            let emitters = scene
+                .surfaces
+                .iter()
+                .filter(|surface| surface.emission != glam::Vec3::ZERO);
+            row::figure(
+                ui,
+                "Emitters",
+                count(emitters.count() as u64),
+                "Triangles that emit light",
+            );
+            row::figure(
+                ui,
+                "Size",
+                format!(
+                    "{} × {} × {}",
+                    figure(size.x),
+                    figure(size.y),
+                    figure(size.z)
+                ),
+                "In the file's units",
+            );
+        }
+        if let Some(secs) = state.run.prepare_secs {
+            row::figure(
+                ui,
+                "Preparing",
+                seconds(secs),
+                "Time to build the hierarchy and the ray tree",
+            );
+        }
+        if let Some(report) = state.report() {
+            row::figure(
+                ui,
+                "Nodes",
+                count(report.nodes),
+                "Clusters, patches and elements",
+            );
+            row::figure(
+                ui,
+                "Elements",
+                count(report.elements),
+                "Leaves that receive light",
+            );
+            row::figure(
+                ui,
+                "Vertices",
+                count(report.vertices),
+                "Of the displayed mesh",
+            );
+            let rate = report.shadow_rays as f64 / report.solve_s.max(1e-9);
+            row::figure(ui, "Rays a second", count(rate as u64), "");
+            row::figure(
+                ui,
+                "Row sums",
+                format!(
+                    "{} / {} / {}",
+                    figure(f64::from(report.row_sum_min)),
+                    figure(f64::from(report.row_sum_mean)),
+                    figure(f64::from(report.row_sum_max))
+                ),
+                "Smallest, mean and largest sum of form factors; 1 in a closed scene",
+            );
+            row::figure(
+                ui,
+                "Contraction",
+                figure(f64::from(report.contraction)),
+                "Ratio of successive changes; below 1 the iteration settles",
+            );
+        }
+    });
+    if !state.adapter_name.is_empty() {
+        ui.add_space(2.0);
+        ui.weak(&state.adapter_name);
+    }
+    if cfg!(debug_assertions) {
+        ui.weak("Debug build: use --release for full speed.");
+    }
+}

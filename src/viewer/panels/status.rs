@@ -1,0 +1,65 @@
+//! The line at the bottom: what is going on, in figures, and whether there is something to read.
+
+use eframe::egui::{self, RichText};
+
+use super::{count, figure, seconds};
+use crate::viewer::{
+    state::{RunStatus, Severity, State},
+    theme,
+};
+
+/// Show the line.
+pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
+    ui.horizontal(|ui| {
+        if let Some(loading) = &state.loading {
+            ui.spinner();
+            ui.label(format!("Reading {}", loading.source().label()));
+        }
+        let color = match &state.run.status {
+            RunStatus::Failed(_) => theme::BAD,
+            RunStatus::Finished(_) => theme::GOOD,
+            RunStatus::Paused => theme::WARNING,
+            _ => ui.visuals().text_color(),
+        };
+        ui.colored_label(color, state.run.status.label());
+        if let Some(report) = state.report() {
+            let text = format!(
+                "Step {}   ε {}   Links {}   Vertices {}   {}",
+                report.step,
+                figure(f64::from(report.epsilon)),
+                count(report.links),
+                count(report.vertices),
+                seconds(report.elapsed_s),
+            );
+            ui.label(RichText::new(text).weak());
+        }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            messages_button(ui, state);
+        });
+    });
+}
+
+fn messages_button(ui: &mut egui::Ui, state: &mut State) {
+    let unseen = state.messages.unseen();
+    let Some(last) = unseen.last() else { return };
+    let worst = |severity| unseen.iter().any(|message| message.severity == severity);
+    let color = if worst(Severity::Error) {
+        theme::BAD
+    } else if worst(Severity::Warning) {
+        theme::WARNING
+    } else {
+        theme::GOOD
+    };
+    let mut text = last.text.clone();
+    if text.chars().count() > 90 {
+        text = text.chars().take(90).chain(['…']).collect();
+    }
+    if unseen.len() > 1 {
+        text = format!("{text}  (+{})", unseen.len() - 1);
+    }
+    let button = egui::Button::new(RichText::new(text).color(color)).frame(false);
+    if ui.add(button).on_hover_text("Show all messages").clicked() {
+        state.panels.show_messages = true;
+        state.panels.shown = true;
+    }
+}

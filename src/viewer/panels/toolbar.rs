@@ -1,0 +1,116 @@
+//! The row above the scene: what is shown and how bright.
+
+use eframe::egui::{self, DragValue, Slider};
+
+use crate::viewer::{
+    action::Action,
+    state::State,
+    view::{ToneMap, ViewMode, ViewSettings},
+};
+
+/// Show the row; what is quick to change is changed in place, the rest goes into `actions`.
+pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
+    ui.horizontal_wrapped(|ui| {
+        mode_ui(ui, state.view.mode, actions);
+        if state.view.mode.is_light() {
+            exposure_ui(ui, &mut state.view, actions);
+        }
+        if state.view.mode.false_color_unit().is_some() {
+            range_ui(ui, &mut state.view, state.false_color_range);
+        }
+        ui.separator();
+        let view = &mut state.view;
+        ui.toggle_value(&mut view.edges, "Mesh")
+            .on_hover_text("Edges of the elements over the light (M)");
+        ui.toggle_value(&mut view.clusters.shown, "Clusters")
+            .on_hover_text("Boxes of the cluster tree; [ and ] change the level (B)");
+        ui.toggle_value(&mut view.backs, "Backs")
+            .on_hover_text("Draw the backs of one-sided faces instead of looking through them (K)");
+        let has_textures = state
+            .loaded
+            .as_ref()
+            .is_some_and(|loaded| !loaded.scene.textures.is_empty());
+        if has_textures {
+            ui.toggle_value(&mut view.texture_detail, "Textures")
+                .on_hover_text("Textures in detail, lit by the computed light");
+        }
+    });
+}
+
+fn mode_ui(ui: &mut egui::Ui, mode: ViewMode, actions: &mut Vec<Action>) {
+    let mut chosen = mode;
+    let response = egui::ComboBox::from_id_salt("view mode")
+        .selected_text(mode.label())
+        .width(176.0)
+        .height(320.0)
+        .show_ui(ui, |ui| {
+            for mode in ViewMode::ALL {
+                ui.selectable_value(&mut chosen, mode, mode.label())
+                    .on_hover_text(mode.explanation());
+            }
+        })
+        .response;
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, "View mode"));
+    response.on_hover_text(mode.explanation());
+    if chosen != mode {
+        actions.push(Action::Mode(chosen));
+    }
+}
+
+fn exposure_ui(ui: &mut egui::Ui, view: &mut ViewSettings, actions: &mut Vec<Action>) {
+    let label = ui.label("Exposure");
+    let mut exposure = view.exposure;
+    let slider = Slider::new(&mut exposure, -8.0..=8.0)
+        .suffix(" EV")
+        .fixed_decimals(1)
+        .step_by(0.1)
+        .clamping(egui::SliderClamping::Never);
+    let response = ui
+        .add(slider)
+        .labelled_by(label.id)
+        .on_hover_text("Brightness of the picture, without computing anything (- and =)");
+    if response.changed() {
+        actions.push(Action::ExposureBy(exposure - view.exposure));
+    }
+    if ui
+        .selectable_label(view.auto_exposure, "Auto")
+        .on_hover_text("Let the exposure follow the light (0)")
+        .clicked()
+    {
+        actions.push(Action::AutoExposure);
+    }
+    let mut is_neutral = view.tone_map == ToneMap::Neutral;
+    ui.toggle_value(&mut is_neutral, "Tone map")
+        .on_hover_text("Compress highlights and keep their colour; off cuts them at white (T)");
+    view.tone_map = if is_neutral {
+        ToneMap::Neutral
+    } else {
+        ToneMap::None
+    };
+}
+
+fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
+    ui.toggle_value(&mut view.logarithmic, "Log")
+        .on_hover_text("Space the colours logarithmically");
+    let mut is_fixed = view.fixed_range.is_some();
+    ui.toggle_value(&mut is_fixed, "Fixed range")
+        .on_hover_text("Keep the range while the light changes; otherwise it follows the light");
+    view.fixed_range = match (is_fixed, view.fixed_range) {
+        (true, None) => Some(in_use),
+        (true, held) => held,
+        (false, _) => None,
+    };
+    if let Some([low, high]) = &mut view.fixed_range {
+        let speed = f64::from(*high) * 0.005;
+        let drag = |value| {
+            DragValue::new(value)
+                .range(0.0..=f32::MAX)
+                .speed(speed)
+                .custom_formatter(|value, _| super::figure(value))
+        };
+        let label = ui.label("from");
+        ui.add(drag(low)).labelled_by(label.id);
+        let label = ui.label("to");
+        ui.add(drag(high)).labelled_by(label.id);
+    }
+}

@@ -1,0 +1,265 @@
+//! Textures on the adapter: one group for each textured material, and group 0 for everything without a texture.
+
+use std::{ops::Range, sync::Arc};
+
+use glam::Vec3;
+use wgpu::util::DeviceExt as _;
+
+use super::Gpu;
+use crate::{
+    scene::{Scene, Texture, TriangleId},
+    solver::DisplayMesh,
+};
+
+/// Textures larger than this are shown smaller: light, not texture, is what is looked at.
+const MAX_SIDE: u32 = 2048;
+
+/// The groups of a scene's materials.
+pub(super) struct DetailSet {
+    layout: wgpu::BindGroupLayout,
+    sampler: wgpu::Sampler,
+    plain: wgpu::BindGroup,
+    scene: Option<Arc<Scene>>,
+    /// Number of the group of each material.
+    group_of: Vec<usize>,
+    /// Groups from 1 on.
+    textured: Vec<wgpu::BindGroup>,
+}
+
+impl DetailSet {
+    /// Only the plain group.
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let layout = layout(&gpu.device);
+        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("detail"),
+            address_mode_u: wgpu::AddressMode::Repeat,
+            address_mode_v: wgpu::AddressMode::Repeat,
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            ..Default::default()
+        });
+        let white = Texture {
+            name: String::new(),
+            width: 1,
+            height: 1,
+            pixels: vec![Vec3::ONE],
+        };
+        let view = upload(gpu, &white);
+        let plain = bind_group(gpu, &layout, &sampler, &view, [1.0, 1.0, 1.0, 0.0]);
+        Self {
+            layout,
+            sampler,
+            plain,
+            scene: None,
+            group_of: Vec::new(),
+            textured: Vec::new(),
+        }
+    }
+
+    /// Layout of group 1 of the mesh pass.
+    pub(super) fn layout(&self) -> &wgpu::BindGroupLayout {
+        &self.layout
+    }
+
+    /// A group by its number.
+    pub(super) fn bind_group(&self, number: usize) -> &wgpu::BindGroup {
+        match number.checked_sub(1) {
+            Some(index) => self.textured.get(index).unwrap_or(&self.plain),
+            None => &self.plain,
+        }
+    }
+
+    /// Upload the textures of another scene.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>) {
+        if self
+            .scene
+            .as_ref()
+            .is_some_and(|held| Arc::ptr_eq(held, scene))
+        {
+            return;
+        }
+        self.scene = Some(scene.clone());
+        self.textured.clear();
+        self.group_of = vec![0; scene.materials.len()];
+        let mut views: Vec<Option<wgpu::TextureView>> = vec![None; scene.textures.len()];
+        for (material, group) in scene.materials.iter().zip(&mut self.group_of) {
+            let Some(texture) = material.reflectance_texture else {
+                continue;
+            };
+            let view = views[texture.index()]
+                .get_or_insert_with(|| upload(gpu, &scene.textures[texture.index()]));
+            let [r, g, b] = material.reflectance.to_array();
+            self.textured.push(bind_group(
+                gpu,
+                &self.layout,
+                &self.sampler,
+                view,
+                [r, g, b, 1.0],
+            ));
+            *group = self.textured.len();
+        }
+    }
+
+    /// The indices of a mesh, those of one group together, and where each group lies.
+    pub(super) fn sort_by_detail(
+        &self,
+        scene: &Scene,
+        mesh: &DisplayMesh,
+    ) -> (Vec<[u32; 3]>, Vec<(Range<u32>, usize)>) {
+        let count = mesh.indices.len();
+        if self.textured.is_empty() || mesh.texcoords.is_empty() {
+            return (mesh.indices.clone(), vec![(0..3 * count as u32, 0)]);
+        }
+        let group = |index: usize| {
+            let triangle = TriangleId(mesh.triangle_of[index]);
+            self.group_of[scene.triangles[triangle.index()].material.index()]
+        };
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_by_key(|&index| group(index));
+        let mut ranges: Vec<(Range<u32>, usize)> = Vec::new();
+        for (place, &index) in order.iter().enumerate() {
+            let (start, end) = (3 * place as u32, 3 * place as u32 + 3);
+            match ranges.last_mut() {
+                Some((range, last)) if *last == group(index) => range.end = end,
+                _ => ranges.push((start..end, group(index))),
+            }
+        }
+        let indices = order.iter().map(|&index| mesh.indices[index]).collect();
+        (indices, ranges)
+    }
+}
+
+fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty,
+        count: None,
+    };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("detail"),
+        entries: &[
+            entry(
+                0,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+            ),
+            entry(
+                1,
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+            ),
+            entry(
+                2,
+                wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+            ),
+        ],
+    })
+}
+
+fn bind_group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    sampler: &wgpu::Sampler,
+    view: &wgpu::TextureView,
+    factor: [f32; 4],
+) -> wgpu::BindGroup {
+    let uniform = gpu
+        .device
+        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("detail"),
+            contents: bytemuck::cast_slice(&factor),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("detail"),
+        layout,
+        entries: &[
+            wgpu::BindGroupEntry {
+                binding: 0,
+                resource: uniform.as_entire_binding(),
+            },
+            wgpu::BindGroupEntry {
+                binding: 1,
+                resource: wgpu::BindingResource::TextureView(view),
+            },
+            wgpu::BindGroupEntry {
+                binding: 2,
+                resource: wgpu::BindingResource::Sampler(sampler),
+            },
+        ],
+    })
+}
+
+/// A texture with all its smaller levels, sRGB-encoded.
+fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
+    let mut level = (texture.width, texture.height, texture.pixels.clone());
+    while level.0.max(level.1) > MAX_SIDE.min(gpu.max_picture_side()) {
+        level = halved(&level);
+    }
+    let (width, height) = (level.0, level.1);
+    let level_count = width.max(height).ilog2() + 1;
+    let mut bytes = Vec::new();
+    for index in 0..level_count {
+        bytes.extend(level.2.iter().flat_map(|pixel| {
+            let [r, g, b] = pixel.to_array().map(srgb_byte);
+            [r, g, b, 255]
+        }));
+        if index + 1 < level_count {
+            level = halved(&level);
+        }
+    }
+    let made = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some(&texture.name),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: level_count,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8UnormSrgb,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::LayerMajor,
+        &bytes,
+    );
+    made.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// A picture of half the size, at least 1 × 1; an odd last row or column counts for its neighbour, too.
+fn halved((width, height, pixels): &(u32, u32, Vec<Vec3>)) -> (u32, u32, Vec<Vec3>) {
+    let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
+    let pixel = |x: u32, y: u32| pixels[(y.min(height - 1) * width + x.min(width - 1)) as usize];
+    let mut half = Vec::with_capacity((half_width * half_height) as usize);
+    for y in 0..half_height {
+        for x in 0..half_width {
+            let (x, y) = (2 * x, 2 * y);
+            half.push(
+                0.25 * (pixel(x, y) + pixel(x + 1, y) + pixel(x, y + 1) + pixel(x + 1, y + 1)),
+            );
+        }
+    }
+    (half_width, half_height, half)
+}
+
+fn srgb_byte(linear: f32) -> u8 {
+    let x = linear.clamp(0.0, 1.0);
+    let encoded = if x <= 0.003_130_8 {
+        12.92 * x
+    } else {
+        1.055 * x.powf(1.0 / 2.4) - 0.055
+    };
+    (encoded * 255.0 + 0.5) as u8
+}

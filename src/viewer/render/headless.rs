@@ -1,0 +1,113 @@
+//! Pictures without a window: the same passes on a device of their own.
+
+use std::{path::Path, sync::Arc};
+
+use glam::Vec3;
+use image::{Rgb32FImage, RgbaImage};
+
+use super::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target};
+use crate::{
+    scene::Scene,
+    solver::Snapshot,
+    viewer::{camera::Camera, clusters, light_range, theme, view::ViewSettings},
+};
+
+/// Why there is no headless picture.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum HeadlessError {
+    /// Nothing can draw.
+    #[error(
+        "no graphics adapter was found ({0}); install a Vulkan driver (on Debian: mesa-vulkan-drivers libvulkan1), or try WGPU_BACKEND=gl"
+    )]
+    NoAdapter(String),
+    /// Too large for the adapter.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// It did not come back.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+}
+
+/// A picture, as display colours and as radiance.
+pub struct HeadlessPicture {
+    /// Tone-mapped and sRGB-encoded.
+    pub display: RgbaImage,
+    /// Linear radiance; empty where the adapter cannot draw it.
+    pub radiance: Option<Rgb32FImage>,
+}
+
+impl HeadlessPicture {
+    /// Write a file; `.exr` takes the radiance, anything else the display colours.
+    ///
+    /// # Errors
+    /// When the file cannot be written or its ending names no format.
+    pub fn save(&self, path: &Path) -> image::ImageResult<()> {
+        let is_exr = path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        match (&self.radiance, is_exr) {
+            (Some(radiance), true) => radiance.save(path),
+            _ => image::DynamicImage::from(self.display.clone())
+                .into_rgb8()
+                .save(path),
+        }
+    }
+}
+
+/// A device of one's own.
+///
+/// # Errors
+/// [`HeadlessError::NoAdapter`].
+pub fn open_gpu() -> Result<Gpu, HeadlessError> {
+    let none = |error: &dyn std::fmt::Display| HeadlessError::NoAdapter(error.to_string());
+    let instance =
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let options = wgpu::RequestAdapterOptions::default();
+    let adapter =
+        pollster::block_on(instance.request_adapter(&options)).map_err(|error| none(&error))?;
+    let (device, queue) =
+        pollster::block_on(adapter.request_device(&Gpu::device_descriptor(&adapter)))
+            .map_err(|error| none(&error))?;
+    Ok(Gpu::new(&adapter, device, queue))
+}
+
+/// Draw a snapshot at a size in pixels. Automatic exposure and ranges are taken from its light, as in the window.
+///
+/// # Errors
+/// See [`HeadlessError`].
+pub fn picture(
+    scene: &Arc<Scene>,
+    snapshot: &Snapshot,
+    camera: &Camera,
+    view: &ViewSettings,
+    size: [u32; 2],
+) -> Result<HeadlessPicture, HeadlessError> {
+    let mut renderer = Renderer::new(open_gpu()?);
+    let target = Target::new(renderer.gpu(), size)?;
+    let mut view = view.clone();
+    if view.auto_exposure {
+        view.exposure = light_range::auto_exposure(snapshot).unwrap_or(view.exposure);
+    }
+    let overlay = Overlay {
+        boxes: Arc::new(clusters::boxes(&snapshot.clusters, &view.clusters)),
+        segments: Arc::default(),
+    };
+    let drawn = Picture {
+        scene,
+        mesh: &snapshot.mesh,
+        light: &snapshot.light,
+        camera,
+        range: light_range::false_color_range(snapshot, &view),
+        view: &view,
+        overlay: &overlay,
+        background: Vec3::splat(theme::PICTURE_BACKGROUND),
+        pixels_per_point: 1.0,
+    };
+    renderer.render(&target, &drawn)?;
+    Ok(HeadlessPicture {
+        display: target.read_display(renderer.gpu())?,
+        radiance: target
+            .read_linear(renderer.gpu(), view.exposure_factor())
+            .ok(),
+    })
+}

@@ -1,0 +1,181 @@
+//! Lines over the surfaces: boxes by the hundred thousand as instances, and segments as ribbons or arrows.
+
+use std::sync::Arc;
+
+use wgpu::util::DeviceExt as _;
+
+use super::{BoxInstance, DEPTH_FORMAT, Gpu, Overlay, SegmentInstance};
+
+/// Vertices of a box: two ends for each of twelve edges.
+const BOX_VERTICES: u32 = 24;
+/// Vertices of a segment: two triangles of the ribbon, one of the arrowhead.
+const SEGMENT_VERTICES: u32 = 9;
+
+/// Pipelines and instance buffers.
+pub(super) struct LinePass {
+    box_pipeline: wgpu::RenderPipeline,
+    segment_pipeline: wgpu::RenderPipeline,
+    boxes: Instances<BoxInstance>,
+    segments: Instances<SegmentInstance>,
+}
+
+impl LinePass {
+    /// Build the pipelines.
+    pub(super) fn new(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout) -> Self {
+        let module = gpu
+            .device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("lines"),
+                source: wgpu::ShaderSource::Wgsl(
+                    concat!(include_str!("view.wgsl"), include_str!("line_pass.wgsl")).into(),
+                ),
+            });
+        let layout = gpu
+            .device
+            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("lines"),
+                bind_group_layouts: &[Some(view_layout)],
+                immediate_size: 0,
+            });
+        let build = |label, entry_point, topology, stride: usize, attributes: &[_]| {
+            pipeline(
+                gpu,
+                &layout,
+                &module,
+                label,
+                entry_point,
+                topology,
+                wgpu::VertexBufferLayout {
+                    array_stride: stride as u64,
+                    step_mode: wgpu::VertexStepMode::Instance,
+                    attributes,
+                },
+            )
+        };
+        let box_pipeline = build(
+            "boxes",
+            "vs_box",
+            wgpu::PrimitiveTopology::LineList,
+            size_of::<BoxInstance>(),
+            &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3],
+        );
+        let segment_pipeline = build(
+            "segments",
+            "vs_segment",
+            wgpu::PrimitiveTopology::TriangleList,
+            size_of::<SegmentInstance>(),
+            &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32],
+        );
+        Self {
+            box_pipeline,
+            segment_pipeline,
+            boxes: Instances::default(),
+            segments: Instances::default(),
+        }
+    }
+
+    /// Upload what changed.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, overlay: &Overlay) {
+        self.boxes.prepare(gpu, "boxes", &overlay.boxes);
+        self.segments.prepare(gpu, "segments", &overlay.segments);
+    }
+
+    /// Draw; group 0 is set.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_pipeline(&self.box_pipeline);
+        self.boxes.draw(pass, BOX_VERTICES);
+        pass.set_pipeline(&self.segment_pipeline);
+        self.segments.draw(pass, SEGMENT_VERTICES);
+    }
+}
+
+/// Instances as they were last uploaded.
+struct Instances<T> {
+    uploaded: Arc<Vec<T>>,
+    buffer: Option<wgpu::Buffer>,
+    count: u32,
+}
+
+impl<T> Default for Instances<T> {
+    fn default() -> Self {
+        Self {
+            uploaded: Arc::default(),
+            buffer: None,
+            count: 0,
+        }
+    }
+}
+
+impl<T: bytemuck::NoUninit> Instances<T> {
+    fn prepare(&mut self, gpu: &Gpu, label: &str, instances: &Arc<Vec<T>>) {
+        if Arc::ptr_eq(&self.uploaded, instances) {
+            return;
+        }
+        self.uploaded = instances.clone();
+        // More than the adapter takes at once are left out, the last first.
+        let fitting =
+            (gpu.device.limits().max_buffer_size as usize / size_of::<T>()).min(instances.len());
+        let shown = &instances[..fitting];
+        self.count = shown.len() as u32;
+        self.buffer = (!shown.is_empty()).then(|| {
+            gpu.device
+                .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some(label),
+                    contents: bytemuck::cast_slice(shown),
+                    usage: wgpu::BufferUsages::VERTEX,
+                })
+        });
+    }
+
+    fn draw(&self, pass: &mut wgpu::RenderPass<'_>, vertex_count: u32) {
+        if let Some(buffer) = &self.buffer {
+            pass.set_vertex_buffer(0, buffer.slice(..));
+            pass.draw(0..vertex_count, 0..self.count);
+        }
+    }
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    label: &str,
+    entry_point: &str,
+    topology: wgpu::PrimitiveTopology,
+    instances: wgpu::VertexBufferLayout<'_>,
+) -> wgpu::RenderPipeline {
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(label),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some(entry_point),
+                compilation_options: Default::default(),
+                buffers: &[Some(instances)],
+            },
+            primitive: wgpu::PrimitiveState {
+                topology,
+                ..Default::default()
+            },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: wgpu::MultisampleState {
+                count: gpu.sample_count,
+                ..Default::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some("fs_main"),
+                compilation_options: Default::default(),
+                targets: &[Some(gpu.linear_format.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}

@@ -1,0 +1,121 @@
+// The lit surfaces. Writes colour and, in alpha, whether it is light (1: exposed, to be tone-mapped) or a display
+// colour (0).
+
+struct Detail {
+    // rgb: reflectance that multiplies the texture; w: 1 where there is a texture.
+    factor: vec4<f32>,
+};
+
+@group(1) @binding(0) var<uniform> detail: Detail;
+@group(1) @binding(1) var detail_texture: texture_2d<f32>;
+@group(1) @binding(2) var detail_sampler: sampler;
+
+struct Surface {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) texcoord: vec2<f32>,
+    @location(3) reflectance: vec3<f32>,
+    @location(4) emission: vec3<f32>,
+    @location(5) light: vec3<f32>,
+};
+
+@vertex
+fn vs_main(
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) texcoord: vec2<f32>,
+    @location(3) reflectance: vec3<f32>,
+    @location(4) emission: vec3<f32>,
+    @location(5) light: vec3<f32>,
+) -> Surface {
+    var out: Surface;
+    out.clip = view.clip_from_frame * vec4<f32>(position, 1.0);
+    out.position = position;
+    out.normal = normal;
+    out.texcoord = texcoord;
+    out.reflectance = reflectance;
+    out.emission = emission;
+    out.light = light;
+    return out;
+}
+
+const PI: f32 = 3.14159265;
+// Largest value of a half float, a little less.
+const BRIGHTEST: f32 = 60000.0;
+
+fn luminance(color: vec3<f32>) -> f32 {
+    return dot(color, vec3<f32>(0.2126, 0.7152, 0.0722));
+}
+
+// Below the range black, above it white.
+fn false_color(value: f32) -> vec3<f32> {
+    let low = view.range.x;
+    let high = view.range.y;
+    var t = (value - low) / max(high - low, 1e-30);
+    if (view.range.z > 0.5) {
+        t = log(max(value, 1e-30) / max(low, 1e-30)) / max(log(max(high, 1e-30) / max(low, 1e-30)), 1e-6);
+    }
+    if (t < -0.001) {
+        return vec3<f32>(0.0);
+    }
+    if (t > 1.001) {
+        return vec3<f32>(1.0);
+    }
+    let at = clamp(t, 0.0, 1.0) * 8.0;
+    let below = u32(min(floor(at), 7.0));
+    return mix(view.ramp[below].rgb, view.ramp[below + 1u].rgb, at - f32(below));
+}
+
+fn to_viewer(surface: Surface) -> vec3<f32> {
+    if (view.eye.w > 0.5) {
+        return view.backward.xyz;
+    }
+    return normalize(view.eye.xyz - surface.position);
+}
+
+fn exposed(radiance: vec3<f32>) -> vec4<f32> {
+    return vec4<f32>(clamp(radiance * view.display.y, vec3<f32>(0.0), vec3<f32>(BRIGHTEST)), 1.0);
+}
+
+@fragment
+fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
+    let texel = textureSample(detail_texture, detail_sampler, vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y));
+    var reflectance = surface.reflectance;
+    if (detail.factor.w * view.display.w > 0.5) {
+        reflectance = detail.factor.rgb * texel.rgb;
+    }
+    let radiance = surface.emission + reflectance * surface.light / PI;
+    let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
+    switch u32(view.display.x) {
+        case 1u: { return exposed(surface.light / PI); }
+        case 3u: { return vec4<f32>(reflectance, 0.0); }
+        case 4u: { return vec4<f32>(pow(0.5 + 0.5 * normalize(surface.normal), vec3<f32>(2.2)), 0.0); }
+        case 5u: { return vec4<f32>(vec3<f32>(0.12 + 0.5 * facing), 0.0); }
+        case 6u: { return vec4<f32>(vec3<f32>(0.05, 0.14, 0.6) * (0.3 + 0.7 * facing), 0.0); }
+        case 7u: { return vec4<f32>(false_color(luminance(surface.light)), 0.0); }
+        case 8u: { return vec4<f32>(false_color(luminance(surface.emission + surface.reflectance * surface.light / PI)), 0.0); }
+        case 9u: { return vec4<f32>(false_color(surface.light.x), 0.0); }
+        default: { return exposed(radiance); }
+    }
+}
+
+// The back of a one-sided face.
+@fragment
+fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
+    let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
+    if (u32(view.display.x) == 6u) {
+        return vec4<f32>(vec3<f32>(0.6, 0.05, 0.04) * (0.3 + 0.7 * facing), 0.0);
+    }
+    return vec4<f32>(vec3<f32>(view.range.w) * (0.4 + 0.6 * facing), 0.0);
+}
+
+@vertex
+fn vs_edge(@location(0) position: vec3<f32>) -> @builtin(position) vec4<f32> {
+    return lifted(view.clip_from_frame * vec4<f32>(position, 1.0));
+}
+
+@fragment
+fn fs_edge() -> @location(0) vec4<f32> {
+    return vec4<f32>(0.008, 0.012, 0.02, view.viewport.w);
+}

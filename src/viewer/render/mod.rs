@@ -1,0 +1,236 @@
+//! Pictures of a snapshot: surfaces and lines into a linear target, then one tone-mapping pass to display colours.
+//!
+//! The same code draws the window's viewport, screenshots and headless pictures. Buffers are uploaded only when the
+//! `Arc` they come from changes, so that a still picture costs nothing.
+
+mod detail;
+pub mod headless;
+mod line_pass;
+mod mesh_pass;
+mod readback;
+mod target;
+mod tonemap_pass;
+mod uniforms;
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+pub use readback::ReadError;
+pub use target::Target;
+
+use super::{camera::Camera, view::ViewSettings};
+use crate::{
+    scene::Scene,
+    solver::{DisplayMesh, VertexLight},
+};
+use line_pass::LinePass;
+use mesh_pass::MeshPass;
+use tonemap_pass::TonemapPass;
+use uniforms::ViewUniforms;
+
+/// Format of the linear picture where the adapter can draw into it.
+const LINEAR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Format of the display picture, already sRGB-encoded: the GL fallback has no views of another format.
+const DISPLAY_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Why a picture cannot be drawn.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RenderError {
+    /// A buffer of the mesh is larger than the adapter takes.
+    #[error(
+        "the mesh needs a buffer of {needed_mib} MiB and this graphics adapter takes {limit_mib}; raise the smallest element area, or the mesh tolerance, and reset"
+    )]
+    MeshTooLarge {
+        /// Size of the largest buffer.
+        needed_mib: u64,
+        /// What the adapter takes.
+        limit_mib: u64,
+    },
+    /// The picture has more pixels on a side than the adapter takes.
+    #[error(
+        "a picture of {width} × {height} pixels is too large for this graphics adapter, which takes {limit} on a side"
+    )]
+    PictureTooLarge {
+        /// Width asked for.
+        width: u32,
+        /// Height asked for.
+        height: u32,
+        /// What the adapter takes on a side.
+        limit: u32,
+    },
+}
+
+/// A device, and what pictures may assume of it. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Name, kind and backend of the adapter, for people.
+    pub adapter_name: String,
+    /// Samples a pixel.
+    pub sample_count: u32,
+    /// Format of the linear picture.
+    pub linear_format: wgpu::TextureFormat,
+}
+
+impl Gpu {
+    /// What an adapter's device can do.
+    pub fn new(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let about = adapter.get_info();
+        let features = adapter.get_texture_format_features(LINEAR_FORMAT);
+        let drawable = features
+            .allowed_usages
+            .contains(wgpu::TextureUsages::RENDER_ATTACHMENT);
+        let multisampled = features.flags.sample_count_supported(4)
+            && features
+                .flags
+                .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
+        // A processor that plays adapter takes twice as long for four samples.
+        let sample_count = if multisampled && drawable && about.device_type != wgpu::DeviceType::Cpu
+        {
+            4
+        } else {
+            1
+        };
+        Self {
+            device,
+            queue,
+            adapter_name: format!(
+                "{} ({:?}, {})",
+                about.name, about.device_type, about.backend
+            ),
+            sample_count,
+            linear_format: if drawable {
+                LINEAR_FORMAT
+            } else {
+                DISPLAY_FORMAT
+            },
+        }
+    }
+
+    /// What to ask a device for: the defaults that every adapter has, and buffers as large as this one takes.
+    pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+        let offered = adapter.limits();
+        let base = if adapter.get_info().backend == wgpu::Backend::Gl {
+            wgpu::Limits::downlevel_webgl2_defaults()
+        } else {
+            wgpu::Limits::downlevel_defaults()
+        };
+        wgpu::DeviceDescriptor {
+            label: Some("vecrad"),
+            required_limits: wgpu::Limits {
+                max_buffer_size: offered.max_buffer_size,
+                max_texture_dimension_2d: offered.max_texture_dimension_2d,
+                ..base
+            },
+            ..Default::default()
+        }
+    }
+
+    /// Largest picture on a side.
+    pub fn max_picture_side(&self) -> u32 {
+        self.device.limits().max_texture_dimension_2d
+    }
+}
+
+/// One box of the overlay: lower corner, upper corner, display-linear colour.
+pub type BoxInstance = [f32; 9];
+/// One segment of the overlay: start, end, display-linear colour, 1 for an arrowhead.
+pub type SegmentInstance = [f32; 10];
+
+/// Lines over the surfaces; uploaded when an `Arc` changes.
+#[derive(Clone, Debug, Default)]
+pub struct Overlay {
+    /// Thin boxes.
+    pub boxes: Arc<Vec<BoxInstance>>,
+    /// Ribbons and arrows.
+    pub segments: Arc<Vec<SegmentInstance>>,
+}
+
+/// All that a picture shows.
+pub struct Picture<'a> {
+    /// Materials and textures.
+    pub scene: &'a Arc<Scene>,
+    /// The mesh.
+    pub mesh: &'a Arc<DisplayMesh>,
+    /// Its light.
+    pub light: &'a Arc<VertexLight>,
+    /// From where.
+    pub camera: &'a Camera,
+    /// How.
+    pub view: &'a ViewSettings,
+    /// Ends of the false colours.
+    pub range: [f32; 2],
+    /// Lines on top.
+    pub overlay: &'a Overlay,
+    /// Display-linear colour behind everything.
+    pub background: Vec3,
+    /// Pixels a point, for the width of lines.
+    pub pixels_per_point: f32,
+}
+
+/// Draws pictures with one device.
+pub struct Renderer {
+    gpu: Gpu,
+    uniforms: ViewUniforms,
+    mesh_pass: MeshPass,
+    line_pass: LinePass,
+    tonemap_pass: TonemapPass,
+}
+
+impl Renderer {
+    /// Build the pipelines.
+    pub fn new(gpu: Gpu) -> Self {
+        let uniforms = ViewUniforms::new(&gpu.device);
+        Self {
+            mesh_pass: MeshPass::new(&gpu, uniforms.layout()),
+            line_pass: LinePass::new(&gpu, uniforms.layout()),
+            tonemap_pass: TonemapPass::new(&gpu, uniforms.layout()),
+            uniforms,
+            gpu,
+        }
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Draw a picture into a target.
+    ///
+    /// # Errors
+    /// [`RenderError::MeshTooLarge`]; the target then holds the background.
+    pub fn render(&mut self, target: &Target, picture: &Picture<'_>) -> Result<(), RenderError> {
+        // Bring the buffers up to date.
+        let upload = self.mesh_pass.prepare(&self.gpu, picture);
+        self.line_pass.prepare(&self.gpu, picture.overlay);
+        self.uniforms.write(&self.gpu.queue, target.size(), picture);
+        // Draw surfaces and lines into the linear picture.
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("picture"),
+            });
+        {
+            let mut pass = target.begin_linear(&mut encoder, picture.background);
+            pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+            if upload.is_ok() {
+                self.mesh_pass.draw(&mut pass, picture.view);
+            }
+            self.line_pass.draw(&mut pass);
+        }
+        // Turn it into display colours.
+        {
+            let mut pass = target.begin_display(&mut encoder);
+            pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+            self.tonemap_pass.draw(&self.gpu, &mut pass, target);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        upload
+    }
+}

@@ -1,0 +1,44 @@
+// From the linear picture to display colours: tone map where alpha says light, then the sRGB curve.
+// Twin of `crate::export::color`.
+
+@group(1) @binding(0) var picture: texture_2d<f32>;
+
+@vertex
+fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    // One triangle that covers the picture.
+    let corner = vec2<f32>(f32((index << 1u) & 2u), f32(index & 2u));
+    return vec4<f32>(corner * 2.0 - 1.0, 0.0, 1.0);
+}
+
+// Khronos PBR Neutral.
+fn neutral(light: vec3<f32>) -> vec3<f32> {
+    let start = 0.8 - 0.04;
+    let desaturation = 0.15;
+    let smallest = min(light.r, min(light.g, light.b));
+    let offset = select(0.04, smallest - 6.25 * smallest * smallest, smallest < 0.08);
+    let shifted = light - offset;
+    let peak = max(shifted.r, max(shifted.g, shifted.b));
+    if (peak < start) {
+        return shifted;
+    }
+    let span = 1.0 - start;
+    let new_peak = 1.0 - span * span / (peak + span - start);
+    let scaled = shifted * (new_peak / peak);
+    let share = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0);
+    return mix(scaled, vec3<f32>(new_peak), share);
+}
+
+fn srgb(linear: vec3<f32>) -> vec3<f32> {
+    let x = clamp(linear, vec3<f32>(0.0), vec3<f32>(1.0));
+    return select(1.055 * pow(x, vec3<f32>(1.0 / 2.4)) - 0.055, x * 12.92, x <= vec3<f32>(0.0031308));
+}
+
+@fragment
+fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let pixel = textureLoad(picture, vec2<i32>(at.xy), 0);
+    var mapped = pixel.rgb;
+    if (view.display.z < 0.5) {
+        mapped = neutral(pixel.rgb);
+    }
+    return vec4<f32>(srgb(mix(pixel.rgb, mapped, pixel.a)), 1.0);
+}

@@ -1,0 +1,107 @@
+//! What every pass knows of the picture, in one uniform buffer. Twin of `View` in view.wgsl.
+
+use std::num::NonZeroU64;
+
+use super::{super::theme, Picture};
+use crate::viewer::view::{ToneMap, ViewMode};
+
+/// Floats of `View`: a matrix, five vectors, nine ramp colours.
+const FLOAT_COUNT: usize = 16 + 5 * 4 + 9 * 4;
+const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
+/// Width of segments in points.
+const LINE_POINTS: f32 = 2.5;
+/// Opacity of element edges over light, and over the grey solid.
+const EDGE_OPACITY: [f32; 2] = [0.45, 0.8];
+
+/// The buffer and how passes see it.
+pub(super) struct ViewUniforms {
+    buffer: wgpu::Buffer,
+    layout: wgpu::BindGroupLayout,
+    bind_group: wgpu::BindGroup,
+}
+
+impl ViewUniforms {
+    /// An empty buffer.
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("view uniforms"),
+            size: BYTE_COUNT,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("view"),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+                ty: wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: NonZeroU64::new(BYTE_COUNT),
+                },
+                count: None,
+            }],
+        });
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("view"),
+            layout: &layout,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: buffer.as_entire_binding(),
+            }],
+        });
+        Self {
+            buffer,
+            layout,
+            bind_group,
+        }
+    }
+
+    /// Layout of group 0 of every pass.
+    pub(super) fn layout(&self) -> &wgpu::BindGroupLayout {
+        &self.layout
+    }
+
+    /// Group 0 of every pass.
+    pub(super) fn bind_group(&self) -> &wgpu::BindGroup {
+        &self.bind_group
+    }
+
+    /// Upload the uniforms of a picture.
+    pub(super) fn write(
+        &self,
+        queue: &wgpu::Queue,
+        [width, height]: [u32; 2],
+        picture: &Picture<'_>,
+    ) {
+        let (camera, view) = (picture.camera, picture.view);
+        let aspect = width as f32 / height as f32;
+        let flag = |on: bool| if on { 1.0 } else { 0.0 };
+        let eye = camera.eye();
+        let backward = camera.backward();
+        let [low, high] = picture.range;
+        let is_solid = view.mode == ViewMode::Elements;
+        let mut floats = Vec::with_capacity(FLOAT_COUNT);
+        floats.extend(camera.clip_from_frame(aspect).to_cols_array());
+        floats.extend([eye.x, eye.y, eye.z, flag(camera.orthographic)]);
+        floats.extend([backward.x, backward.y, backward.z, 0.0]);
+        floats.extend([low, high, flag(view.logarithmic), theme::BACK_LIGHTNESS]);
+        floats.extend([
+            f32::from(view.mode.shader_number()),
+            view.exposure_factor(),
+            flag(view.tone_map == ToneMap::None),
+            flag(view.texture_detail),
+        ]);
+        floats.extend([
+            width as f32,
+            height as f32,
+            LINE_POINTS * picture.pixels_per_point,
+            EDGE_OPACITY[usize::from(is_solid)],
+        ]);
+        for color in theme::ramp_stops() {
+            floats.extend([color.x, color.y, color.z, 1.0]);
+        }
+        debug_assert_eq!(floats.len(), FLOAT_COUNT);
+        queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&floats));
+    }
+}

@@ -1,0 +1,23 @@
+// What every pass knows of the picture. Twin of `ViewUniforms` in mod.rs; put in front of each pass's own text.
+struct View {
+    clip_from_frame: mat4x4<f32>,
+    // xyz: position of the eye; w: 1 where the projection is parallel.
+    eye: vec4<f32>,
+    // xyz: direction to the viewer, for parallel projection.
+    backward: vec4<f32>,
+    // Low and high end of the false colours; 1 where they are logarithmic; lightness of the backs.
+    range: vec4<f32>,
+    // Number of the mode; exposure factor; number of the tone map; 1 where textures show in detail.
+    display: vec4<f32>,
+    // Width and height in pixels; width of a line in pixels; opacity of the edges.
+    viewport: vec4<f32>,
+    // Display-linear colours of the false-colour ramp, evenly spaced.
+    ramp: array<vec4<f32>, 9>,
+};
+
+@group(0) @binding(0) var<uniform> view: View;
+
+// Lines lie a little before the surface that they belong to.
+fn lifted(clip: vec4<f32>) -> vec4<f32> {
+    return vec4<f32>(clip.xy, clip.z * 1.0006 + view.eye.w * 2e-5, clip.w);
+}

@@ -1,0 +1,88 @@
+//! Pictures to files, on a thread of their own.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::mpsc::Sender,
+    thread,
+};
+
+use image::{DynamicImage, Rgb32FImage, RgbaImage};
+
+use super::state::Severity;
+use crate::worker::Wake;
+
+/// A sentence from another thread.
+pub type Notice = (Severity, String);
+
+/// A picture on its way to a file.
+pub struct Saving {
+    /// Where to; `.exr` takes the radiance.
+    pub path: PathBuf,
+    /// Display colours.
+    pub display: RgbaImage,
+    /// Linear radiance.
+    pub radiance: Option<Rgb32FImage>,
+}
+
+impl Saving {
+    /// Write it, and say how that went.
+    pub fn start(self, notices: Sender<Notice>, wake: Wake) {
+        let failed = notices.clone();
+        let spawned = thread::Builder::new()
+            .name("picture".to_owned())
+            .spawn(move || {
+                // Nobody listens once the window is closed.
+                let _ = notices.send(self.write());
+                wake();
+            });
+        if let Err(error) = spawned {
+            let _ = failed.send((Severity::Error, format!("cannot save the picture: {error}")));
+        }
+    }
+
+    fn write(self) -> Notice {
+        let is_exr = self
+            .path
+            .extension()
+            .is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        let picture = match (self.radiance, is_exr) {
+            (Some(radiance), true) => DynamicImage::from(radiance),
+            (None, true) => {
+                let text = "this graphics adapter draws no linear pictures; save a PNG instead";
+                return (Severity::Error, text.to_owned());
+            }
+            (_, false) => DynamicImage::from(DynamicImage::from(self.display).into_rgb8()),
+        };
+        match picture.save(&self.path) {
+            Ok(()) => (Severity::Note, format!("saved {}", self.path.display())),
+            Err(error) => {
+                let text = format!("cannot save {}: {error}", self.path.display());
+                (Severity::Error, text)
+            }
+        }
+    }
+}
+
+/// A name in the pictures folder that is free: `scene_1.png` and on.
+pub fn free_path(scene: &str) -> PathBuf {
+    let folder = directories::UserDirs::new()
+        .and_then(|folders| folders.picture_dir().map(Path::to_owned))
+        .filter(|folder| folder.is_dir())
+        .unwrap_or_default();
+    let stem: String = scene
+        .trim_end_matches(".obj")
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() || "-_".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    let stem = if stem.is_empty() { "vecrad" } else { &stem };
+    (1_u32..)
+        .map(|number| folder.join(format!("{stem}_{number}.png")))
+        .find(|path| !path.exists())
+        .unwrap_or_else(|| folder.join("vecrad.png"))
+}

@@ -1,0 +1,190 @@
+//! What outlives a window: recent scenes, and a sidecar beside a scene with its camera, view and settings.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    camera::{Camera, UpAxis},
+    loader::SceneSource,
+    view::ViewSettings,
+};
+use crate::{scene::Frame, solver::SolveSettings};
+
+/// Scenes that the menu remembers.
+const MOST_RECENT: usize = 12;
+
+/// Recent scenes, the newest first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Recent {
+    /// The files.
+    pub files: Vec<PathBuf>,
+}
+
+impl Recent {
+    /// Put a file on top.
+    pub fn push(&mut self, path: &Path) {
+        // Whole paths: the next window may start in another folder.
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        self.files.retain(|held| *held != path);
+        self.files.insert(0, path);
+        self.files.truncate(MOST_RECENT);
+    }
+}
+
+/// Camera in world units, so that it stays right when the scene grows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct SavedCamera {
+    position: [f64; 3],
+    focal_point: [f64; 3],
+    view_angle_degrees: f32,
+    #[serde(default)]
+    parallel: bool,
+    #[serde(default)]
+    up: UpAxis,
+}
+
+/// The sidecar file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+struct Sidecar {
+    camera: Option<SavedCamera>,
+    view: ViewSettings,
+    settings: SolveSettings,
+}
+
+/// What a sidecar holds, in the scene's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Session {
+    /// The camera, where it is valid.
+    pub camera: Option<Camera>,
+    /// How the light is shown.
+    pub view: ViewSettings,
+    /// How it is computed.
+    pub settings: SolveSettings,
+}
+
+/// Where the sidecar of a scene is: the file's name with `.vecrad.toml` behind it.
+pub fn sidecar_path(source: &SceneSource) -> Option<PathBuf> {
+    let mut name = source.path()?.as_os_str().to_owned();
+    name.push(".vecrad.toml");
+    Some(PathBuf::from(name))
+}
+
+/// The sidecar as text.
+pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
+    let saved = Sidecar {
+        camera: session.camera.map(|camera| SavedCamera {
+            position: frame.to_world(camera.eye()).to_array(),
+            focal_point: frame.to_world(camera.pivot).to_array(),
+            view_angle_degrees: camera.fov_y_radians.to_degrees(),
+            parallel: camera.orthographic,
+            up: camera.up,
+        }),
+        view: session.view.clone(),
+        settings: session.settings.clone(),
+    };
+    toml::to_string_pretty(&saved).map_err(|error| error.to_string())
+}
+
+/// A sidecar's text in the scene's frame.
+pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
+    let saved: Sidecar = toml::from_str(text).map_err(|error| error.message().to_owned())?;
+    let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };
+    let camera = saved.camera.map(|camera| Camera {
+        fov_y_radians: camera.view_angle_degrees.to_radians(),
+        orthographic: camera.parallel,
+        ..Camera::looking(
+            in_frame(camera.position),
+            in_frame(camera.focal_point),
+            camera.up,
+        )
+    });
+    Ok(Session {
+        camera: camera.filter(Camera::is_valid),
+        view: saved.view,
+        settings: saved.settings,
+    })
+}
+
+/// Write the sidecar of a scene; returns where.
+///
+/// # Errors
+/// One sentence for people.
+pub fn save(source: &SceneSource, session: &Session, frame: &Frame) -> Result<PathBuf, String> {
+    let path = sidecar_path(source)
+        .ok_or("a built-in scene has no file to save settings beside; write it with 'vecrad scenes --write' first")?;
+    let text = to_toml(session, frame)?;
+    fs::write(&path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+    Ok(path)
+}
+
+/// The session beside a scene: `None` without a sidecar.
+pub fn load(source: &SceneSource, frame: &Frame) -> Option<Result<Session, String>> {
+    let path = sidecar_path(source)?;
+    let text = fs::read_to_string(&path).ok()?;
+    Some(
+        from_toml(&text, frame)
+            .map_err(|error| format!("{} was not used: {error}", path.display())),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_survives_its_file() {
+        let frame = Frame {
+            centre: DVec3::new(1000.0, -5.0, 3.0),
+            scale: 12.5,
+        };
+        let session = Session {
+            camera: Some(Camera::looking(
+                Vec3::new(10.0, 20.0, 30.0),
+                Vec3::new(1.0, 0.0, -2.0),
+                UpAxis::Z,
+            )),
+            view: ViewSettings {
+                exposure: 1.5,
+                fixed_range: Some([0.5, 20.0]),
+                ..ViewSettings::default()
+            },
+            settings: SolveSettings::draft(),
+        };
+        let text = to_toml(&session, &frame).expect("plain values");
+        let read = from_toml(&text, &frame).expect("our own text");
+        assert_eq!(read.view, session.view);
+        assert_eq!(read.settings, session.settings);
+        let (was, is) = (session.camera.expect("set"), read.camera.expect("valid"));
+        assert!((was.eye() - is.eye()).length() < 1e-3);
+        assert!((was.pivot - is.pivot).length() < 1e-3);
+    }
+
+    #[test]
+    fn a_broken_sidecar_is_one_sentence() {
+        let frame = Frame {
+            centre: DVec3::ZERO,
+            scale: 1.0,
+        };
+        let error = from_toml("settings = 3", &frame).expect_err("not a table");
+        assert!(!error.contains('\n'), "{error}");
+    }
+
+    #[test]
+    fn the_newest_file_is_on_top_once() {
+        let mut recent = Recent::default();
+        for name in ["/a.obj", "/b.obj", "/a.obj"] {
+            recent.push(Path::new(name));
+        }
+        assert_eq!(
+            recent.files,
+            [PathBuf::from("/a.obj"), PathBuf::from("/b.obj")]
+        );
+    }
+}

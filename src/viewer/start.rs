@@ -1,0 +1,220 @@
+//! Opening the window: options, the graphics device, and what can go wrong with it.
+
+use std::sync::{
+    Arc, Mutex, OnceLock, PoisonError,
+    atomic::{AtomicBool, Ordering},
+};
+
+use eframe::{egui, egui_wgpu};
+use glam::DVec3;
+
+use super::{
+    app::App,
+    camera::{Camera, UpAxis},
+    loader::SceneSource,
+    render::Gpu,
+    view::ViewSettings,
+};
+use crate::{
+    scene::{Frame, SceneOptions},
+    solver::SolveSettings,
+    worker::{RunOptions, Wake},
+};
+
+/// What the window opens with.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The scene; none shows how to open one.
+    pub source: Option<SceneSource>,
+    /// How it is read.
+    pub scene_options: SceneOptions,
+    /// What is computed.
+    pub settings: SolveSettings,
+    /// Limits of the run.
+    pub run: RunOptions,
+    /// How it is shown.
+    pub view: ViewSettings,
+    /// Exposure in EV instead of the automatic one.
+    pub exposure: Option<f32>,
+    /// From where.
+    pub camera: CameraRequest,
+}
+
+/// A camera in world units, as far as it was asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraRequest {
+    /// The eye.
+    pub position: Option<DVec3>,
+    /// What it looks at.
+    pub focal_point: Option<DVec3>,
+    /// Vertical angle of view in degrees.
+    pub view_angle_degrees: Option<f32>,
+    /// Which axis is up.
+    pub up: UpAxis,
+}
+
+impl CameraRequest {
+    /// A camera with what was asked for put in.
+    pub fn apply(&self, camera: Camera, frame: &Frame) -> Camera {
+        let mut camera = camera;
+        if self.up != camera.up {
+            let (eye, pivot) = (camera.eye(), camera.pivot);
+            camera = Camera {
+                fov_y_radians: camera.fov_y_radians,
+                ..Camera::looking(eye, pivot, self.up)
+            };
+        }
+        if self.position.is_some() || self.focal_point.is_some() {
+            let eye = self
+                .position
+                .map_or(camera.eye(), |point| frame.from_world(point));
+            let target = self
+                .focal_point
+                .map_or(camera.pivot, |point| frame.from_world(point));
+            camera = Camera {
+                fov_y_radians: camera.fov_y_radians,
+                orthographic: camera.orthographic,
+                ..Camera::looking(eye, target, camera.up)
+            };
+        }
+        if let Some(degrees) = self.view_angle_degrees {
+            camera.fov_y_radians = degrees.clamp(1.0, 170.0).to_radians();
+        }
+        camera
+    }
+}
+
+/// Why there is no window, or no more.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ViewerError {
+    /// Nothing can draw.
+    #[error(
+        "no graphics adapter can draw the window ({0}); try WGPU_BACKEND=gl, or install a Vulkan driver (on Debian: mesa-vulkan-drivers libvulkan1)"
+    )]
+    NoAdapter(String),
+    /// There is no display.
+    #[error(
+        "no display was found ({0}); set DISPLAY or WAYLAND_DISPLAY, or light the scene without a window: vecrad solve SCENE.obj --export lit.ply"
+    )]
+    NoDisplay(String),
+    /// The device went away.
+    #[error("the graphics device was lost ({0}); start again, with WGPU_BACKEND=gl if it repeats")]
+    DeviceLost(String),
+    /// Anything else.
+    #[error("the window failed: {0}")]
+    Other(String),
+}
+
+/// Open the window and stay until it is closed.
+///
+/// # Errors
+/// See [`ViewerError`].
+pub fn run(options: Options) -> Result<(), ViewerError> {
+    let faults = Arc::new(Faults::default());
+    let title = options.source.as_ref().map_or_else(
+        || "vecrad".to_owned(),
+        |source| format!("{} – vecrad", source.label()),
+    );
+    let app_faults = faults.clone();
+    let ended = eframe::run_native(
+        "vecrad",
+        native_options(&title),
+        Box::new(move |cc| Ok(Box::new(App::new(cc, options, app_faults)?))),
+    );
+    if let Some(reason) = faults.lost.get() {
+        return Err(ViewerError::DeviceLost(reason.clone()));
+    }
+    ended.map_err(|error| describe(&error))
+}
+
+fn native_options(title: &str) -> eframe::NativeOptions {
+    let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
+    setup.device_descriptor = Arc::new(Gpu::device_descriptor);
+    eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title(title)
+            .with_app_id("vecrad")
+            .with_inner_size([1360.0, 860.0])
+            .with_min_inner_size([720.0, 480.0])
+            .with_drag_and_drop(true),
+        wgpu_options: egui_wgpu::WgpuConfiguration {
+            wgpu_setup: setup.into(),
+            ..Default::default()
+        },
+        persist_window: true,
+        ..Default::default()
+    }
+}
+
+/// One sentence for what eframe says.
+fn describe(error: &eframe::Error) -> ViewerError {
+    let text = error.to_string().replace('\n', " ");
+    match error {
+        eframe::Error::Wgpu(_) => ViewerError::NoAdapter(text),
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => ViewerError::NoDisplay(text),
+        _ => ViewerError::Other(text),
+    }
+}
+
+/// What the graphics device complained of, from whatever thread.
+#[derive(Default)]
+pub struct Faults {
+    sentences: Mutex<Vec<String>>,
+    lost: OnceLock<String>,
+    is_lost: AtomicBool,
+}
+
+impl Faults {
+    /// Listen to a device, so that its errors become sentences and not the end of the program.
+    pub fn watch(self: &Arc<Self>, device: &wgpu::Device, wake: Wake) {
+        let (faults, waker) = (self.clone(), wake.clone());
+        device.set_device_lost_callback(move |reason, text| {
+            // Closing the window drops the device, too.
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                let _ = faults.lost.set(text.replace('\n', " "));
+                faults.is_lost.store(true, Ordering::Relaxed);
+                waker();
+            }
+        });
+        let faults = self.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            faults.push(match error {
+                wgpu::Error::OutOfMemory { .. } => {
+                    "the graphics adapter is out of memory; close other programs, or raise the smallest element area and reset".to_owned()
+                }
+                other => format!("the graphics adapter refused: {}", first_line(&other.to_string())),
+            });
+            wake();
+        }));
+    }
+
+    /// Whether the device is gone.
+    pub fn is_lost(&self) -> bool {
+        self.is_lost.load(Ordering::Relaxed)
+    }
+
+    /// Sentences since the last call.
+    pub fn take(&self) -> Vec<String> {
+        let mut held = self
+            .sentences
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut *held)
+    }
+
+    fn push(&self, sentence: String) {
+        self.sentences
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(sentence);
+    }
+}
+
+fn first_line(text: &str) -> String {
+    text.lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .take(3)
+        .collect::<Vec<_>>()
+        .join(": ")
+}

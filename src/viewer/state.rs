@@ -1,0 +1,330 @@
+//! What the window knows: the scene, the run, the view, the selection, the messages.
+
+use std::sync::Arc;
+
+use super::{
+    camera::{Camera, CameraRig},
+    loader::{LoadedScene, Loader},
+    pick::{ObjectLight, Pick, Probe},
+    session::Recent,
+    view::ViewSettings,
+};
+use crate::{
+    scene::SceneOptions,
+    solver::{Snapshot, SolveSettings, StepReport},
+    worker::{Effect, Event, RunOptions, StopReason},
+};
+
+/// Where a run stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum RunStatus {
+    /// Nothing runs.
+    #[default]
+    Idle,
+    /// The hierarchy is being built.
+    Preparing,
+    /// Light is being computed.
+    Running,
+    /// It rests until continued.
+    Paused,
+    /// It ended.
+    Finished(StopReason),
+    /// The solver failed with this message.
+    Failed(String),
+}
+
+impl RunStatus {
+    /// Whether the solver is at work.
+    pub fn is_busy(&self) -> bool {
+        matches!(self, Self::Preparing | Self::Running)
+    }
+
+    /// Whether there is something to go on with.
+    pub fn can_continue(&self) -> bool {
+        match self {
+            Self::Paused => true,
+            Self::Finished(reason) => reason.can_continue(),
+            _ => false,
+        }
+    }
+
+    /// For people.
+    pub fn label(&self) -> String {
+        match self {
+            Self::Idle => "No scene".to_owned(),
+            Self::Preparing => "Preparing".to_owned(),
+            Self::Running => "Computing light".to_owned(),
+            Self::Paused => "Paused".to_owned(),
+            Self::Finished(reason) => match reason {
+                StopReason::Converged => "Done".to_owned(),
+                StopReason::StepLimit => "Done: step limit reached".to_owned(),
+                StopReason::TimeLimit => "Stopped by the time limit".to_owned(),
+                StopReason::MemoryLimit => "Stopped by the memory limit".to_owned(),
+                StopReason::Requested => "Stopped".to_owned(),
+            },
+            Self::Failed(_) => "Failed".to_owned(),
+        }
+    }
+}
+
+/// The run as it is shown.
+#[derive(Default)]
+pub struct Run {
+    /// Where it stands.
+    pub status: RunStatus,
+    /// One report a step.
+    pub reports: Vec<StepReport>,
+    /// The newest snapshot.
+    pub snapshot: Option<Arc<Snapshot>>,
+    /// Seconds that preparing took.
+    pub prepare_secs: Option<f64>,
+    /// What the last change of settings did.
+    pub last_effect: Option<Effect>,
+}
+
+impl Run {
+    /// Take note of an event.
+    pub fn note(&mut self, event: Event) {
+        match event {
+            Event::Started => {
+                self.status = RunStatus::Preparing;
+                self.reports.clear();
+                self.prepare_secs = None;
+            }
+            Event::Prepared { seconds } => {
+                self.prepare_secs = Some(seconds);
+                if self.status == RunStatus::Preparing {
+                    self.status = RunStatus::Running;
+                }
+            }
+            Event::Stepped(report) => self.reports.push(report),
+            Event::Paused => self.status = RunStatus::Paused,
+            Event::Continued => self.status = RunStatus::Running,
+            Event::Finished(reason) => self.status = RunStatus::Finished(reason),
+            Event::Failed(message) => self.status = RunStatus::Failed(message),
+        }
+    }
+}
+
+/// How much a message matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// Something was done.
+    Note,
+    /// Something may not be as expected.
+    Warning,
+    /// Something was not done.
+    Error,
+}
+
+/// One sentence for the messages panel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// How much it matters.
+    pub severity: Severity,
+    /// The sentence.
+    pub text: String,
+}
+
+/// All messages, and how many were seen.
+#[derive(Clone, Debug, Default)]
+pub struct Messages {
+    /// The oldest first.
+    pub all: Vec<Message>,
+    /// How many of them were shown.
+    pub seen: usize,
+}
+
+impl Messages {
+    /// Messages kept; older ones go.
+    const KEPT: usize = 500;
+
+    /// Add a sentence.
+    pub fn push(&mut self, severity: Severity, text: impl Into<String>) {
+        let message = Message {
+            severity,
+            text: sentence(text.into()),
+        };
+        // What repeats itself every frame is said once.
+        if self.all.last() == Some(&message) {
+            return;
+        }
+        if self.all.len() >= Self::KEPT {
+            self.all.remove(0);
+            self.seen = self.seen.saturating_sub(1);
+        }
+        self.all.push(message);
+    }
+
+    /// Messages that nobody has seen.
+    pub fn unseen(&self) -> &[Message] {
+        &self.all[self.seen.min(self.all.len())..]
+    }
+}
+
+/// A first capital, as sentences have on screen.
+fn sentence(text: String) -> String {
+    let mut chars = text.chars();
+    match chars.next() {
+        Some(first) if first.is_lowercase() => first.to_uppercase().chain(chars).collect(),
+        _ => text,
+    }
+}
+
+/// The picked point and what was looked up for it.
+pub struct Selection {
+    /// The point.
+    pub pick: Pick,
+    /// The snapshot that the figures are of.
+    pub of: Option<Arc<Snapshot>>,
+    /// Light at the point.
+    pub probe: Option<Probe>,
+    /// Light over the object.
+    pub object_light: ObjectLight,
+    /// Index of the object.
+    pub object: Option<usize>,
+}
+
+/// What the panels hold open and half typed.
+#[derive(Clone, Debug)]
+pub struct PanelState {
+    /// Whether the side panels are shown.
+    pub shown: bool,
+    /// Whether the key sheet is open.
+    pub help: bool,
+    /// Whether the dialog for pictures is open.
+    pub picture: bool,
+    /// Whether the field for a path is open.
+    pub path: bool,
+    /// The typed path.
+    pub path_text: String,
+    /// The typed path of a picture.
+    pub picture_text: String,
+    /// Size of a picture in pixels.
+    pub picture_size: [u32; 2],
+    /// Whether the messages are to be opened.
+    pub show_messages: bool,
+    /// Units a second when flying, in frame units.
+    pub fly_speed: f32,
+}
+
+impl Default for PanelState {
+    fn default() -> Self {
+        Self {
+            shown: true,
+            help: false,
+            picture: false,
+            path: false,
+            path_text: String::new(),
+            picture_text: String::new(),
+            picture_size: [1920, 1080],
+            show_messages: false,
+            fly_speed: 30.0,
+        }
+    }
+}
+
+/// All of it.
+#[derive(Default)]
+pub struct State {
+    /// The scene that is shown.
+    pub loaded: Option<Arc<LoadedScene>>,
+    /// The scene that is being read.
+    pub loading: Option<Loader>,
+    /// The run.
+    pub run: Run,
+    /// Settings in force.
+    pub settings: SolveSettings,
+    /// Limits in force.
+    pub options: RunOptions,
+    /// How scenes are read.
+    pub scene_options: SceneOptions,
+    /// How the light is shown.
+    pub view: ViewSettings,
+    /// From where.
+    pub rig: CameraRig,
+    /// The picked point.
+    pub selection: Option<Selection>,
+    /// The selected cluster.
+    pub cluster: Option<usize>,
+    /// Ends of the false colours in use.
+    pub false_color_range: [f32; 2],
+    /// What was said.
+    pub messages: Messages,
+    /// Scenes opened before.
+    pub recent: Recent,
+    /// What the panels hold.
+    pub panels: PanelState,
+    /// The graphics adapter, for the statistics.
+    pub adapter_name: String,
+    /// Size of the viewport in pixels.
+    pub viewport_size: [u32; 2],
+}
+
+impl State {
+    /// Width over height of the viewport.
+    pub fn aspect(&self) -> f32 {
+        let [width, height] = self.viewport_size;
+        width.max(1) as f32 / height.max(1) as f32
+    }
+
+    /// Show the whole scene from the present direction.
+    pub fn frame_all(&mut self) {
+        let aspect = self.aspect();
+        if let Some(loaded) = &self.loaded {
+            self.rig.target.frame_box(loaded.min, loaded.max, aspect);
+        }
+    }
+
+    /// The view that a scene opens with: its own, or all of it.
+    pub fn opening_camera(&self, loaded: &LoadedScene) -> Camera {
+        loaded.viewpoint.unwrap_or_else(|| {
+            let mut camera = Camera {
+                up: self.rig.target.up,
+                ..Camera::default()
+            };
+            camera.frame_box(loaded.min, loaded.max, self.aspect());
+            camera
+        })
+    }
+
+    /// The last report.
+    pub fn report(&self) -> Option<&StepReport> {
+        self.run.reports.last()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_goes_through_its_states() {
+        let mut run = Run::default();
+        run.note(Event::Started);
+        assert!(run.status.is_busy());
+        run.note(Event::Prepared { seconds: 0.5 });
+        assert_eq!(run.status, RunStatus::Running);
+        run.note(Event::Stepped(StepReport::default()));
+        run.note(Event::Paused);
+        assert!(run.status.can_continue());
+        run.note(Event::Continued);
+        run.note(Event::Finished(StopReason::Converged));
+        assert!(!run.status.can_continue());
+        assert_eq!(run.reports.len(), 1);
+        run.note(Event::Started);
+        assert!(
+            run.reports.is_empty(),
+            "a new run begins with an empty plot"
+        );
+    }
+
+    #[test]
+    fn a_repeated_message_is_said_once() {
+        let mut messages = Messages::default();
+        messages.push(Severity::Error, "no room");
+        messages.push(Severity::Error, "no room");
+        assert_eq!(messages.unseen().len(), 1);
+        assert_eq!(messages.all[0].text, "No room");
+    }
+}

@@ -1,0 +1,113 @@
+//! Colours and spacing of the window and of pictures.
+
+use std::sync::LazyLock;
+
+use eframe::egui::{self, Color32};
+use glam::Vec3;
+
+/// Display-linear lightness behind the scene in saved pictures and in the dark theme.
+pub const PICTURE_BACKGROUND: f32 = 0.018;
+/// Display-linear lightness of the backs of one-sided faces.
+pub(super) const BACK_LIGHTNESS: f32 = 0.035;
+
+/// Colour of good news.
+pub const GOOD: Color32 = Color32::from_rgb(0x5b, 0xb9, 0x74);
+/// Colour of warnings.
+pub const WARNING: Color32 = Color32::from_rgb(0xe0, 0xa0, 0x30);
+/// Colour of errors.
+pub const BAD: Color32 = Color32::from_rgb(0xe5, 0x5b, 0x55);
+/// Colour of what is selected, in the window.
+pub const SELECTED: Color32 = Color32::from_rgb(0xff, 0xb4, 0x3a);
+
+/// Colour of lines that mark the selection, display-linear.
+pub const SELECTED_LINE: Vec3 = Vec3::new(1.0, 0.45, 0.04);
+/// Colours of the arrows along x, y and z, display-linear.
+pub const AXIS_LINES: [Vec3; 3] = [
+    Vec3::new(0.85, 0.09, 0.08),
+    Vec3::new(0.16, 0.6, 0.1),
+    Vec3::new(0.1, 0.27, 0.95),
+];
+
+/// The false-colour ramp, evenly spaced, as sRGB: dark blue over green to light yellow, even in lightness.
+/// The ends stay clear of the black and white that mark values outside the range.
+const RAMP: [[u8; 3]; 9] = [
+    [0x30, 0x12, 0x5a],
+    [0x41, 0x3a, 0x92],
+    [0x2f, 0x68, 0xa6],
+    [0x1f, 0x90, 0x9a],
+    [0x2f, 0xb0, 0x7a],
+    [0x7c, 0xc9, 0x4f],
+    [0xd0, 0xd0, 0x3a],
+    [0xf5, 0xa5, 0x30],
+    [0xe0, 0x4a, 0x2c],
+];
+
+/// The ramp, display-linear.
+pub(super) fn ramp_stops() -> &'static [Vec3; 9] {
+    static STOPS: LazyLock<[Vec3; 9]> = LazyLock::new(|| {
+        RAMP.map(|color| Vec3::from_array(color.map(|byte| linear(f32::from(byte) / 255.0))))
+    });
+    &STOPS
+}
+
+/// Display-linear colour of the ramp at 0…1.
+pub(super) fn ramp(t: f32) -> Vec3 {
+    let stops = ramp_stops();
+    let at = t.clamp(0.0, 1.0) * (stops.len() - 1) as f32;
+    let below = (at as usize).min(stops.len() - 2);
+    stops[below].lerp(stops[below + 1], at - below as f32)
+}
+
+/// The ramp at 0…1 for the window.
+pub fn ramp_color(t: f32) -> Color32 {
+    let [r, g, b] = ramp(t).to_array().map(|x| (encoded(x) * 255.0 + 0.5) as u8);
+    Color32::from_rgb(r, g, b)
+}
+
+fn linear(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+fn encoded(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// Colour of names beside figures: quieter than the figures, but easy to read.
+pub fn secondary_text(visuals: &egui::Visuals) -> Color32 {
+    if visuals.dark_mode {
+        Color32::from_gray(158)
+    } else {
+        Color32::from_gray(88)
+    }
+}
+
+/// Spacing and corners, for both themes.
+pub fn apply(ctx: &egui::Context) {
+    ctx.all_styles_mut(|style| {
+        style.spacing.item_spacing = egui::vec2(8.0, 6.0);
+        style.spacing.button_padding = egui::vec2(8.0, 4.0);
+        style.spacing.slider_width = 120.0;
+        style.spacing.interact_size.y = 22.0;
+        style.spacing.indent = 14.0;
+        style.visuals.striped = false;
+        style.visuals.weak_text_color = Some(secondary_text(&style.visuals));
+        style.visuals.indent_has_left_vline = false;
+    });
+}
+
+/// Colour of an axis in the window: x red, y green, z blue.
+pub fn axis_color(axis: usize) -> Color32 {
+    [
+        Color32::from_rgb(0xec, 0x5b, 0x56),
+        Color32::from_rgb(0x6c, 0xbf, 0x4c),
+        Color32::from_rgb(0x5b, 0x8f, 0xf5),
+    ][axis.min(2)]
+}

@@ -1,0 +1,249 @@
+//! What the viewport shows of the light, and how: mode, exposure, tone map, false-colour range, overlays.
+//! Nothing here changes what is computed.
+
+use serde::{Deserialize, Serialize};
+
+/// What the surfaces show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ViewMode {
+    /// Radiance towards the viewer: emitted, and reflected as ρE/π.
+    #[default]
+    Radiance,
+    /// Irradiance over π: the light without the surfaces' colours.
+    LightOnly,
+    /// Radiance from light that came straight from emitters.
+    DirectOnly,
+    /// Diffuse reflectance.
+    Reflectance,
+    /// Unit normals, −1…1 mapped to 0…1.
+    Normals,
+    /// The elements as a grey solid with their edges.
+    Elements,
+    /// Fronts blue, backs red.
+    FaceOrientation,
+    /// Luminance of irradiance, in false colour.
+    FalseIrradiance,
+    /// Luminance of radiance, in false colour.
+    FalseRadiance,
+    /// Estimated error of irradiance, in false colour.
+    Uncertainty,
+}
+
+impl ViewMode {
+    /// All modes in the order of their keys.
+    pub const ALL: [Self; 10] = [
+        Self::Radiance,
+        Self::LightOnly,
+        Self::DirectOnly,
+        Self::Reflectance,
+        Self::Normals,
+        Self::Elements,
+        Self::FaceOrientation,
+        Self::FalseIrradiance,
+        Self::FalseRadiance,
+        Self::Uncertainty,
+    ];
+
+    /// Label in menus.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Radiance => "Radiance",
+            Self::LightOnly => "Light only",
+            Self::DirectOnly => "Direct light",
+            Self::Reflectance => "Reflectance",
+            Self::Normals => "Normals",
+            Self::Elements => "Element mesh",
+            Self::FaceOrientation => "Face orientation",
+            Self::FalseIrradiance => "False colour: irradiance",
+            Self::FalseRadiance => "False colour: radiance",
+            Self::Uncertainty => "Uncertainty",
+        }
+    }
+
+    /// One sentence about it.
+    pub fn explanation(self) -> &'static str {
+        match self {
+            Self::Radiance => "What a camera sees: emitted and reflected light.",
+            Self::LightOnly => "Irradiance over π, without the colours of the surfaces.",
+            Self::DirectOnly => "Only light that comes straight from the emitters.",
+            Self::Reflectance => "Diffuse reflectance, without light.",
+            Self::Normals => "Direction of each surface as a colour.",
+            Self::Elements => "The mesh that carries the light.",
+            Self::FaceOrientation => "Fronts are blue, backs are red.",
+            Self::FalseIrradiance => "Luminance of the irradiance in W/m², as false colour.",
+            Self::FalseRadiance => "Luminance of the radiance in W/(sr·m²), as false colour.",
+            Self::Uncertainty => "Estimated error of the irradiance in W/m², as false colour.",
+        }
+    }
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Radiance => "radiance",
+            Self::LightOnly => "irradiance",
+            Self::DirectOnly => "direct",
+            Self::Reflectance => "reflectance",
+            Self::Normals => "normals",
+            Self::Elements => "elements",
+            Self::FaceOrientation => "orientation",
+            Self::FalseIrradiance => "false-irradiance",
+            Self::FalseRadiance => "false-radiance",
+            Self::Uncertainty => "error",
+        }
+    }
+
+    /// The mode of a name on the command line.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|mode| mode.name() == name)
+    }
+
+    /// Whether the colours are light, which exposure and tone map apply to.
+    pub fn is_light(self) -> bool {
+        matches!(self, Self::Radiance | Self::LightOnly | Self::DirectOnly)
+    }
+
+    /// Unit of the legend where the mode is a false-colour one.
+    pub fn false_color_unit(self) -> Option<&'static str> {
+        match self {
+            Self::FalseIrradiance | Self::Uncertainty => Some("W/m²"),
+            Self::FalseRadiance => Some("W/(sr·m²)"),
+            _ => None,
+        }
+    }
+
+    /// Number by which the shader knows the mode.
+    pub(crate) fn shader_number(self) -> u8 {
+        Self::ALL
+            .iter()
+            .position(|mode| *mode == self)
+            .map_or(0, |index| index as u8)
+    }
+}
+
+/// How exposed radiance becomes a display colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToneMap {
+    /// Highlights are compressed above 0.76, the rest keeps its colour (Khronos PBR Neutral).
+    #[default]
+    Neutral,
+    /// Clipped at 1.
+    None,
+}
+
+/// What a cluster box's colour tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClusterColor {
+    /// Power that leaves the cluster.
+    #[default]
+    Power,
+    /// Area of its patches.
+    Area,
+    /// How much its normals disagree.
+    Spread,
+    /// Links that it receives over.
+    Links,
+    /// Estimated error of these links.
+    Error,
+}
+
+impl ClusterColor {
+    /// All, in menu order.
+    pub const ALL: [Self; 5] = [
+        Self::Power,
+        Self::Area,
+        Self::Spread,
+        Self::Links,
+        Self::Error,
+    ];
+
+    /// Label in menus.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Power => "Power",
+            Self::Area => "Area",
+            Self::Spread => "Direction spread",
+            Self::Links => "Links received",
+            Self::Error => "Estimated error",
+        }
+    }
+}
+
+/// Which clusters are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ClusterOverlay {
+    /// Whether boxes are drawn at all.
+    pub shown: bool,
+    /// Level of the tree whose boxes are drawn; leaves above it are drawn, too.
+    pub level: u32,
+    /// What their colour tells.
+    pub color: ClusterColor,
+}
+
+impl Default for ClusterOverlay {
+    fn default() -> Self {
+        Self {
+            shown: false,
+            level: 3,
+            color: ClusterColor::Power,
+        }
+    }
+}
+
+/// Everything about the picture but the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ViewSettings {
+    /// What the surfaces show.
+    pub mode: ViewMode,
+    /// Exposure in EV: radiance is multiplied by 2^EV. Kept within [`ViewSettings::EXPOSURE_RANGE`].
+    pub exposure: f32,
+    /// Whether the exposure follows the light.
+    pub auto_exposure: bool,
+    /// Tone map of the light modes.
+    pub tone_map: ToneMap,
+    /// Whether false colours are spaced logarithmically.
+    pub logarithmic: bool,
+    /// Range of false colours; `None` follows the light.
+    pub fixed_range: Option<[f32; 2]>,
+    /// Whether the edges of the elements are drawn over the light.
+    pub edges: bool,
+    /// Whether backs of one-sided faces are drawn, dark, instead of being looked through.
+    pub backs: bool,
+    /// Whether textures show in detail, and not only as the mean of each element.
+    pub texture_detail: bool,
+    /// The cluster boxes.
+    pub clusters: ClusterOverlay,
+}
+
+impl ViewSettings {
+    /// Exposures beyond this leave the range of the picture's half floats.
+    pub const EXPOSURE_RANGE: std::ops::RangeInclusive<f32> = -20.0..=20.0;
+
+    /// What radiance is multiplied by.
+    pub fn exposure_factor(&self) -> f32 {
+        self.exposure
+            .clamp(*Self::EXPOSURE_RANGE.start(), *Self::EXPOSURE_RANGE.end())
+            .exp2()
+    }
+}
+
+impl Default for ViewSettings {
+    fn default() -> Self {
+        Self {
+            mode: ViewMode::Radiance,
+            exposure: 0.0,
+            auto_exposure: true,
+            tone_map: ToneMap::Neutral,
+            logarithmic: false,
+            fixed_range: None,
+            edges: false,
+            backs: false,
+            texture_detail: true,
+            clusters: ClusterOverlay::default(),
+        }
+    }
+}

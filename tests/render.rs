@@ -1,0 +1,302 @@
+//! Pictures of a small scene, drawn without a window, have the colours that the light says.
+
+#![cfg(feature = "viewer")]
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use image::RgbaImage;
+use vecrad::{
+    export::{ColorOptions, ToneMap as ExportToneMap},
+    scene::{Material, Scene, SceneBuilder, SceneOptions},
+    solver::{ClusterBox, DisplayMesh, Snapshot, VertexLight},
+    viewer::{
+        camera::{Camera, UpAxis},
+        render::headless::{self, HeadlessError, HeadlessPicture},
+        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+    },
+};
+
+const SIZE: [u32; 2] = [128, 128];
+/// Steps of 255 by which a rounded half float may be off after the sRGB curve.
+const TOLERANCE: i32 = 2;
+
+/// A red wall that fills the left half of a picture taken from +z, and a green one in the right half that shows its back.
+fn scene() -> Arc<Scene> {
+    let mut builder = SceneBuilder::default();
+    let colors = [Vec3::new(0.8, 0.1, 0.1), Vec3::new(0.1, 0.8, 0.1)];
+    for (index, color) in colors.into_iter().enumerate() {
+        let material = builder.push_material(Material::plain("wall", color, Vec3::ZERO));
+        let left = index as f64 - 1.0;
+        let corners = [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)]
+            .map(|(x, y)| builder.push_position(DVec3::new(left + x, y, 0.0)));
+        let triangles: [[usize; 3]; 2] = match index {
+            0 => [[0, 1, 2], [0, 2, 3]],
+            _ => [[0, 2, 1], [0, 3, 2]],
+        };
+        for triangle in triangles {
+            builder.push_triangle(triangle.map(|corner| corners[corner]), material);
+        }
+    }
+    Arc::new(builder.finish(&SceneOptions::default()).expect("two walls"))
+}
+
+/// The scene's own triangles under even light.
+fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
+    let mut mesh = DisplayMesh::default();
+    for id in scene.triangle_ids() {
+        let first = mesh.positions.len() as u32;
+        let surface = scene.surfaces[id.index()];
+        for corner in scene.corners(id) {
+            mesh.positions.push(corner);
+            mesh.normals.push(surface.area_vector.normalize_or_zero());
+            mesh.reflectance.push(surface.reflectance);
+            mesh.emission.push(surface.emission);
+        }
+        mesh.indices.push([first, first + 1, first + 2]);
+        mesh.triangle_of.push(id.0);
+        mesh.is_back.push(false);
+        mesh.element_of.push(id.0);
+    }
+    let count = mesh.positions.len();
+    let root = ClusterBox {
+        min: Vec3::new(-30.0, -30.0, -1.0),
+        max: Vec3::new(30.0, 30.0, 1.0),
+        level: 0,
+        parent: u32::MAX,
+        patch_count: 4,
+        area: 1.0,
+        power: 1.0,
+        direction_spread: 0.0,
+        link_count: 0,
+        error: 0.0,
+        face_power: [0.0; 6],
+    };
+    Snapshot {
+        step: 1,
+        mesh: Arc::new(mesh),
+        light: Arc::new(VertexLight {
+            irradiance: vec![irradiance; count],
+            direct: vec![irradiance * 0.5; count],
+            uncertainty: vec![0.25; count],
+        }),
+        clusters: Arc::new(vec![root]),
+    }
+}
+
+fn camera() -> Camera {
+    let eye = Vec3::new(0.0, 0.0, 130.0);
+    Camera::looking(eye, Vec3::ZERO, UpAxis::Y)
+}
+
+/// Exposure 0 and no tone map, so that colours can be computed by hand.
+fn plain(mode: ViewMode) -> ViewSettings {
+    ViewSettings {
+        mode,
+        auto_exposure: false,
+        tone_map: ToneMap::None,
+        ..ViewSettings::default()
+    }
+}
+
+/// A picture, or `None` on a machine that cannot draw; CI must be able to.
+fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<HeadlessPicture> {
+    match headless::picture(scene, snapshot, &camera(), view, SIZE) {
+        Ok(picture) => Some(picture),
+        Err(HeadlessError::NoAdapter(reason)) => {
+            assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
+            eprintln!("skipped, no graphics adapter: {reason}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// The pixel in the middle of the left wall.
+fn left(picture: &RgbaImage) -> [u8; 3] {
+    let [r, g, b, _] = picture.get_pixel(40, 64).0;
+    [r, g, b]
+}
+
+/// The pixel in the middle of the right wall.
+fn right(picture: &RgbaImage) -> [u8; 3] {
+    let [r, g, b, _] = picture.get_pixel(88, 64).0;
+    [r, g, b]
+}
+
+fn assert_near(seen: [u8; 3], expected: [u8; 3], what: &str) {
+    let near = seen
+        .iter()
+        .zip(expected)
+        .all(|(a, b)| (i32::from(*a) - i32::from(b)).abs() <= TOLERANCE);
+    assert!(near, "{what}: {seen:?} instead of {expected:?}");
+}
+
+#[test]
+fn light_has_the_colours_of_the_exported_vertices() {
+    let scene = scene();
+    let irradiance = Vec3::new(3.0, 2.0, 1.0);
+    let snapshot = snapshot(&scene, irradiance);
+    let reflectance = Vec3::new(0.8, 0.1, 0.1);
+    let radiance = reflectance * irradiance / std::f32::consts::PI;
+    for (exposure, tone_map, export_tone_map) in [
+        (0.0, ToneMap::None, ExportToneMap::None),
+        (0.0, ToneMap::Neutral, ExportToneMap::Neutral),
+        (2.5, ToneMap::Neutral, ExportToneMap::Neutral),
+        (-3.0, ToneMap::None, ExportToneMap::None),
+    ] {
+        let export = ColorOptions {
+            exposure_ev: exposure,
+            tone_map: export_tone_map,
+        };
+        let mut view = plain(ViewMode::Radiance);
+        view.exposure = exposure;
+        view.tone_map = tone_map;
+        let Some(picture) = draw(&snapshot, &scene, &view) else {
+            return;
+        };
+        let what = format!("{tone_map:?} at {exposure} EV");
+        assert_near(left(&picture.display), export.encode(radiance), &what);
+    }
+}
+
+#[test]
+fn light_modes_show_what_they_say() {
+    let scene = scene();
+    let irradiance = Vec3::splat(1.0);
+    let snapshot = snapshot(&scene, irradiance);
+    let plain_color = ColorOptions {
+        exposure_ev: 0.0,
+        tone_map: ExportToneMap::None,
+    };
+    let reflectance = Vec3::new(0.8, 0.1, 0.1);
+    let over_pi = 1.0 / std::f32::consts::PI;
+    for (mode, expected) in [
+        (ViewMode::LightOnly, irradiance * over_pi),
+        (ViewMode::DirectOnly, reflectance * 0.5 * over_pi),
+        (ViewMode::Reflectance, reflectance),
+    ] {
+        let Some(picture) = draw(&snapshot, &scene, &plain(mode)) else {
+            return;
+        };
+        assert_near(
+            left(&picture.display),
+            plain_color.encode(expected),
+            mode.label(),
+        );
+    }
+}
+
+#[test]
+fn backs_are_looked_through_unless_shown() {
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::splat(2.0));
+    let mut view = plain(ViewMode::Radiance);
+    let Some(hidden) = draw(&snapshot, &scene, &view) else {
+        return;
+    };
+    let corner = hidden.display.get_pixel(1, 1).0;
+    assert_near(
+        right(&hidden.display),
+        [corner[0], corner[1], corner[2]],
+        "the background behind a back",
+    );
+    view.backs = true;
+    let shown = draw(&snapshot, &scene, &view).expect("drawn before");
+    assert_ne!(right(&shown.display), right(&hidden.display));
+    assert_eq!(left(&shown.display), left(&hidden.display));
+    // Face orientation shows both, fronts blue and backs red.
+    let faces = draw(&snapshot, &scene, &plain(ViewMode::FaceOrientation)).expect("drawn before");
+    let ([r, _, b], [back_r, _, back_b]) = (left(&faces.display), right(&faces.display));
+    assert!(b > r && back_r > back_b, "{:?}", left(&faces.display));
+}
+
+#[test]
+fn false_colours_mark_what_is_out_of_range() {
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::splat(2.0));
+    let with_range = |low, high, logarithmic| ViewSettings {
+        fixed_range: Some([low, high]),
+        logarithmic,
+        ..plain(ViewMode::FalseIrradiance)
+    };
+    for (range, expected) in [
+        (with_range(0.1, 1.0, false), [255; 3]),
+        (with_range(3.0, 9.0, false), [0; 3]),
+        (with_range(0.1, 1.0, true), [255; 3]),
+        (with_range(3.0, 9.0, true), [0; 3]),
+    ] {
+        let Some(picture) = draw(&snapshot, &scene, &range) else {
+            return;
+        };
+        assert_near(left(&picture.display), expected, "out of range");
+    }
+    let inside = draw(&snapshot, &scene, &with_range(0.0, 4.0, false)).expect("drawn before");
+    // The middle of the ramp is green.
+    let [r, g, b] = left(&inside.display);
+    assert!(g > r && g > b, "{r} {g} {b}");
+    let middle = draw(&snapshot, &scene, &with_range(1.0, 4.0, true)).expect("drawn before");
+    assert_near(
+        left(&middle.display),
+        [r, g, b],
+        "2 is the middle of 1 to 4",
+    );
+}
+
+#[test]
+fn linear_picture_holds_radiance_at_any_exposure() {
+    let scene = scene();
+    let irradiance = Vec3::new(30.0, 20.0, 10.0);
+    let snapshot = snapshot(&scene, irradiance);
+    let expected = Vec3::new(0.8, 0.1, 0.1) * irradiance / std::f32::consts::PI;
+    for exposure in [-4.0, 0.0, 3.0] {
+        let mut view = plain(ViewMode::Radiance);
+        view.exposure = exposure;
+        let Some(picture) = draw(&snapshot, &scene, &view) else {
+            return;
+        };
+        let Some(radiance) = picture.radiance else {
+            return;
+        };
+        let seen = Vec3::from_array(radiance.get_pixel(40, 64).0);
+        // A half float has 11 bits.
+        let near = (seen - expected).abs().cmple(expected * 2e-3).all();
+        assert!(near, "{seen} instead of {expected} at {exposure} EV");
+    }
+}
+
+#[test]
+fn cluster_boxes_are_drawn_over_the_surfaces() {
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::splat(1.0));
+    let mut view = plain(ViewMode::LightOnly);
+    let Some(without) = draw(&snapshot, &scene, &view) else {
+        return;
+    };
+    view.clusters = ClusterOverlay {
+        shown: true,
+        level: 0,
+        ..ClusterOverlay::default()
+    };
+    let with = draw(&snapshot, &scene, &view).expect("drawn before");
+    let changed = without
+        .display
+        .pixels()
+        .zip(with.display.pixels())
+        .filter(|(a, b)| a != b)
+        .count();
+    // Four long edges before and four behind, in a picture of 128 pixels; surfaces hide some of them.
+    assert!((100..3000).contains(&changed), "{changed} pixels");
+}
+
+#[test]
+fn a_picture_that_is_too_large_is_one_sentence() {
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::ONE);
+    let view = plain(ViewMode::Radiance);
+    match headless::picture(&scene, &snapshot, &camera(), &view, [1_000_000, 2]) {
+        Err(HeadlessError::NoAdapter(_)) => {}
+        Err(error) => assert!(error.to_string().contains("too large"), "{error}"),
+        Ok(_) => panic!("no adapter takes a million pixels on a side"),
+    }
+}

@@ -1,0 +1,234 @@
+//! The window by its labels, without a graphics adapter: panels ask, the worker obeys, the state follows.
+
+#![cfg(feature = "viewer")]
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use eframe::egui;
+use egui_kittest::{Harness, kittest::Queryable as _};
+use vecrad::{
+    solver::SolveSettings,
+    viewer::{
+        Options,
+        action::Action,
+        app::App,
+        loader::SceneSource,
+        start::Faults,
+        state::{RunStatus, Severity},
+        view::ViewMode,
+    },
+    worker::{Effect, StopReason},
+};
+
+/// Longest wait for a small scene on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn window(options: Options) -> Harness<'static, App> {
+    Harness::builder()
+        .with_size([1280.0, 900.0])
+        .build_eframe(move |cc| {
+            App::new(cc, options, Arc::new(Faults::default())).expect("threads can be had")
+        })
+}
+
+/// A window that lights the two plates: a moment's work.
+fn plates() -> Harness<'static, App> {
+    let mut harness = window(Options {
+        source: Some(SceneSource::Builtin("plates".to_owned())),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    harness
+}
+
+/// Frames until something holds.
+fn wait_for(harness: &mut Harness<'static, App>, holds: impl Fn(&App) -> bool) {
+    let begin = Instant::now();
+    while !holds(harness.state()) {
+        assert!(
+            begin.elapsed() < PATIENCE,
+            "{:?}",
+            harness.state().state.run.status
+        );
+        std::thread::sleep(Duration::from_millis(10));
+        harness.step();
+    }
+    harness.run_steps(3);
+}
+
+fn perform(harness: &mut Harness<'static, App>, action: Action) {
+    let ctx = harness.ctx.clone();
+    harness.state_mut().perform(&ctx, action);
+    harness.run_steps(2);
+}
+
+#[test]
+fn an_empty_window_says_what_to_do() {
+    let mut harness = window(Options::default());
+    harness.run_steps(2);
+    harness.get_by_label("Open a scene to light it");
+    harness.get_by_label("Open…");
+    assert_eq!(harness.state().state.run.status, RunStatus::Idle);
+}
+
+#[test]
+fn a_scene_is_read_lit_and_finished() {
+    let harness = plates();
+    let state = &harness.state().state;
+    assert_eq!(state.run.reports.len() as u32, state.settings.max_steps);
+    let snapshot = state.run.snapshot.as_ref().expect("there is light");
+    assert!(
+        snapshot
+            .light
+            .irradiance
+            .iter()
+            .all(|light| light.is_finite())
+    );
+    harness.get_by_label("Reset");
+    harness.get_by_label("Statistics");
+}
+
+#[test]
+fn a_finer_threshold_refines_and_another_method_restarts() {
+    let mut harness = plates();
+    let generation_of = |harness: &Harness<'static, App>| harness.state().state.run.reports.len();
+    let steps = generation_of(&harness);
+    let mut finer = harness.state().state.settings.clone();
+    finer.epsilon *= 0.5;
+    perform(&mut harness, Action::Settings(finer.clone()));
+    assert_eq!(harness.state().state.run.last_effect, Some(Effect::Refines));
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+            && app.state.run.reports.len() > steps
+    });
+    assert!(
+        generation_of(&harness) > steps,
+        "the steps before are still there"
+    );
+    let mut other = finer;
+    other.seed += 1;
+    perform(&mut harness, Action::Settings(other));
+    assert_eq!(
+        harness.state().state.run.last_effect,
+        Some(Effect::Restarts)
+    );
+    harness.get_by_label_contains("began the light again");
+}
+
+#[test]
+fn presets_are_chosen_by_their_button() {
+    let mut harness = plates();
+    harness.get_by_label("Normal").click();
+    harness.run_steps(3);
+    assert_eq!(
+        harness.state().state.settings.epsilon,
+        SolveSettings::normal().epsilon
+    );
+}
+
+#[test]
+fn pause_and_continue_never_begin_again() {
+    let mut harness = window(Options {
+        source: Some(SceneSource::Builtin("room-1022".to_owned())),
+        settings: SolveSettings::finest(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| !app.state.run.reports.is_empty());
+    perform(&mut harness, Action::PauseContinue);
+    wait_for(&mut harness, |app| {
+        app.state.run.status == RunStatus::Paused
+    });
+    let steps = harness.state().state.run.reports.len();
+    harness.get_by_label("Continue").click();
+    wait_for(&mut harness, |app| {
+        app.state.run.status == RunStatus::Running
+    });
+    assert!(harness.state().state.run.reports.len() >= steps);
+    perform(&mut harness, Action::Stop);
+    wait_for(&mut harness, |app| {
+        app.state.run.status == RunStatus::Finished(StopReason::Requested)
+    });
+}
+
+#[test]
+fn view_keys_change_the_view() {
+    let mut harness = plates();
+    harness.key_press(egui::Key::M);
+    harness.run_steps(2);
+    assert!(harness.state().state.view.edges);
+    harness.key_press(egui::Key::B);
+    harness.run_steps(2);
+    assert!(harness.state().state.view.clusters.shown);
+    harness.key_press(egui::Key::Equals);
+    harness.run_steps(2);
+    let view = &harness.state().state.view;
+    assert!(
+        !view.auto_exposure,
+        "a hand on the exposure ends the automatic"
+    );
+    perform(&mut harness, Action::Mode(ViewMode::FalseIrradiance));
+    harness.get_by_label("Fixed range");
+    harness.key_press(egui::Key::F1);
+    harness.run_steps(2);
+    harness.get_by_label("Keys and mouse");
+    harness.get_by_label("Pause or continue");
+}
+
+#[test]
+fn a_click_picks_and_shows_the_light() {
+    let mut harness = plates();
+    let scene = harness.get_by_label("Scene").rect();
+    let at = scene.center();
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.drop_at(at);
+    harness.run_steps(3);
+    // The middle of the opening view may be a gap between the plates: then nothing is picked.
+    if harness.state().state.selection.is_some() {
+        harness.get_by_label("Position");
+    }
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(2);
+    assert!(harness.state().state.selection.is_none());
+}
+
+#[test]
+fn a_file_that_is_not_there_is_a_message() {
+    let mut harness = plates();
+    let source = SceneSource::File("/no/such/scene.obj".into());
+    perform(&mut harness, Action::Load(source));
+    wait_for(&mut harness, |app| app.state.loading.is_none());
+    let state = &harness.state().state;
+    let last = state.messages.all.last().expect("a message");
+    assert_eq!(last.severity, Severity::Error);
+    assert!(state.loaded.is_some(), "the scene before stays");
+}
+
+#[test]
+fn reload_keeps_camera_and_settings() {
+    let mut harness = plates();
+    harness.state_mut().state.rig.target.yaw = 1.25;
+    perform(&mut harness, Action::ExposureBy(0.5));
+    let exposure = harness.state().state.view.exposure;
+    perform(&mut harness, Action::Reload);
+    wait_for(&mut harness, |app| {
+        app.state.loading.is_none() && matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    let state = &harness.state().state;
+    assert_eq!(state.rig.target.yaw, 1.25);
+    assert_eq!(state.view.exposure, exposure);
+}
+
+#[test]
+fn an_idle_window_asks_for_no_frames() {
+    let mut harness = plates();
+    // Ends only when nothing asks for another frame; a restless window exceeds the steps and panics.
+    harness.run();
+}
