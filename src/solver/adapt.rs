@@ -116,21 +116,15 @@ impl DirectField {
     ) -> Option<u64> {
         let mut ray_count = 0;
         for _ in 0..MOST_ROUNDS {
-            ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed);
-            if cancel.is_cancelled() {
-                return None;
-            }
+            ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
-            ray_count += self.probe_centres(rays, hierarchy, limits, mean);
-            if cancel.is_cancelled() {
-                return None;
-            }
+            ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, limits, mean);
             if !hierarchy.mesh.divide(&wanted) {
                 break;
             }
         }
-        ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed);
+        ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
         Some(ray_count)
     }
 
@@ -145,24 +139,30 @@ impl DirectField {
         hierarchy: &Hierarchy,
         samples: u32,
         seed: u64,
-    ) -> u64 {
+        cancel: &Cancel,
+    ) -> Option<u64> {
         let first = self.vertices.len();
         let count = hierarchy.mesh.vertices.len();
         if first == count {
-            return 0;
+            return Some(0);
         }
         self.vertices.resize(count, DirectLight::default());
         self.ends.resize(count, None);
         let receivers = vertex_receivers(hierarchy, first);
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
-        self.shoot(rays, &receivers, 0..probing, seed);
+        self.shoot(rays, &receivers, 0..probing, seed, cancel);
         let disputed = self.disputed(hierarchy, first);
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
             .filter(|&(vertex, _)| disputed[vertex as usize - first])
             .collect();
-        self.shoot(rays, &rest, probing..samples, seed);
+        self.shoot(rays, &rest, probing..samples, seed, cancel);
+        if cancel.is_cancelled() {
+            self.vertices.truncate(first);
+            self.ends.truncate(first);
+            return None;
+        }
         let mut is_known = vec![false; count - first];
         for &(vertex, _) in &receivers {
             is_known[vertex as usize - first] = true;
@@ -172,10 +172,12 @@ impl DirectField {
                 self.ends[index] = hierarchy.mesh.vertices[index].ends;
             }
         }
-        self.vertices[first..]
-            .iter()
-            .map(|light| u64::from(light.shot))
-            .sum()
+        Some(
+            self.vertices[first..]
+                .iter()
+                .map(|light| u64::from(light.shot))
+                .sum(),
+        )
     }
 
     fn shoot(
@@ -184,13 +186,15 @@ impl DirectField {
         receivers: &[(u32, Receiver)],
         samples: std::ops::Range<u32>,
         seed: u64,
+        cancel: &Cancel,
     ) {
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
         let mut known: Vec<DirectLight> = receivers
             .iter()
             .map(|&(vertex, _)| self.vertices[vertex as usize])
             .collect();
-        self.lights.shoot(rays, &places, samples, seed, &mut known);
+        self.lights
+            .shoot(rays, &places, samples, seed, &mut known, cancel);
         for (&(vertex, _), light) in receivers.iter().zip(known) {
             self.vertices[vertex as usize] = light;
         }
@@ -242,7 +246,8 @@ impl DirectField {
         hierarchy: &Hierarchy,
         limits: Limits,
         mean: f32,
-    ) -> u64 {
+        cancel: &Cancel,
+    ) -> Option<u64> {
         self.centres.resize(hierarchy.mesh.elements.len(), None);
         let unknown: Vec<usize> = hierarchy
             .mesh
@@ -271,13 +276,17 @@ impl DirectField {
             0..limits.shadow_samples,
             limits.seed,
             &mut lights,
+            cancel,
         );
+        if cancel.is_cancelled() {
+            return None;
+        }
         let mut ray_count = 0;
         for (leaf, light) in unknown.into_iter().zip(lights) {
             ray_count += u64::from(light.shot);
             self.centres[leaf] = Some(light);
         }
-        ray_count
+        Some(ray_count)
     }
 
     /// Leaves whose corners do not tell what lies between.

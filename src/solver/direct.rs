@@ -9,6 +9,7 @@ use std::{f32::consts::PI, ops::Range};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::Cancel;
 use crate::{
     geometry::{Random, RayTree, low_discrepancy_2d, point_irradiance, triangle_point},
     hierarchy::{Hierarchy, Patch},
@@ -70,6 +71,7 @@ impl Lights {
     }
 
     /// Shoot a range of the shadow rays of many points, and add what they find to what is known of each.
+    /// When cancelled, some points are left out and all must be asked again.
     pub(super) fn shoot(
         &self,
         rays: &RayTree,
@@ -77,13 +79,16 @@ impl Lights {
         samples: Range<u32>,
         seed: u64,
         known: &mut [DirectLight],
+        cancel: &Cancel,
     ) {
         known
             .par_iter_mut()
             .zip(receivers)
             .with_min_len(16)
             .for_each_init(Vec::new, |sums, (light, receiver)| {
-                self.shoot_at(rays, receiver, samples.clone(), seed, sums, light)
+                if !cancel.is_cancelled() {
+                    self.shoot_at(rays, receiver, samples.clone(), seed, sums, light);
+                }
             });
     }
 

@@ -301,11 +301,11 @@ impl Solver {
             if !self.hierarchy.mesh.divide(&refinement.wanted) {
                 break;
             }
+            self.extend_to_new_elements();
             if let Some(field) = &mut self.direct {
                 let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
-                self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed);
+                self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
             }
-            self.extend_to_new_elements();
         }
         self.pull();
         Some(())
