@@ -12,7 +12,11 @@ use vecrad::{
     solver::{ClusterBox, DisplayMesh, Snapshot, VertexLight},
     viewer::{
         camera::{Camera, UpAxis},
-        render::headless::{self, HeadlessError, HeadlessPicture},
+        clusters,
+        render::{
+            Overlay, Picture, Renderer, Target,
+            headless::{self, HeadlessError, HeadlessPicture},
+        },
         view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
     },
 };
@@ -287,6 +291,48 @@ fn cluster_boxes_are_drawn_over_the_surfaces() {
         .count();
     // Four long edges before and four behind, in a picture of 128 pixels; surfaces hide some of them.
     assert!((100..3000).contains(&changed), "{changed} pixels");
+}
+
+#[test]
+fn the_selected_cluster_is_outlined() {
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::splat(1.0));
+    let gpu = match headless::open_gpu() {
+        Ok(gpu) => gpu,
+        Err(reason) => {
+            assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
+            return;
+        }
+    };
+    let mut renderer = Renderer::new(gpu);
+    let target = Target::new(renderer.gpu(), SIZE).expect("a small picture");
+    let overlay = Overlay {
+        boxes: Arc::default(),
+        segments: Arc::new(clusters::outline(
+            &snapshot.clusters[0],
+            Vec3::new(0.0, 0.0, 1.0),
+        )),
+    };
+    let view = plain(ViewMode::LightOnly);
+    let picture = Picture {
+        scene: &scene,
+        mesh: &snapshot.mesh,
+        light: &snapshot.light,
+        camera: &camera(),
+        view: &view,
+        range: [0.0, 1.0],
+        overlay: &overlay,
+        background: Vec3::ZERO,
+        pixels_per_point: 1.0,
+    };
+    renderer.render(&target, &picture).expect("a small mesh");
+    let display = target.read_display(renderer.gpu()).expect("read back");
+    let is_blue = |x, y| display.get_pixel(x, y).0[2] > 200 && display.get_pixel(x, y).0[0] < 60;
+    // Each of the four sides crosses one of these lines through the middle, at about 35 and 93.
+    let across = (0..128).filter(|x| is_blue(*x, 64)).count();
+    let down = (0..128).filter(|y| is_blue(64, *y)).count();
+    assert!((2..20).contains(&across), "{across}");
+    assert!((2..20).contains(&down), "{down}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Keys and what they do: one table, read by the window and by the key sheet.
 
-use eframe::egui::{InputState, Key, Modifiers};
+use eframe::egui::{Event, InputState, Key, Modifiers};
 
 use super::{
     action::Action,
@@ -42,7 +42,7 @@ pub struct Binding {
     pub key: Key,
     /// Modifiers that must be held.
     pub modifiers: Modifiers,
-    /// Whether Shift is looked at: `?` is typed with it on some keyboards.
+    /// Whether it does not matter if Shift is held: `?` and `+` are typed with it on some keyboards.
     pub ignores_shift: bool,
     /// Where it stands on the sheet.
     pub group: Group,
@@ -53,6 +53,20 @@ pub struct Binding {
 }
 
 impl Binding {
+    /// Whether a key press is meant. Held keys repeat only what is done in steps.
+    fn fits(&self, key: Key, modifiers: Modifiers, is_repeat: bool) -> bool {
+        let goes_in_steps = matches!(
+            self.action,
+            Action::ExposureBy(_) | Action::ClusterLevelBy(_)
+        );
+        let shift = self.ignores_shift || modifiers.shift == self.modifiers.shift;
+        key == self.key
+            && shift
+            && modifiers.command == self.modifiers.command
+            && modifiers.alt == self.modifiers.alt
+            && (goes_in_steps || !is_repeat)
+    }
+
     /// The key as people write it.
     pub fn keys(&self) -> String {
         let mut text = String::new();
@@ -231,20 +245,27 @@ pub fn bindings() -> Vec<Binding> {
     all
 }
 
-/// The actions whose keys were pressed; the keys are used up.
+/// The actions whose keys were pressed, with exactly their modifiers; the key presses are used up.
 pub fn pressed(input: &mut InputState, table: &[Binding]) -> Vec<Action> {
-    table
-        .iter()
-        .filter(|binding| {
-            let mut modifiers = binding.modifiers;
-            if binding.ignores_shift {
-                modifiers.shift = input.modifiers.shift;
-            }
-            // Exactly these modifiers: Ctrl+F12 is not F12.
-            input.modifiers.matches_exact(modifiers) && input.consume_key(modifiers, binding.key)
-        })
-        .map(|binding| binding.action.clone())
-        .collect()
+    let mut actions = Vec::new();
+    input.events.retain(|event| {
+        // The modifiers of the press count, not those that are held when the frame begins.
+        let Event::Key {
+            key,
+            pressed: true,
+            repeat,
+            modifiers,
+            ..
+        } = event
+        else {
+            return true;
+        };
+        let fits = |binding: &&Binding| binding.fits(*key, *modifiers, *repeat);
+        let found = table.iter().find(fits);
+        actions.extend(found.map(|binding| binding.action.clone()));
+        found.is_none()
+    });
+    actions
 }
 
 /// The key of an action as a hint for menus, empty where it has none.
@@ -266,7 +287,7 @@ fn bind(
     Binding {
         key,
         modifiers,
-        ignores_shift: key == Key::Questionmark,
+        ignores_shift: matches!(key, Key::Questionmark | Key::Plus),
         group,
         text,
         action,
@@ -279,6 +300,7 @@ fn key_name(key: Key) -> &'static str {
         Key::CloseBracket => "]",
         Key::Minus => "-",
         Key::Equals => "=",
+        Key::Plus => "+",
         Key::Period => ".",
         Key::Questionmark => "?",
         Key::Escape => "Esc",
@@ -304,6 +326,32 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn modifiers_must_be_exactly_those() {
+        let table = bindings();
+        let found = |key, modifiers| {
+            let mut fitting = table
+                .iter()
+                .filter(|binding| binding.fits(key, modifiers, false));
+            let action = fitting.next().map(|binding| binding.action.clone());
+            assert!(fitting.next().is_none());
+            action
+        };
+        let front = Action::LookFrom(AxisView::Front);
+        assert_eq!(found(Key::Num1, Modifiers::NONE), Some(front));
+        let radiance = Action::Mode(ViewMode::Radiance);
+        assert_eq!(found(Key::Num1, Modifiers::ALT), Some(radiance));
+        assert_eq!(
+            found(Key::F12, Modifiers::COMMAND),
+            Some(Action::Screenshot)
+        );
+        assert_eq!(found(Key::F12, Modifiers::SHIFT), None);
+        assert_eq!(
+            found(Key::Questionmark, Modifiers::SHIFT),
+            Some(Action::ToggleHelp)
+        );
     }
 
     #[test]

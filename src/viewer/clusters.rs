@@ -99,7 +99,7 @@ pub fn outline(cluster: &ClusterBox, color: Vec3) -> Vec<SegmentInstance> {
     edges
 }
 
-/// The six face powers as arrows from the faces outwards; the strongest is as long as the box is large.
+/// The six face powers as arrows from the faces outwards; the strongest is half as long as the box is large.
 pub fn face_power_arrows(cluster: &ClusterBox) -> Vec<SegmentInstance> {
     let strongest = cluster.face_power.into_iter().fold(0.0, f32::max);
     if strongest <= 0.0 {
@@ -115,7 +115,7 @@ pub fn face_power_arrows(cluster: &ClusterBox) -> Vec<SegmentInstance> {
         let direction = sign * [Vec3::X, Vec3::Y, Vec3::Z][axis];
         if power > 0.0 {
             let start = centre + direction * half;
-            let end = start + direction * (extent * power / strongest);
+            let end = start + direction * (0.5 * extent * power / strongest);
             arrows.push(segment(start, end, theme::AXIS_LINES[axis], true));
         }
     }

@@ -83,7 +83,7 @@ fn encoded(linear: f32) -> f32 {
 /// Colour of names beside figures: quieter than the figures, but easy to read.
 pub fn secondary_text(visuals: &egui::Visuals) -> Color32 {
     if visuals.dark_mode {
-        Color32::from_gray(158)
+        Color32::from_gray(150)
     } else {
         Color32::from_gray(88)
     }
@@ -99,6 +99,8 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.indent = 14.0;
         style.visuals.striped = false;
         style.visuals.weak_text_color = Some(secondary_text(&style.visuals));
+        let text = if style.visuals.dark_mode { 212 } else { 30 };
+        style.visuals.widgets.noninteractive.fg_stroke.color = Color32::from_gray(text);
         style.visuals.indent_has_left_vline = false;
     });
 }

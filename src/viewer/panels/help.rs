@@ -18,7 +18,12 @@ pub fn help_window(ctx: &egui::Context, state: &mut State, table: &[Binding]) {
             let height = (ctx.content_rect().height() - 120.0).max(120.0);
             egui::ScrollArea::vertical()
                 .max_height(height)
-                .show(ui, |ui| sheet_ui(ui, table));
+                .min_scrolled_height(height)
+                .show(ui, |ui| {
+                    egui::Frame::new()
+                        .inner_margin(egui::Margin::symmetric(12, 4))
+                        .show(ui, |ui| sheet_ui(ui, table));
+                });
         });
 }
 

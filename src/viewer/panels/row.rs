@@ -1,5 +1,7 @@
 //! Rows of a panel: a setting with its label, unit, explanation and reset; a figure with its name.
 
+use std::f32::consts::TAU;
+
 use eframe::egui::{self, RichText};
 
 use crate::viewer::theme;
@@ -46,16 +48,30 @@ pub fn setting<T: PartialEq + Clone>(
                     .on_hover_text(explanation);
             },
         );
-        if *value != *default
-            && ui
-                .small_button("⟲")
-                .on_hover_text(format!("Reset {}", label.to_lowercase()))
-                .clicked()
-        {
+        if *value != *default && reset_button(ui, label).clicked() {
             *value = default.clone();
         }
     });
     *value != before
+}
+
+/// A small arrow that turns back.
+fn reset_button(ui: &mut egui::Ui, label: &str) -> egui::Response {
+    let size = egui::Vec2::splat(ui.spacing().interact_size.y - 4.0);
+    let (rect, response) = ui.allocate_exact_size(size, egui::Sense::click());
+    let name = format!("Reset {}", label.to_lowercase());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &name));
+    let stroke = egui::Stroke::new(1.5, ui.style().interact(&response).fg_stroke.color);
+    // Drawn, since not every font has such an arrow.
+    let radius = 0.28 * size.x;
+    let on_circle = |turn: f32| rect.center() + radius * egui::Vec2::angled(turn * TAU);
+    let arc = (0..=18).map(|step| on_circle(0.62 - 0.8 * step as f32 / 18.0));
+    ui.painter().line(arc.collect(), stroke);
+    let tip = on_circle(0.62);
+    for arm in [egui::vec2(0.0, -4.0), egui::vec2(4.0, 0.5)] {
+        ui.painter().line_segment([tip, tip + arm], stroke);
+    }
+    response.on_hover_text(name)
 }
 
 /// A choice among a few.

@@ -37,14 +37,14 @@ impl LinePass {
                 bind_group_layouts: &[Some(view_layout)],
                 immediate_size: 0,
             });
-        let build = |label, entry_point, topology, stride: usize, attributes: &[_]| {
+        let build = |label, entry_point, is_ribbon, stride: usize, attributes: &[_]| {
             pipeline(
                 gpu,
                 &layout,
                 &module,
                 label,
                 entry_point,
-                topology,
+                is_ribbon,
                 wgpu::VertexBufferLayout {
                     array_stride: stride as u64,
                     step_mode: wgpu::VertexStepMode::Instance,
@@ -55,14 +55,14 @@ impl LinePass {
         let box_pipeline = build(
             "boxes",
             "vs_box",
-            wgpu::PrimitiveTopology::LineList,
+            false,
             size_of::<BoxInstance>(),
             &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3],
         );
         let segment_pipeline = build(
             "segments",
             "vs_segment",
-            wgpu::PrimitiveTopology::TriangleList,
+            true,
             size_of::<SegmentInstance>(),
             &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32],
         );
@@ -141,7 +141,7 @@ fn pipeline(
     module: &wgpu::ShaderModule,
     label: &str,
     entry_point: &str,
-    topology: wgpu::PrimitiveTopology,
+    is_ribbon: bool,
     instances: wgpu::VertexBufferLayout<'_>,
 ) -> wgpu::RenderPipeline {
     gpu.device
@@ -155,13 +155,22 @@ fn pipeline(
                 buffers: &[Some(instances)],
             },
             primitive: wgpu::PrimitiveState {
-                topology,
+                topology: if is_ribbon {
+                    wgpu::PrimitiveTopology::TriangleList
+                } else {
+                    wgpu::PrimitiveTopology::LineList
+                },
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                depth_write_enabled: Some(!is_ribbon),
+                // What is selected shows through everything.
+                depth_compare: Some(if is_ribbon {
+                    wgpu::CompareFunction::Always
+                } else {
+                    wgpu::CompareFunction::GreaterEqual
+                }),
                 stencil: Default::default(),
                 bias: Default::default(),
             }),

@@ -60,10 +60,12 @@ fn vs_segment(
     let across = vec2<f32>(-direction.y, direction.x);
     let width = view.viewport.z;
     let head = min(6.0 * width, 0.6 * length_px) * arrow;
-    // Six corners of the ribbon, then three of the head.
+    // Six corners of the ribbon, then three of the head. Without a head its triangle repeats the first of the ribbon:
+    // one without area makes the software rasteriser lose the ribbon, too.
+    let corner = select(index, index - 6u, index >= 6u && arrow < 0.5);
     var clip = a;
     var offset = vec2<f32>(0.0);
-    switch index {
+    switch corner {
         case 0u, 3u: { offset = -0.5 * width * across; }
         case 1u: { offset = 0.5 * width * across; }
         case 2u, 4u: { clip = b; offset = 0.5 * width * across - head * direction; }
