@@ -18,46 +18,123 @@ const GROUP_PATCHES: u32 = 64;
 /// Rays per group.
 const GROUP_RAYS: u32 = 24;
 
-/// Rays per patch where the group's rays did not all meet a lit side.
-const PATCH_RAYS: u32 = 12;
+/// Rays spent on all patches together where the rays of a group did not all meet a lit side, as long as that leaves
+/// each patch between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
+const OPEN_RAYS: usize = 100_000;
 
-/// Closure of every patch, 0…1, and the rays shot.
+/// Rays per patch at least.
+const LEAST_PATCH_RAYS: usize = 16;
+
+/// Rays per patch at most.
+const MOST_PATCH_RAYS: usize = 8192;
+
+/// Form factors that add to less than this share of the closure are not trusted to stand for what is missing.
+/// Nearer to 1, and coarse links stay as wrong as they are; further, and the noise of a few rays is blown up.
+const LEAST_ROW: f32 = 0.3;
+
+/// How much of a patch's view is filled by lit surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Closure {
+    /// The part, 0…1.
+    share: f32,
+    /// Standard error of it: 0 in closed surroundings.
+    deviation: f32,
+}
+
+impl Closure {
+    /// Surrounded by lit surfaces.
+    const CLOSED: Self = Self {
+        share: 1.0,
+        deviation: 0.0,
+    };
+
+    /// From how many of some rays met a lit side.
+    fn of(hits: u32, rays: usize) -> Self {
+        // Half a hit and half a miss more, so that no finite number of rays proves a certainty.
+        let (hits, rays) = (hits as f32 + 0.5, rays as f32 + 1.0);
+        let share = hits / rays;
+        Self {
+            share,
+            deviation: (share * (1.0 - share) / rays).sqrt(),
+        }
+    }
+
+    /// Whether it is known without doubt, and so for every part of the patch.
+    fn is_certain(&self) -> bool {
+        self.deviation == 0.0
+    }
+
+    /// What irradiance must be multiplied by, given the sum of its form factors. Where the closure is only estimated,
+    /// a sum that differs by no more than the estimate's error is left alone.
+    fn factor(&self, row: f32) -> f32 {
+        let gap = self.share - row;
+        let doubt = 2.0 * self.deviation;
+        let trust = if self.is_certain() {
+            1.0
+        } else {
+            gap * gap / (gap * gap + doubt * doubt)
+        };
+        let target = row + trust * gap;
+        let row = row.max(LEAST_ROW * self.share);
+        if row > 0.0 { target / row } else { 1.0 }
+    }
+
+    /// The factor for one leaf, from the sum of its form factors and, over the whole patch, the area and the sum times
+    /// area. An estimate stands for the patch as a whole only: its parts may rightly differ.
+    pub(super) fn factor_for(&self, row: f32, (area, weighted): (f32, f32)) -> f32 {
+        if self.is_certain() || area <= 0.0 {
+            self.factor(row)
+        } else {
+            self.factor(weighted / area)
+        }
+    }
+}
+
+/// Closure of every patch, and the rays shot.
 pub(super) fn closures(
     scene: &Scene,
     hierarchy: &Hierarchy,
     rays: &RayTree,
     seed: u64,
-) -> (Vec<f32>, u64) {
+) -> (Vec<Closure>, u64) {
     let groups = groups(hierarchy);
-    let found: Vec<(Vec<f32>, u64)> = groups
+    let closed: Vec<bool> = groups
         .par_iter()
         .map(|cluster| {
             let range = cluster.patches();
-            let count = range.len();
-            let mut hits = 0;
-            for ray in 0..GROUP_RAYS {
-                let patch = range.start + (ray as usize * count) / GROUP_RAYS as usize;
-                hits += probe(scene, hierarchy, rays, patch, 1, ray, seed);
-            }
-            if hits == GROUP_RAYS {
-                return (vec![1.0; count], u64::from(GROUP_RAYS));
-            }
-            let shares = range
-                .map(|patch| {
-                    probe(scene, hierarchy, rays, patch, PATCH_RAYS, 0, seed) as f32
-                        / PATCH_RAYS as f32
-                })
-                .collect();
-            (
-                shares,
-                u64::from(GROUP_RAYS) + count as u64 * u64::from(PATCH_RAYS),
+            (0..GROUP_RAYS).all(|ray| {
+                let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
+                probe(scene, hierarchy, rays, patch, 1, ray, seed) == 1
+            })
+        })
+        .collect();
+    let is_open = |group: &(&Cluster, bool)| !group.1;
+    let pairs = || groups.iter().copied().zip(closed.iter().copied());
+    let open: usize = pairs()
+        .filter(is_open)
+        .map(|(cluster, _)| cluster.patches().len())
+        .sum();
+    let count = (OPEN_RAYS / open.max(1)).clamp(LEAST_PATCH_RAYS, MOST_PATCH_RAYS);
+    let mut closures = vec![Closure::CLOSED; hierarchy.patches.len()];
+    let patches: Vec<usize> = pairs()
+        .filter(is_open)
+        .flat_map(|(cluster, _)| cluster.patches())
+        .collect();
+    let found: Vec<Closure> = patches
+        .par_iter()
+        .map(|&patch| {
+            Closure::of(
+                probe(scene, hierarchy, rays, patch, count as u32, 0, seed),
+                count,
             )
         })
         .collect();
-    let ray_count = found.iter().map(|(_, rays)| rays).sum();
+    for (patch, closure) in patches.into_iter().zip(found) {
+        closures[patch] = closure;
+    }
     (
-        found.into_iter().flat_map(|(shares, _)| shares).collect(),
-        ray_count,
+        closures,
+        (groups.len() * GROUP_RAYS as usize + open * count) as u64,
     )
 }
 

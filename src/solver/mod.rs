@@ -31,6 +31,7 @@ use crate::{
     transport::{Estimate, Judge, Kernel, LinkStore, PairSampler, Refiner, luminance},
 };
 use adapt::DirectField;
+use closure::Closure;
 use direct::Lights;
 use reconstruct::LeafLight;
 
@@ -75,7 +76,7 @@ pub struct Solver {
     /// Linked irradiance of every element, scaled so that form factors add to the closure; `w` is their raw sum.
     linked: Vec<Vec4>,
     /// Part of each patch's view that lit surfaces fill.
-    closures: Vec<f32>,
+    closures: Vec<Closure>,
     leaves: Vec<LeafLight>,
     mean_irradiance: f32,
     step: u32,
@@ -343,9 +344,19 @@ impl Solver {
 
     /// Scale the colours of all leaves so that their form factors add to the closure.
     fn scale_to_closure(&self, irradiance: &mut [Vec4]) {
-        for leaf in self.hierarchy.mesh.leaves() {
-            let closure = self.closures[self.hierarchy.mesh.elements[leaf].patch as usize];
-            irradiance[leaf] = scaled_to_closure(irradiance[leaf], closure);
+        let mesh = &self.hierarchy.mesh;
+        // Area and sum of form factors times area, by patch.
+        let mut sums = vec![(0.0f32, 0.0f32); self.hierarchy.patches.len()];
+        for leaf in mesh.leaves() {
+            let element = &mesh.elements[leaf];
+            let area = element.area_vector.length();
+            let sum = &mut sums[element.patch as usize];
+            *sum = (sum.0 + area, sum.1 + area * irradiance[leaf].w);
+        }
+        for leaf in mesh.leaves() {
+            let patch = mesh.elements[leaf].patch as usize;
+            let factor = self.closures[patch].factor_for(irradiance[leaf].w, sums[patch]);
+            irradiance[leaf] = (irradiance[leaf].truncate() * factor).extend(irradiance[leaf].w);
         }
     }
 
@@ -367,18 +378,6 @@ impl Solver {
         self.memory_limit
             .is_some_and(|limit| self.memory_bytes() > limit)
     }
-}
-
-/// Form factors that add to less than this share of the closure are not trusted to stand for what is missing, and
-/// those that add to more than its inverse are cut. Nearer to 1, and coarse links stay as wrong as they are; further,
-/// and the noise of a few rays is blown up.
-const LEAST_ROW: f32 = 0.3;
-
-/// Irradiance scaled so that its form factors, whose sum is `w`, add to the closure. `w` stays as it is.
-fn scaled_to_closure(irradiance: Vec4, closure: f32) -> Vec4 {
-    let row = irradiance.w.max(LEAST_ROW * closure);
-    let scale = if row > 0.0 { closure / row } else { 1.0 };
-    (irradiance.truncate() * scale).extend(irradiance.w)
 }
 
 /// A colour that is safe to show: finite and not negative.

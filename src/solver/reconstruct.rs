@@ -7,7 +7,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::scaled_to_closure;
+use super::closure::Closure;
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
     transport::{Kernel, Link, LinkStore, self_irradiance},
@@ -34,7 +34,7 @@ pub(super) struct LeafLight {
 pub(super) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    closures: &[f32],
+    closures: &[Closure],
 ) -> Vec<LeafLight> {
     let hierarchy = kernel.hierarchy;
     let leaf_clusters: Vec<usize> = (0..hierarchy.clusters.len())
@@ -47,20 +47,29 @@ pub(super) fn gather_leaves(
             let chain = chain_above(hierarchy, links, cluster);
             let mut found = Vec::new();
             for patch in hierarchy.clusters[cluster].patches() {
+                let first = found.len();
                 gather_patch(kernel, links, &chain, patch, &mut found);
-            }
-            for leaf in &mut found {
-                let closure =
-                    closures[hierarchy.mesh.elements[leaf.element as usize].patch as usize];
-                leaf.centre = scaled_to_closure(leaf.centre, closure);
-                leaf.corners = leaf
-                    .corners
-                    .map(|corner| scaled_to_closure(corner, closure));
+                scale_to_closure(hierarchy, closures[patch], &mut found[first..]);
             }
             found
         })
         .collect();
     found.into_iter().flatten().collect()
+}
+
+/// Scale the light of the leaves of one patch so that their form factors add to the closure.
+fn scale_to_closure(hierarchy: &Hierarchy, closure: Closure, leaves: &mut [LeafLight]) {
+    let sums = leaves.iter().fold((0.0, 0.0), |(areas, rows), leaf| {
+        let area = hierarchy.mesh.elements[leaf.element as usize]
+            .area_vector
+            .length();
+        (areas + area, rows + area * leaf.centre.w)
+    });
+    for leaf in leaves {
+        for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
+            *value = (value.truncate() * closure.factor_for(value.w, sums)).extend(value.w);
+        }
+    }
 }
 
 /// The links of a cluster and of all above it, each with the cluster that receives over it.
