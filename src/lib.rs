@@ -11,7 +11,7 @@
 //! * [`solver`]: one progressive step after the other, as a value without threads, clocks or globals;
 //! * [`reference`]: the truth by other means, sharing no transport code;
 //! * [`metrics`]: error measures and reports;
-//! * [`export`]: files;
+//! * [`export`] writes files;
 //! * [`worker`]: the solver thread;
 //! * `viewer`: the window and its pictures;
 //! * [`cli`]: flags to settings, headless commands.

@@ -1,5 +1,7 @@
 //! The program from outside: exit codes, sentences, files.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{
     fs,
     path::Path,

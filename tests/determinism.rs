@@ -1,5 +1,7 @@
 //! Same scene, settings and seed: the same bits on any number of threads.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{path::Path, sync::Arc, time::Duration};
 
 use vecrad::{

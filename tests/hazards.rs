@@ -1,5 +1,7 @@
 //! Files that break readers: each with the warning, the sentence and the scene that it must give.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;

@@ -1,5 +1,7 @@
 //! Equations 1 to 15 of the paper, for clusters small enough to compute by hand.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::f32::consts::PI;
 
 use glam::{DVec3, Vec3, Vec4};

@@ -1,5 +1,7 @@
 //! The worker with a stand-in for the solver: cancelling, pausing, generations, panics, limits.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{
     sync::{
         Arc, Mutex,

@@ -109,7 +109,7 @@ pub(super) struct StepFacts {
 }
 
 /// Times in seconds; the figures of the last step are in `steps`.
-#[derive(Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub(super) struct Totals {
     pub(super) steps: usize,
     pub(super) read_s: f64,

@@ -28,7 +28,7 @@ pub struct ColorOptions {
 impl ColorOptions {
     /// Linear radiance times exposure; 0 where it is negative or not a number, finite always.
     pub fn exposed(&self, radiance: Vec3) -> Vec3 {
-        (radiance * self.exposure_ev.exp2()).map(|x| x.max(0.0).min(f32::MAX))
+        (radiance * self.exposure_ev.exp2()).map(|x| if x > 0.0 { x.min(f32::MAX) } else { 0.0 })
     }
 
     /// The sRGB bytes that show a radiance.

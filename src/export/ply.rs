@@ -112,7 +112,7 @@ fn header(vertex_count: usize, face_count: usize, options: &PlyOptions) -> Strin
 
 /// Finite and not negative, whatever comes in.
 fn presentable(light: Vec3) -> Vec3 {
-    light.map(|x| x.max(0.0).min(f32::MAX))
+    light.map(|x| if x > 0.0 { x.min(f32::MAX) } else { 0.0 })
 }
 
 fn write_vector(out: &mut impl Write, vector: Vec3) -> io::Result<()> {

@@ -297,7 +297,7 @@ impl Mesh {
                 hangs.then(|| self.middle(corners[side], corners[(side + 1) % 3]))
             });
             close(corners, middles, |vertices| {
-                triangles.push((index as u32, vertices))
+                triangles.push((index as u32, vertices));
             });
         }
         triangles

@@ -84,7 +84,7 @@ impl Estimator<'_> {
         let (mut at, mut bounce) = (start, first);
         for depth in 0..MAX_BOUNCES {
             ray_count += 2;
-            sum += throughput * self.from_emitter(at, bounce);
+            sum += throughput * self.emitter_share(at, bounce);
             let direction = cosine_direction(at.normal, bounce.direction);
             let hit = self.rays.closest(at.position, direction, Some(at.triangle));
             let Some(arrival) = hit.and_then(|hit| self.arrive(at, direction, hit)) else {
@@ -108,7 +108,7 @@ impl Estimator<'_> {
     }
 
     /// The weighted share of direct light by a point of an emitter.
-    fn from_emitter(&self, at: PathPoint, bounce: Bounce) -> Vec3 {
+    fn emitter_share(&self, at: PathPoint, bounce: Bounce) -> Vec3 {
         let sample = self
             .emitters
             .sample(self.scene, bounce.choice, bounce.emitter);

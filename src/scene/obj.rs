@@ -381,12 +381,11 @@ impl Import<'_> {
         };
         let material = Material {
             name: defined.material.name.clone(),
-            reflectance: diffuse
-                .map(linear)
-                .unwrap_or_else(|| bare(reflectance_texture, DEFAULT_REFLECTANCE, most)),
-            emission: emissive
-                .map(linear)
-                .unwrap_or_else(|| bare(emission_texture, Vec3::ZERO, 1.0)),
+            reflectance: diffuse.map_or_else(
+                || bare(reflectance_texture, DEFAULT_REFLECTANCE, most),
+                linear,
+            ),
+            emission: emissive.map_or_else(|| bare(emission_texture, Vec3::ZERO, 1.0), linear),
             reflectance_texture,
             emission_texture,
         };

@@ -144,7 +144,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         for link in (self.links_of)(receiver) {
             let decision = self.decide(link.source, receiver, Some(link), out);
             self.apply(
-                decision,
+                &decision,
                 link.source,
                 receiver,
                 Some(link),
@@ -158,7 +158,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         while let Some(source) = pending.pop() {
             let decision = self.decide(source, receiver, None, out);
             self.apply(
-                decision,
+                &decision,
                 source,
                 receiver,
                 None,
@@ -183,7 +183,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     )]
     fn apply(
         &self,
-        decision: Decision,
+        decision: &Decision,
         source: NodeId,
         receiver: NodeId,
         known: Option<&Link>,
@@ -194,9 +194,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     ) {
         match decision {
             Decision::Drop => {}
-            Decision::Keep(link) => out.links.push(link),
+            Decision::Keep(link) => out.links.push(*link),
             Decision::DivideSource => {
-                pending.extend(self.hierarchy().children(source).rev().map(NodeId))
+                pending.extend(self.hierarchy().children(source).rev().map(NodeId));
             }
             Decision::DivideReceiver if source == receiver => {
                 down.extend(self.hierarchy().children(receiver).map(NodeId));

@@ -5,20 +5,27 @@ use vecrad::scene::{Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sid
 
 /// Collects rectangles in world coordinates.
 #[derive(Default)]
-pub struct Plates {
+pub(crate) struct Plates {
     builder: SceneBuilder,
 }
 
 impl Plates {
     /// Add a grey material.
-    pub fn material(&mut self, reflectance: f32, emission: f32) -> MaterialId {
+    pub(crate) fn material(&mut self, reflectance: f32, emission: f32) -> MaterialId {
         let [reflectance, emission] = [reflectance, emission].map(Vec3::splat);
         self.builder
             .push_material(Material::plain("", reflectance, emission))
     }
 
     /// Add a rectangle of `2 n²` triangles; its front shows along `u × v`.
-    pub fn rectangle(&mut self, origin: DVec3, u: DVec3, v: DVec3, n: u32, material: MaterialId) {
+    pub(crate) fn rectangle(
+        &mut self,
+        origin: DVec3,
+        u: DVec3,
+        v: DVec3,
+        n: u32,
+        material: MaterialId,
+    ) {
         let corner = |i: u32, j: u32| {
             origin + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(n))
         };
@@ -34,7 +41,7 @@ impl Plates {
     }
 
     /// Add a unit cube seen from inside, six walls in the order -x +x -y +y -z +z.
-    pub fn room(&mut self, n: u32, materials: [MaterialId; 6]) {
+    pub(crate) fn room(&mut self, n: u32, materials: [MaterialId; 6]) {
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
         let walls = [
             (DVec3::ZERO, y, z),
@@ -50,16 +57,18 @@ impl Plates {
     }
 
     /// The scene, with all faces of these sides.
-    pub fn finish(self, sides: Sides) -> Scene {
+    pub(crate) fn finish(self, sides: Sides) -> Scene {
         let options = SceneOptions {
             sides,
             ..SceneOptions::default()
         };
-        self.builder.finish(&options).unwrap()
+        self.builder
+            .finish(&options)
+            .expect("the plates are usable")
     }
 }
 
 /// Whether to go on: tests are never cancelled.
-pub fn never() -> bool {
+pub(crate) fn never() -> bool {
     false
 }
