@@ -169,6 +169,8 @@ impl RunFlags {
 pub enum Reference {
     /// Path tracing with this many samples per point.
     Paths(u32),
+    /// The full radiosity matrix over the triangles.
+    Matrix,
 }
 
 impl FromStr for Reference {
@@ -178,13 +180,14 @@ impl FromStr for Reference {
         /// Enough to tell an error of a few per cent in usual rooms.
         const DEFAULT_SAMPLES: u32 = 256;
         let samples = match text.split_once('=') {
+            None if text == "matrix" => return Ok(Self::Matrix),
             None if text == "paths" => DEFAULT_SAMPLES,
             Some(("paths", samples)) => samples
                 .parse()
                 .ok()
                 .filter(|&samples| samples > 0)
                 .ok_or_else(|| format!("'{samples}' is not a number of samples"))?,
-            _ => return Err("expected paths or paths=SAMPLES".to_owned()),
+            _ => return Err("expected paths, paths=SAMPLES or matrix".to_owned()),
         };
         Ok(Self::Paths(samples))
     }

@@ -18,10 +18,11 @@ use super::{
     output,
     progress::Progress,
     report::{Machine, SceneFacts, SolveReport, StepFacts, Totals, WarningFacts, core_count},
-    truth::{self, Errors},
+    truth::{self, Errors, Truth},
 };
 use crate::{
     export::write_ply,
+    reference::MatrixError,
     scene::Scene,
     solver::{Snapshot, StepReport},
     worker::{Event, StopReason, WorkerHandle},
@@ -155,15 +156,20 @@ fn worker(
     errors: &Errors,
 ) -> Result<WorkerHandle> {
     let wake = Arc::new(|| {});
-    let traced = arguments.reference.and_then(|Reference::Paths(samples)| {
-        let seed = arguments.setting_flags.settings().seed;
-        let cancel = || interrupted.load(Ordering::Relaxed);
-        truth::trace(scene, samples, seed, &cancel)
-    });
-    match traced {
+    let seed = arguments.setting_flags.settings().seed;
+    let cancel = || interrupted.load(Ordering::Relaxed);
+    let truth = match arguments.reference {
+        None => None,
+        Some(Reference::Paths(samples)) => Truth::traced(scene, samples, seed, &cancel),
+        Some(Reference::Matrix) => match Truth::by_matrix(scene, seed, &cancel) {
+            Err(MatrixError::Cancelled) => None,
+            found => Some(found?),
+        },
+    };
+    match truth {
         None => WorkerHandle::spawn(wake),
-        Some(points) => {
-            WorkerHandle::with_steppers(wake, truth::measured_solvers(points, errors.clone()))
+        Some(truth) => {
+            WorkerHandle::with_steppers(wake, truth::measured_solvers(truth, errors.clone()))
         }
     }
     .context("cannot start the solver thread")

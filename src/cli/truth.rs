@@ -1,14 +1,19 @@
-//! `--reference`: the error of every step against path tracing.
+//! `--reference`: the error of every step against path tracing or the full matrix.
 
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, PoisonError},
 };
 
+use glam::{Vec2, Vec3};
+
 use crate::{
-    geometry::RayTree,
+    geometry::{RayTree, low_discrepancy_2d, triangle_point},
     metrics::{ErrorMeasures, MeshLookup, measure_error},
-    reference::{PathSettings, PathTracer, ReferencePoint},
+    reference::{
+        MatrixError, MatrixPatch, MatrixSettings, PathSettings, PathTracer, ReferencePoint,
+        solve_matrix,
+    },
     scene::Scene,
     solver::{Cancel, Snapshot, SolveSettings, Solver, StepReport},
     worker::{Job, MakeStepper, Stepper},
@@ -17,30 +22,119 @@ use crate::{
 /// Errors by step, filled while the solve runs.
 pub(super) type Errors = Arc<Mutex<BTreeMap<u32, ErrorMeasures>>>;
 
-/// Path-trace the reference; `None` when cancelled.
-pub(super) fn trace(
-    scene: &Arc<Scene>,
-    samples: u32,
-    seed: u64,
-    cancel: &(dyn Fn() -> bool + Sync),
-) -> Option<Vec<ReferencePoint>> {
-    let rays = Arc::new(RayTree::new(scene));
-    let settings = PathSettings {
-        samples_per_pass: samples,
-        seed,
-        ..PathSettings::default()
-    };
-    let mut tracer = PathTracer::new(scene.clone(), rays, settings);
-    tracer.pass(cancel).then(|| tracer.result().points)
+/// What measured light is compared with.
+pub(super) struct Truth {
+    /// Area-weighted random points with their light.
+    points: Vec<ReferencePoint>,
+    /// Where the measured light of each point is looked up and averaged: as many places in turn for every point.
+    probes: Vec<ReferencePoint>,
+}
+
+/// Patches drawn, in proportion to their area, to stand for the matrix.
+const MATRIX_POINTS: usize = 4000;
+
+/// Places per drawn patch: the matrix knows means of patches only, so the mean of the mesh is compared.
+const MATRIX_PROBES: u32 = 8;
+
+impl Truth {
+    /// By path tracing; `None` when cancelled.
+    pub(super) fn traced(
+        scene: &Arc<Scene>,
+        samples: u32,
+        seed: u64,
+        cancel: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
+        let rays = Arc::new(RayTree::new(scene));
+        let settings = PathSettings {
+            samples_per_pass: samples,
+            seed,
+            ..PathSettings::default()
+        };
+        let mut tracer = PathTracer::new(scene.clone(), rays, settings);
+        let points = tracer.pass(cancel).then(|| tracer.result().points)?;
+        Some(Self {
+            probes: points.clone(),
+            points,
+        })
+    }
+
+    /// By the full matrix.
+    ///
+    /// # Errors
+    /// As [`solve_matrix`].
+    pub(super) fn by_matrix(
+        scene: &Scene,
+        seed: u64,
+        cancel: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self, MatrixError> {
+        let settings = MatrixSettings {
+            seed,
+            ..MatrixSettings::default()
+        };
+        let solution = solve_matrix(scene, &RayTree::new(scene), &settings, cancel)?;
+        let area = |patch: &MatrixPatch| {
+            f64::from(scene.surfaces[patch.triangle.index()].area_vector.length())
+        };
+        let total: f64 = solution.patches.iter().map(area).sum();
+        let (mut points, mut probes) = (Vec::new(), Vec::new());
+        let mut sum = 0.0;
+        for patch in &solution.patches {
+            sum += area(patch);
+            while (points.len() as f64 + 0.5) * total < sum * MATRIX_POINTS as f64 {
+                points.push(matrix_point(scene, patch, Vec3::splat(1.0 / 3.0)));
+                for probe in 0..MATRIX_PROBES {
+                    let at = triangle_point(low_discrepancy_2d(probe, Vec2::ZERO));
+                    probes.push(matrix_point(scene, patch, at));
+                }
+            }
+        }
+        Ok(Self { points, probes })
+    }
+
+    /// Error of what a snapshot shows.
+    fn measure(&self, scene: &Scene, snapshot: &Snapshot) -> Option<ErrorMeasures> {
+        let lookup = MeshLookup::new(scene, &snapshot.mesh);
+        let found = lookup.radiance(&snapshot.light, &self.probes);
+        let count = self
+            .probes
+            .len()
+            .checked_div(self.points.len())
+            .filter(|&count| count > 0)?;
+        let mean = |probes: &[Option<Vec3>]| -> Option<Vec3> {
+            let sum: Option<Vec3> = probes.iter().copied().sum();
+            sum.map(|sum| sum / count as f32)
+        };
+        let measured: Vec<Option<Vec3>> = found.chunks(count).map(mean).collect();
+        measure_error(&measured, &self.points)
+    }
+}
+
+/// A point that stands for a patch of the matrix.
+fn matrix_point(scene: &Scene, patch: &MatrixPatch, barycentric: Vec3) -> ReferencePoint {
+    let [a, b, c] = scene.corners(patch.triangle);
+    let surface = scene.surfaces[patch.triangle.index()];
+    let front = surface.area_vector.normalize_or_zero();
+    ReferencePoint {
+        triangle: patch.triangle,
+        is_back: patch.is_back,
+        barycentric,
+        position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
+        normal: if patch.is_back { -front } else { front },
+        reflectance: surface.reflectance,
+        emission: surface.emission,
+        irradiance: patch.irradiance,
+        irradiance_error: 0.0,
+        standard_error: 0.0,
+    }
 }
 
 /// Makes solvers that measure the error of each snapshot. The measuring counts as elapsed, not as solved time.
-pub(super) fn measured_solvers(points: Vec<ReferencePoint>, errors: Errors) -> MakeStepper {
-    let points = Arc::new(points);
+pub(super) fn measured_solvers(truth: Truth, errors: Errors) -> MakeStepper {
+    let truth = Arc::new(truth);
     Arc::new(move |job: Job| {
         Box::new(MeasuredSolver {
             solver: Solver::new(job.scene, job.settings, job.memory_limit),
-            points: points.clone(),
+            truth: truth.clone(),
             errors: errors.clone(),
         }) as Box<dyn Stepper>
     })
@@ -48,7 +142,7 @@ pub(super) fn measured_solvers(points: Vec<ReferencePoint>, errors: Errors) -> M
 
 struct MeasuredSolver {
     solver: Solver,
-    points: Arc<Vec<ReferencePoint>>,
+    truth: Arc<Truth>,
     errors: Errors,
 }
 
@@ -59,9 +153,7 @@ impl Stepper for MeasuredSolver {
 
     fn snapshot(&self) -> Snapshot {
         let snapshot = self.solver.snapshot();
-        let lookup = MeshLookup::new(self.solver.scene(), &snapshot.mesh);
-        let measured = lookup.radiance(&snapshot.light, &self.points);
-        if let Some(error) = measure_error(&measured, &self.points) {
+        if let Some(error) = self.truth.measure(self.solver.scene(), &snapshot) {
             self.errors
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
