@@ -20,7 +20,7 @@ use super::{
     panels, pick, saver,
     saver::Notice,
     session::{self, Recent, Session},
-    start::{Faults, Options},
+    start::{CameraRequest, Faults, Options},
     state::{RunStatus, Selection, Severity, State},
     theme,
     viewport::{Viewport, viewport_ui},
@@ -234,7 +234,15 @@ impl App {
     /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
     fn open_view(&mut self, loaded: &LoadedScene) {
         let frame = &loaded.scene.frame;
-        let mut camera = self.state.opening_camera(loaded);
+        let mut camera = loaded.viewpoint;
+        if loaded.source.path().is_some() {
+            // The axis chosen before holds for the next file, too; built-in scenes know theirs.
+            let chosen = CameraRequest {
+                up: self.state.rig.target.up,
+                ..CameraRequest::default()
+            };
+            camera = chosen.apply(camera, frame);
+        }
         match session::load(&loaded.source, frame) {
             Some(Ok(saved)) => {
                 camera = saved.camera.unwrap_or(camera);
@@ -306,18 +314,18 @@ impl App {
             }
             Action::ClearRecent => self.state.recent = Recent::default(),
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
-            other => self.change_view(other),
+            other => self.change_view(&other),
         }
         ctx.request_repaint();
     }
 
     /// Actions that change only how the scene is shown.
-    fn change_view(&mut self, action: Action) {
+    fn change_view(&mut self, action: &Action) {
         let state = &mut self.state;
         match action {
-            Action::Mode(mode) => state.view.mode = mode,
+            Action::Mode(mode) => state.view.mode = *mode,
             Action::ExposureBy(step) => {
-                state.view.exposure += step;
+                state.view.exposure += *step;
                 state.view.auto_exposure = false;
             }
             Action::AutoExposure => state.view.auto_exposure = true,
@@ -340,18 +348,18 @@ impl App {
                     .as_ref()
                     .map_or(0, |snapshot| clusters::deepest_level(&snapshot.clusters));
                 let level = &mut state.view.clusters.level;
-                *level = level.saturating_add_signed(step).min(deepest);
+                *level = level.saturating_add_signed(*step).min(deepest);
                 state.view.clusters.shown = true;
             }
             Action::FrameAll => state.frame_all(),
-            Action::LookFrom(view) => state.rig.target.look_from(view),
+            Action::LookFrom(view) => state.rig.target.look_from(*view),
             Action::ToggleProjection => {
                 state.rig.target.orthographic = !state.rig.target.orthographic;
                 state.rig.current.orthographic = state.rig.target.orthographic;
             }
             Action::Up(up) => {
-                state.rig.target.up = up;
-                state.rig.current.up = up;
+                state.rig.target.up = *up;
+                state.rig.current.up = *up;
             }
             Action::TogglePanels => state.panels.shown = !state.panels.shown,
             Action::ToggleHelp => state.panels.help = !state.panels.help,

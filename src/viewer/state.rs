@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    camera::{Camera, CameraRig},
+    camera::CameraRig,
     loader::{LoadedScene, Loader},
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
@@ -274,18 +274,6 @@ impl State {
         if let Some(loaded) = &self.loaded {
             self.rig.target.frame_box(loaded.min, loaded.max, aspect);
         }
-    }
-
-    /// The view that a scene opens with: its own, or all of it.
-    pub fn opening_camera(&self, loaded: &LoadedScene) -> Camera {
-        loaded.viewpoint.unwrap_or_else(|| {
-            let mut camera = Camera {
-                up: self.rig.target.up,
-                ..Camera::default()
-            };
-            camera.frame_box(loaded.min, loaded.max, self.aspect());
-            camera
-        })
     }
 
     /// The last report.
