@@ -163,6 +163,9 @@ impl App {
             self.state.view.exposure = exposure;
         }
         self.state.false_color_range = light_range::false_color_range(snapshot, &self.state.view);
+        self.state
+            .cluster_counts
+            .update(&snapshot.clusters, self.state.view.clusters.level);
         self.look_up();
     }
 
@@ -175,6 +178,10 @@ impl App {
         ) else {
             return;
         };
+        let is_current = |held: &Arc<_>| Arc::ptr_eq(held, snapshot);
+        if selection.of.as_ref().is_some_and(is_current) {
+            return;
+        }
         let triangle = selection.pick.triangle;
         selection.of = Some(snapshot.clone());
         selection.probe = pick::probe(snapshot, &selection.pick);
@@ -342,11 +349,7 @@ impl App {
                 state.view.clusters.shown = !state.view.clusters.shown;
             }
             Action::ClusterLevelBy(step) => {
-                let deepest = state
-                    .run
-                    .snapshot
-                    .as_ref()
-                    .map_or(0, |snapshot| clusters::deepest_level(&snapshot.clusters));
+                let deepest = state.cluster_counts.deepest;
                 let level = &mut state.view.clusters.level;
                 *level = level.saturating_add_signed(*step).min(deepest);
                 state.view.clusters.shown = true;

@@ -66,6 +66,8 @@ pub struct LoadedScene {
     pub min: Vec3,
     /// Upper corner in frame units.
     pub max: Vec3,
+    /// Triangles that emit.
+    pub emitter_count: usize,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
 }
@@ -133,7 +135,9 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
     let (min, max) = bounds(&scene);
     let rays = RayTree::new(&scene);
     let viewpoint = viewpoint.unwrap_or_else(|| opening::deepest_view(&scene, &rays, min, max));
+    let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
+        emitter_count: scene.surfaces.iter().filter(emits).count(),
         rays,
         scene: Arc::new(scene),
         source,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{
     camera::CameraRig,
+    clusters::ClusterCounts,
     loader::{LoadedScene, Loader},
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
@@ -247,6 +248,8 @@ pub struct State {
     pub selection: Option<Selection>,
     /// The selected cluster.
     pub cluster: Option<usize>,
+    /// Counts of the cluster tree at the level that is shown.
+    pub cluster_counts: ClusterCounts,
     /// Ends of the false colours in use.
     pub false_color_range: [f32; 2],
     /// What was said.
