@@ -20,7 +20,7 @@ use super::{
     panels, pick, saver,
     saver::Notice,
     session::{self, Recent, Session},
-    start::{CameraRequest, Faults, Options},
+    start::{self, CameraRequest, Faults, Options},
     state::{RunStatus, Selection, Severity, State},
     theme,
     viewport::{Viewport, viewport_ui},
@@ -45,6 +45,8 @@ pub struct App {
     notices: (Sender<Notice>, Receiver<Notice>),
     /// Set from the command line for the first scene only.
     first: Option<Options>,
+    /// A new title for the window.
+    title: Option<String>,
     /// Camera and view stay as they are when the scene being read arrives.
     keeps_view: bool,
 }
@@ -94,6 +96,7 @@ impl App {
             dialog_is_open: false,
             notices: mpsc::channel(),
             first: None,
+            title: None,
             keeps_view: false,
         };
         app.state.rig.target.up = options.camera.up;
@@ -226,6 +229,7 @@ impl App {
             self.open_view(&loaded);
         }
         self.keeps_view = true;
+        self.title = Some(start::title(&loaded.source));
         self.state.selection = None;
         self.state.cluster = None;
         self.state.run.snapshot = None;
@@ -597,6 +601,9 @@ impl eframe::App for App {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         self.drain();
+        if let Some(title) = self.title.take() {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
+        }
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
@@ -634,6 +641,7 @@ impl eframe::App for App {
                 if self.state.loaded.is_none() && self.state.loading.is_none() {
                     panels::scene::empty_ui(ui, rect, &mut self.state, &mut actions);
                 }
+                panels::scene::waiting_ui(ui, rect, &self.state);
                 panels::legend::legend_ui(ui, rect, &self.state);
                 picked
             })

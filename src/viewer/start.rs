@@ -111,10 +111,8 @@ pub enum ViewerError {
 /// See [`ViewerError`].
 pub fn run(options: Options) -> Result<(), ViewerError> {
     let faults = Arc::new(Faults::default());
-    let title = options.source.as_ref().map_or_else(
-        || "vecrad".to_owned(),
-        |source| format!("{} – vecrad", source.label()),
-    );
+    let source = options.source.as_ref();
+    let title = source.map_or_else(|| "vecrad".to_owned(), title);
     let app_faults = faults.clone();
     let ended = eframe::run_native(
         "vecrad",
@@ -125,6 +123,11 @@ pub fn run(options: Options) -> Result<(), ViewerError> {
         return Err(ViewerError::DeviceLost(reason.clone()));
     }
     ended.map_err(|error| describe(&error))
+}
+
+/// Title of the window that shows a scene.
+pub(super) fn title(source: &SceneSource) -> String {
+    format!("{} – vecrad", source.label())
 }
 
 fn native_options(title: &str) -> eframe::NativeOptions {

@@ -12,7 +12,7 @@ use crate::viewer::{
 pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
     ui.horizontal(|ui| {
         if let Some(loading) = &state.loading {
-            ui.spinner();
+            // No spinner: turning it would take the processor from the reading.
             ui.label(format!("Reading {}", loading.source().label()));
         }
         let color = match &state.run.status {
