@@ -32,6 +32,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Flags of `vecrad solve`.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub struct SolveArguments {
     /// OBJ file to light
     #[arg(required_unless_present = "scene", conflicts_with = "scene")]

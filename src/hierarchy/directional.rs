@@ -14,7 +14,7 @@
 //! The same moments hold light that arrives: with `S_j` replaced by the vector irradiances (eq. 14) `f(n)` is the
 //! irradiance of a face of normal n (eq. 15), for all links at once.
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 /// How the moments are read. The method of the settings, without `exact`, which does not read moments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub enum Reading {
     Isotropic,
 }
 
-/// What one number of a moment is: a scalar for area, RGB for power.
+/// What one number of a moment is: a scalar, or RGB with a fourth channel (see `Tables`).
 pub trait Quantity:
     Copy
     + Default
@@ -46,6 +46,8 @@ pub trait Quantity:
     fn lower_of(self, other: Self) -> Self;
     /// Component-wise larger.
     fn upper_of(self, other: Self) -> Self;
+    /// Component-wise `1 / (1/x + 1/limit)`: about x while it is small, never above the limit. Both not negative.
+    fn saturated(self, limit: Self) -> Self;
 }
 
 impl Quantity for f32 {
@@ -61,21 +63,26 @@ impl Quantity for f32 {
     fn upper_of(self, other: Self) -> Self {
         self.max(other)
     }
+    fn saturated(self, limit: Self) -> Self {
+        self * limit / (self + limit).max(f32::MIN_POSITIVE)
+    }
 }
 
-impl Quantity for Vec3A {
+impl Quantity for Vec4 {
     fn magnitude(self) -> Self {
         self.abs()
     }
     fn geometric_mean(self, other: Self) -> Self {
-        let product = (self * other).max(Self::ZERO);
-        Self::new(product.x.sqrt(), product.y.sqrt(), product.z.sqrt())
+        (self * other).max(Self::ZERO).sqrt()
     }
     fn lower_of(self, other: Self) -> Self {
         self.min(other)
     }
     fn upper_of(self, other: Self) -> Self {
         self.max(other)
+    }
+    fn saturated(self, limit: Self) -> Self {
+        self * limit / (self + limit).max(Self::splat(f32::MIN_POSITIVE))
     }
 }
 
@@ -120,6 +127,20 @@ impl<Q: Quantity> Moments<Q> {
         ];
         for (sum, product) in self.quadratic.iter_mut().zip(products) {
             *sum += weight * product;
+        }
+    }
+
+    /// Add light along a unit direction, of which the share `spread` comes from the half-space about it: its linear part
+    /// is that of the direction, its even part alike for all faces.
+    pub fn add_spread(&mut self, direction: Vec3, strength: Q, spread: f32) {
+        let before = self.linear;
+        self.add(direction, strength * (1.0 - spread));
+        let components = direction.to_array();
+        for axis in 0..3 {
+            self.linear[axis] = before[axis] + strength * components[axis];
+        }
+        if spread > 0.0 {
+            self.add_isotropic(strength * (0.5 * spread));
         }
     }
 
@@ -197,6 +218,15 @@ impl<Q: Quantity> Moments<Q> {
             Reading::Single => linear,
             Reading::Isotropic => self.total() * 0.25,
         };
+        value.upper_of(Q::default())
+    }
+
+    /// The bounded projection for a receiver that is seen over a range of directions about a unit direction: of the even
+    /// part, the share `spread` is replaced by its mean over all directions, half of the total.
+    pub fn project_spread(&self, unit: Vec3, spread: f32) -> Q {
+        let linear = self.linear_part(unit);
+        let even = self.project(unit, Reading::Bounded) * 2.0 - linear;
+        let value = (even * (1.0 - spread) + self.total() * (0.5 * spread) + linear) * 0.5;
         value.upper_of(Q::default())
     }
 

@@ -164,6 +164,9 @@ impl Mesh {
                 continue;
             }
             self.divide_one(index);
+            // Where others are much finer already, the children are still too coarse.
+            let first = self.elements[index as usize].first_child;
+            pending.extend((first..first + 4).filter(|&child| self.hangs_twice(child as usize)));
             // An edge of the new children may lie on a neighbour's half edge: then the neighbour is two levels
             // above and must be divided, too.
             for half in self.half_edges_of_parent(index) {

@@ -132,6 +132,8 @@ pub struct Hierarchy {
     pub mesh: Mesh,
     /// Sum of all patch areas.
     pub area: f64,
+    /// The patches on the front and on the back of each triangle; `u32::MAX` for a back that is not lit.
+    sides: Vec<[u32; 2]>,
 }
 
 impl Hierarchy {
@@ -139,17 +141,30 @@ impl Hierarchy {
     pub fn new(scene: &Scene, crease_degrees: f32) -> Self {
         let (clusters, patches) = build::build(scene);
         let mesh = Mesh::new(scene, &patches, crease_degrees);
+        let mut sides = vec![[u32::MAX; 2]; scene.triangles.len()];
+        for (index, patch) in patches.iter().enumerate() {
+            sides[patch.triangle.index()][usize::from(patch.is_back)] = index as u32;
+        }
         let area = patches.iter().map(|patch| f64::from(patch.area)).sum();
         Self {
             clusters,
             patches,
             mesh,
             area,
+            sides,
         }
     }
 
     /// The root cluster.
     pub const ROOT: NodeId = NodeId(0);
+
+    /// The patch that a ray of the given direction meets on a triangle, if that side is lit.
+    pub fn patch_met(&self, triangle: TriangleId, direction: Vec3) -> Option<usize> {
+        let [front, back] = self.sides[triangle.index()];
+        let meets_front = self.patches[front as usize].normal.dot(direction) < 0.0;
+        let patch = if meets_front { front } else { back };
+        (patch != u32::MAX).then_some(patch as usize)
+    }
 
     /// Number of nodes of both kinds.
     pub fn node_count(&self) -> usize {
@@ -223,6 +238,7 @@ impl Hierarchy {
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.clusters.as_slice())
             + size_of_val(self.patches.as_slice())
+            + size_of_val(self.sides.as_slice())
             + self.mesh.memory_bytes()
     }
 }

@@ -1,36 +1,38 @@
 //! What every node shows as a source: directional moments of clusters, radiosity of elements.
 //!
-//! With radiosity 1 everywhere the tables hold projected area, and what arrives are form factors.
+//! Four channels travel together: red, green, blue, and in `w` what a radiosity of 1 everywhere would give. As a source
+//! `w` holds projected area, as irradiance the sum of form factors, which must be 1 in a closed scene.
 
-use super::{Hierarchy, Kind, Moments, NodeId, Quantity};
+use glam::Vec4;
 
-/// Source tables of all nodes for one quantity: RGB radiosity (`Vec3A`) or area (`f32`).
+use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _};
+
+/// Source tables of all nodes.
 #[derive(Clone, Debug, Default)]
-pub struct Tables<Q> {
+pub struct Tables {
     /// Σ B S of each cluster, as moments (eq. 7).
-    pub clusters: Vec<Moments<Q>>,
+    pub clusters: Vec<Moments<Vec4>>,
     /// Largest radiosity in each cluster: no irradiance from it can be larger.
-    pub brightest: Vec<Q>,
+    pub brightest: Vec<Vec4>,
     /// Mean radiosity of each element.
-    pub elements: Vec<Q>,
+    pub elements: Vec<Vec4>,
 }
 
-impl<Q: Quantity> Tables<Q> {
+impl Tables {
     /// Tables of a hierarchy whose leaves have the radiosity that `leaf` gives by element index.
-    pub fn new(hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Q) -> Self {
+    pub fn new(hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Vec4) -> Self {
         let mut tables = Self::default();
         tables.pull(hierarchy, leaf);
         tables
     }
 
     /// Take the radiosity of the leaves and carry it up to their parents and clusters.
-    pub fn pull(&mut self, hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Q) {
+    pub fn pull(&mut self, hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Vec4) {
         let elements = &hierarchy.mesh.elements;
-        self.elements.resize(elements.len(), Q::default());
+        self.elements.resize(elements.len(), Vec4::ZERO);
         self.clusters
             .resize(hierarchy.clusters.len(), Moments::default());
-        self.brightest
-            .resize(hierarchy.clusters.len(), Q::default());
+        self.brightest.resize(hierarchy.clusters.len(), Vec4::ZERO);
         // Children come after their parents.
         for index in (0..elements.len()).rev() {
             let element = &elements[index];
@@ -44,7 +46,7 @@ impl<Q: Quantity> Tables<Q> {
         }
         for (index, cluster) in hierarchy.clusters.iter().enumerate().rev() {
             let mut moments = Moments::default();
-            let mut brightest = Q::default();
+            let mut brightest = Vec4::ZERO;
             if cluster.is_leaf() {
                 for patch in cluster.patches() {
                     moments.add(hierarchy.patches[patch].area_vector, self.elements[patch]);
@@ -62,7 +64,7 @@ impl<Q: Quantity> Tables<Q> {
     }
 
     /// Radiosity times area of a node.
-    pub fn power(&self, hierarchy: &Hierarchy, node: NodeId) -> Q {
+    pub fn power(&self, hierarchy: &Hierarchy, node: NodeId) -> Vec4 {
         match hierarchy.kind(node) {
             Kind::Cluster(index) => self.clusters[index].total(),
             Kind::Element(index) => {
@@ -72,7 +74,7 @@ impl<Q: Quantity> Tables<Q> {
     }
 
     /// Largest radiosity within a node. Elements are taken as uniform.
-    pub fn brightest(&self, hierarchy: &Hierarchy, node: NodeId) -> Q {
+    pub fn brightest(&self, hierarchy: &Hierarchy, node: NodeId) -> Vec4 {
         match hierarchy.kind(node) {
             Kind::Cluster(index) => self.brightest[index],
             Kind::Element(index) => self.elements[index],

@@ -1,7 +1,7 @@
 //! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
 //! Elements are divided where linear interpolation between their corners would miss it.
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 use super::{
     Cancel,
@@ -16,6 +16,9 @@ const LARGEST_SHARE: f64 = 1.0 / 1000.0;
 
 /// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
 const SPREAD_SHARE: f32 = 0.15;
+
+/// Share of the shadow rays that is shot first.
+const PROBING_SHARE: f32 = 0.25;
 
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
@@ -38,6 +41,8 @@ pub(super) struct DirectField {
     lights: Lights,
     /// By vertex; shorter than the vertices where some are new.
     vertices: Vec<DirectLight>,
+    /// For vertices that only close an edge: the ends of that edge, whose mean they take.
+    ends: Vec<Option<[u32; 2]>>,
     /// By element, where it was needed.
     centres: Vec<Option<DirectLight>>,
 }
@@ -65,28 +70,40 @@ impl DirectField {
         Self {
             lights,
             vertices: Vec::new(),
+            ends: Vec::new(),
             centres: Vec::new(),
         }
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid.
-    pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec3A {
+    pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
         let known = |vertex: u32| {
             self.vertices
                 .get(vertex as usize)
-                .map_or(Vec3A::ZERO, |light| light.irradiance)
+                .map_or(Vec4::ZERO, DirectLight::irradiance)
         };
         let [a, b, c] = hierarchy.mesh.elements[element].vertices.map(known);
         let corners = a + b + c;
         match self.centres.get(element).copied().flatten() {
-            Some(centre) => centre.irradiance * 0.75 + corners * (0.25 / 3.0),
+            Some(centre) => centre.irradiance() * 0.75 + corners * (0.25 / 3.0),
             None => corners / 3.0,
         }
     }
 
-    /// Direct light at a vertex; zero where none of its elements was asked.
-    pub(super) fn vertex(&self, vertex: usize) -> DirectLight {
-        self.vertices.get(vertex).copied().unwrap_or_default()
+    /// Direct irradiance at a vertex and its standard error (luminance).
+    pub(super) fn vertex(&self, vertex: usize) -> (Vec4, f32) {
+        let Some(light) = self.vertices.get(vertex) else {
+            return (Vec4::ZERO, 0.0);
+        };
+        match self.ends[vertex] {
+            Some([a, b]) => {
+                // Ends were made before the vertices between them, so this descends.
+                let ((a, a_error), (b, b_error)) =
+                    (self.vertex(a as usize), self.vertex(b as usize));
+                ((a + b) * 0.5, (a_error + b_error) * 0.5)
+            }
+            None => (light.irradiance(), light.error()),
+        }
     }
 
     /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot.
@@ -99,58 +116,108 @@ impl DirectField {
     ) -> Option<u64> {
         let mut ray_count = 0;
         for _ in 0..MOST_ROUNDS {
-            ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed);
-            if cancel.is_cancelled() {
-                return None;
-            }
+            ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
-            ray_count += self.probe_centres(rays, hierarchy, limits, mean);
-            if cancel.is_cancelled() {
-                return None;
-            }
+            ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, limits, mean);
             if !hierarchy.mesh.divide(&wanted) {
                 break;
             }
         }
-        ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed);
+        ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
         Some(ray_count)
     }
 
     /// Sample the vertices that are new. Returns the rays shot.
+    ///
+    /// A share of the rays comes first. Where they agree with those of all vertices of the same elements there is no
+    /// shadow border, and they are enough. (To trust a vertex's own rays alone would be biased: where a twentieth of
+    /// the light arrives, most vertices would see none.)
     pub(super) fn cover(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
         samples: u32,
         seed: u64,
-    ) -> u64 {
+        cancel: &Cancel,
+    ) -> Option<u64> {
         let first = self.vertices.len();
-        let receivers = vertex_receivers(hierarchy, first);
-        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
-        let lights = self.lights.at_all(rays, &places, samples, seed);
-        self.vertices
-            .resize(hierarchy.mesh.vertices.len(), DirectLight::default());
-        let mut ray_count = 0;
-        let mut is_known = vec![false; self.vertices.len() - first];
-        for ((vertex, _), light) in receivers.iter().zip(lights) {
-            self.vertices[*vertex as usize] = light;
-            is_known[*vertex as usize - first] = true;
-            ray_count += u64::from(light.ray_count);
+        let count = hierarchy.mesh.vertices.len();
+        if first == count {
+            return Some(0);
         }
-        for index in first..self.vertices.len() {
-            if let (false, Some([a, b])) =
-                (is_known[index - first], hierarchy.mesh.vertices[index].ends)
-            {
-                let (a, b) = (self.vertices[a as usize], self.vertices[b as usize]);
-                self.vertices[index] = DirectLight {
-                    irradiance: (a.irradiance + b.irradiance) * 0.5,
-                    ray_count: 0,
-                    error: (a.error + b.error) * 0.5,
-                };
+        self.vertices.resize(count, DirectLight::default());
+        self.ends.resize(count, None);
+        let receivers = vertex_receivers(hierarchy, first);
+        let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
+        self.shoot(rays, &receivers, 0..probing, seed, cancel);
+        let disputed = self.disputed(hierarchy, first);
+        let rest: Vec<(u32, Receiver)> = receivers
+            .iter()
+            .copied()
+            .filter(|&(vertex, _)| disputed[vertex as usize - first])
+            .collect();
+        self.shoot(rays, &rest, probing..samples, seed, cancel);
+        if cancel.is_cancelled() {
+            self.vertices.truncate(first);
+            self.ends.truncate(first);
+            return None;
+        }
+        let mut is_known = vec![false; count - first];
+        for &(vertex, _) in &receivers {
+            is_known[vertex as usize - first] = true;
+        }
+        for index in first..count {
+            if !is_known[index - first] {
+                self.ends[index] = hierarchy.mesh.vertices[index].ends;
             }
         }
-        ray_count
+        Some(
+            self.vertices[first..]
+                .iter()
+                .map(|light| u64::from(light.shot))
+                .sum(),
+        )
+    }
+
+    fn shoot(
+        &mut self,
+        rays: &RayTree,
+        receivers: &[(u32, Receiver)],
+        samples: std::ops::Range<u32>,
+        seed: u64,
+        cancel: &Cancel,
+    ) {
+        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
+        let mut known: Vec<DirectLight> = receivers
+            .iter()
+            .map(|&(vertex, _)| self.vertices[vertex as usize])
+            .collect();
+        self.lights
+            .shoot(rays, &places, samples, seed, &mut known, cancel);
+        for (&(vertex, _), light) in receivers.iter().zip(known) {
+            self.vertices[vertex as usize] = light;
+        }
+    }
+
+    /// Which vertices from `first` on share an element with one whose rays had another outcome.
+    fn disputed(&self, hierarchy: &Hierarchy, first: usize) -> Vec<bool> {
+        let mut disputed = vec![false; self.vertices.len() - first];
+        for leaf in hierarchy.mesh.leaves() {
+            let corners = hierarchy.mesh.elements[leaf]
+                .vertices
+                .map(|vertex| vertex as usize);
+            if corners.iter().all(|&vertex| vertex < first) {
+                continue;
+            }
+            let [a, b, c] = corners.map(|vertex| &self.vertices[vertex]);
+            if !(a.agrees_with(b) && b.agrees_with(c) && c.agrees_with(a)) {
+                for vertex in corners.into_iter().filter(|&vertex| vertex >= first) {
+                    disputed[vertex - first] = true;
+                }
+            }
+        }
+        disputed
     }
 
     fn mean(&self, hierarchy: &Hierarchy) -> f32 {
@@ -158,14 +225,14 @@ impl DirectField {
         luminance(
             (sum / hierarchy.area.max(f64::MIN_POSITIVE))
                 .as_vec3()
-                .into(),
+                .extend(0.0),
         )
     }
 
     /// How much the luminance of the corners varies, times the weight of the element, relative to the mean.
     fn spread(&self, hierarchy: &Hierarchy, element: usize, mean: f32) -> f32 {
         let corners = hierarchy.mesh.elements[element].vertices;
-        let values = corners.map(|vertex| luminance(self.vertices[vertex as usize].irradiance));
+        let values = corners.map(|vertex| luminance(self.vertices[vertex as usize].irradiance()));
         let range = values.iter().copied().fold(0.0, f32::max)
             - values.iter().copied().fold(f32::MAX, f32::min);
         let share = hierarchy.mesh.elements[element].area_vector.length() / hierarchy.area as f32;
@@ -179,7 +246,8 @@ impl DirectField {
         hierarchy: &Hierarchy,
         limits: Limits,
         mean: f32,
-    ) -> u64 {
+        cancel: &Cancel,
+    ) -> Option<u64> {
         self.centres.resize(hierarchy.mesh.elements.len(), None);
         let unknown: Vec<usize> = hierarchy
             .mesh
@@ -201,15 +269,24 @@ impl DirectField {
                 }
             })
             .collect();
-        let lights = self
-            .lights
-            .at_all(rays, &receivers, limits.shadow_samples, limits.seed);
+        let mut lights = vec![DirectLight::default(); receivers.len()];
+        self.lights.shoot(
+            rays,
+            &receivers,
+            0..limits.shadow_samples,
+            limits.seed,
+            &mut lights,
+            cancel,
+        );
+        if cancel.is_cancelled() {
+            return None;
+        }
         let mut ray_count = 0;
         for (leaf, light) in unknown.into_iter().zip(lights) {
-            ray_count += u64::from(light.ray_count);
+            ray_count += u64::from(light.shot);
             self.centres[leaf] = Some(light);
         }
-        ray_count
+        Some(ray_count)
     }
 
     /// Leaves whose corners do not tell what lies between.
@@ -227,8 +304,8 @@ impl DirectField {
                 }
                 let [a, b, c] = element
                     .vertices
-                    .map(|vertex| self.vertices[vertex as usize].irradiance);
-                let bend = luminance((centre.irradiance - (a + b + c) / 3.0).abs());
+                    .map(|vertex| self.vertices[vertex as usize].irradiance());
+                let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
                 let weight = (area / hierarchy.area as f32).sqrt() / mean.max(f32::MIN_POSITIVE);
                 bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
             })

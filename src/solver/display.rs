@@ -121,16 +121,14 @@ impl Solver {
             uncertainty: Vec::with_capacity(count),
         };
         for (vertex, (&linked, &error)) in means.irradiance.iter().zip(&means.error).enumerate() {
-            let direct = self
+            let (direct, noise) = self
                 .direct
                 .as_ref()
                 .map(|field| field.vertex(vertex))
                 .unwrap_or_default();
-            light
-                .irradiance
-                .push(displayable(linked + direct.irradiance));
-            light.direct.push(displayable(direct.irradiance));
-            let error = error + direct.error;
+            light.irradiance.push(displayable(linked + direct));
+            light.direct.push(displayable(direct));
+            let error = error + noise;
             light
                 .uncertainty
                 .push(if error.is_finite() { error } else { f32::MAX });
@@ -153,9 +151,8 @@ impl Solver {
     fn cluster_box(&self, index: usize, cluster: &Cluster, level: u32) -> ClusterBox {
         let links = self.links.of(NodeId(index as u32));
         let moments = &self.power.clusters[index];
-        let area = &self.area.clusters[index];
-        let vector = Vec3::from_array(area.linear);
-        let total = area.total();
+        let vector = Vec3::from_array(moments.linear.map(|along| along.w));
+        let total = moments.total().w;
         ClusterBox {
             min: cluster.min,
             max: cluster.max,

@@ -4,12 +4,12 @@
 //! cluster has to its children and lets each face take its share by its own normal (eq. 15), for all links at once.
 //! The paper's other way, each vector pushed to each face at once, is [`Push::AtOnce`].
 
-use glam::Vec3A;
+use glam::Vec4;
 use rayon::prelude::*;
 
 use super::Push;
 use crate::{
-    hierarchy::{Hierarchy, Kind, Moments, NodeId, Quantity, Reading},
+    hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
     transport::{Kernel, LinkStore, self_irradiance},
 };
 
@@ -17,11 +17,7 @@ use crate::{
 const TASK_NODES: usize = 256;
 
 /// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples.
-pub(super) fn gather<Q: Quantity + Send + Sync>(
-    kernel: Kernel<'_, Q>,
-    links: &LinkStore,
-    push: Push,
-) -> Vec<Q> {
+pub(super) fn gather(kernel: Kernel<'_>, links: &LinkStore, push: Push) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let mut irradiance = own_irradiance(kernel, links);
     let from_clusters = match push {
@@ -41,14 +37,14 @@ pub(super) fn gather<Q: Quantity + Send + Sync>(
 }
 
 /// What elements receive over their own links.
-fn own_irradiance<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let base = hierarchy.clusters.len() as u32;
     (0..hierarchy.mesh.elements.len())
         .into_par_iter()
         .with_min_len(TASK_NODES)
         .map(|index| {
-            let mut sum = Q::default();
+            let mut sum = Vec4::ZERO;
             let links = links.of(NodeId(base + index as u32));
             if links.is_empty() {
                 return sum;
@@ -71,10 +67,10 @@ fn own_irradiance<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &Link
 }
 
 /// What patches receive from the links of clusters, through the moments of all clusters above them.
-fn push_moments<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
-    let mut incident: Vec<Moments<Q>> = (0..hierarchy.clusters.len())
+    let mut incident: Vec<Moments<Vec4>> = (0..hierarchy.clusters.len())
         .into_par_iter()
         .with_min_len(TASK_NODES)
         .map(|index| cluster_incident(kernel, links, index))
@@ -102,40 +98,36 @@ fn push_moments<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkSt
 }
 
 /// The vector irradiances of all links of one cluster.
-fn cluster_incident<Q: Quantity>(
-    kernel: Kernel<'_, Q>,
-    links: &LinkStore,
-    index: usize,
-) -> Moments<Q> {
+fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Moments<Vec4> {
     let hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
     let mut sum = Moments::default();
     for link in links.of(NodeId(index as u32)) {
         if link.source.index() == index {
-            sum.add_isotropic(self_irradiance(
-                hierarchy,
-                index,
-                kernel.tables.clusters[index].total(),
-            ));
+            sum.add_isotropic(
+                self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
+                    * link.visibility,
+            );
         } else {
-            let incident = kernel.vector_irradiance(link.source, cluster.centroid);
-            sum.add(incident.towards_source, incident.strength * link.visibility);
+            kernel
+                .vector_irradiance(link.source, cluster.centroid, cluster.radius)
+                .add_to(&mut sum, link.visibility);
         }
     }
     sum
 }
 
 /// What patches receive from the links of clusters, each vector pushed by itself.
-fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkStore) -> Vec<Q> {
+fn push_at_once(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let leaves: Vec<usize> = (0..hierarchy.clusters.len())
         .filter(|&index| hierarchy.clusters[index].is_leaf())
         .collect();
-    let parts: Vec<(usize, Vec<Q>)> = leaves
+    let parts: Vec<(usize, Vec<Vec4>)> = leaves
         .par_iter()
         .map(|&leaf| {
             let range = hierarchy.clusters[leaf].patches();
-            let mut sums = vec![Q::default(); range.len()];
+            let mut sums = vec![Vec4::ZERO; range.len()];
             let mut at = leaf;
             loop {
                 for link in links.of(NodeId(at as u32)) {
@@ -156,7 +148,7 @@ fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkSt
             (range.start, sums)
         })
         .collect();
-    let mut irradiance = vec![Q::default(); hierarchy.patches.len()];
+    let mut irradiance = vec![Vec4::ZERO; hierarchy.patches.len()];
     for (start, sums) in parts {
         irradiance[start..start + sums.len()].copy_from_slice(&sums);
     }
@@ -164,36 +156,37 @@ fn push_at_once<Q: Quantity + Send + Sync>(kernel: Kernel<'_, Q>, links: &LinkSt
 }
 
 /// Eq. 15 for one link of a cluster and some of its patches.
-fn push_one<Q: Quantity>(
-    kernel: Kernel<'_, Q>,
+fn push_one(
+    kernel: Kernel<'_>,
     cluster: usize,
     source: NodeId,
     visibility: f32,
     patches: &[crate::hierarchy::Patch],
-    sums: &mut [Q],
+    sums: &mut [Vec4],
 ) {
     let hierarchy = kernel.hierarchy;
     if source.index() == cluster {
         let irradiance =
-            self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total());
+            self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total())
+                * visibility;
         sums.iter_mut().for_each(|sum| *sum += irradiance);
         return;
     }
-    let incident = kernel.vector_irradiance(source, hierarchy.clusters[cluster].centroid);
-    let strength = incident.strength * visibility;
+    let receiver = &hierarchy.clusters[cluster];
+    let incident = kernel.vector_irradiance(source, receiver.centroid, receiver.radius);
     for (sum, patch) in sums.iter_mut().zip(patches) {
-        *sum += strength * incident.towards_source.dot(patch.normal).max(0.0);
+        *sum += incident.on_face(patch.normal) * visibility;
     }
 }
 
-/// Sum over elements of area times a quantity, in order and in double precision.
-pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec3A) -> glam::DVec3 {
+/// Sum over leaves of area times a colour, in order and in double precision.
+pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4) -> glam::DVec3 {
     hierarchy
         .mesh
         .leaves()
         .map(|leaf| {
             let area = f64::from(hierarchy.mesh.elements[leaf].area_vector.length());
-            glam::Vec3::from(of(leaf)).as_dvec3() * area
+            of(leaf).truncate().as_dvec3() * area
         })
         .sum()
 }

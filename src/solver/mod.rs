@@ -5,6 +5,7 @@
 //! gathering and pushing until the light settles, and gathers once more for the vertices.
 
 mod adapt;
+mod closure;
 mod direct;
 mod display;
 mod gather;
@@ -18,7 +19,7 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
@@ -67,14 +68,14 @@ pub struct Solver {
     rays: RayTree,
     hierarchy: Hierarchy,
     area_sums: Vec<f64>,
-    /// Radiosity 1 everywhere: projected areas, and form factors when gathered.
-    area: Tables<f32>,
     /// What links carry: reflected light, and emission where it is linked.
-    power: Tables<Vec3A>,
+    power: Tables,
     links: LinkStore,
     direct: Option<DirectField>,
-    /// Linked irradiance of every element.
-    linked: Vec<Vec3A>,
+    /// Linked irradiance of every element, scaled so that form factors add to the closure; `w` is their raw sum.
+    linked: Vec<Vec4>,
+    /// Part of each patch's view that lit surfaces fill.
+    closures: Vec<f32>,
     leaves: Vec<LeafLight>,
     mean_irradiance: f32,
     step: u32,
@@ -93,17 +94,18 @@ impl Solver {
             Direct::Sampled => true,
             Direct::Linked => false,
         };
+        let (closures, ray_count) = closure::closures(&scene, &hierarchy, &rays, settings.seed);
         let mut solver = Self {
+            closures,
             area_sums: PairSampler::area_sums(&hierarchy),
-            area: Tables::new(&hierarchy, |_| 1.0),
             power: Tables::default(),
             links: LinkStore::default(),
             direct: is_sampled.then(|| DirectField::new(lights)),
-            linked: vec![Vec3A::ZERO; hierarchy.mesh.elements.len()],
+            linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
             mean_irradiance: 0.0,
             step: 0,
-            ray_count: 0,
+            ray_count,
             snapshot: Snapshot::default(),
             scene,
             settings,
@@ -131,7 +133,7 @@ impl Solver {
         self.estimate_mean();
         self.refine(report.epsilon, cancel)?;
         self.iterate(&mut report, cancel)?;
-        self.leaves = reconstruct::gather_leaves(self.kernel(), &self.links);
+        self.leaves = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures);
         self.step = report.step;
         self.fill(&mut report);
         self.show();
@@ -180,7 +182,7 @@ impl Solver {
         }
     }
 
-    fn kernel(&self) -> Kernel<'_, Vec3A> {
+    fn kernel(&self) -> Kernel<'_> {
         Kernel {
             hierarchy: &self.hierarchy,
             tables: &self.power,
@@ -188,29 +190,21 @@ impl Solver {
         }
     }
 
-    fn area_kernel(&self) -> Kernel<'_, f32> {
-        Kernel {
-            hierarchy: &self.hierarchy,
-            tables: &self.area,
-            reading: self.reading(),
-        }
-    }
-
     /// Direct irradiance of a leaf, by samples.
-    fn direct_of(&self, element: usize) -> Vec3A {
+    fn direct_of(&self, element: usize) -> Vec4 {
         self.direct
             .as_ref()
-            .map_or(Vec3A::ZERO, |field| field.element(&self.hierarchy, element))
+            .map_or(Vec4::ZERO, |field| field.element(&self.hierarchy, element))
     }
 
     /// Radiosity that a leaf sends over links.
-    fn radiosity(&self, element: usize) -> Vec3A {
+    fn radiosity(&self, element: usize) -> Vec4 {
         let patch = self.hierarchy.patch_of(element);
         let reflected =
-            Vec3A::from(patch.reflectance) * (self.linked[element] + self.direct_of(element));
+            patch.reflectance * (self.linked[element] + self.direct_of(element)).truncate();
         match self.direct {
-            Some(_) => reflected,
-            None => reflected + Vec3A::from(patch.emission * std::f32::consts::PI),
+            Some(_) => reflected.extend(1.0),
+            None => (reflected + patch.emission * std::f32::consts::PI).extend(1.0),
         }
     }
 
@@ -257,10 +251,10 @@ impl Solver {
         });
         let linked = gather::area_sum(&self.hierarchy, |leaf| self.linked[leaf]);
         let area = self.hierarchy.area.max(f64::MIN_POSITIVE);
-        let mut mean = luminance((total / area).as_vec3().into());
+        let mut mean = luminance((total / area).as_vec3().extend(0.0));
         if linked == glam::DVec3::ZERO {
             let power = gather::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
-            mean += luminance((power / area).as_vec3().into());
+            mean += luminance((power / area).as_vec3().extend(0.0));
         }
         self.mean_irradiance = mean;
     }
@@ -268,7 +262,6 @@ impl Solver {
     /// Bring the links to a smaller threshold.
     fn refine(&mut self, epsilon: f32, cancel: &Cancel) -> Option<()> {
         for _ in 0..MOST_PASSES {
-            self.area.pull(&self.hierarchy, |_| 1.0);
             self.pull();
             let is_first = self.links.is_empty();
             let refinement = {
@@ -284,8 +277,7 @@ impl Solver {
                 };
                 let refiner = Refiner {
                     judge: Judge {
-                        power: self.kernel(),
-                        area: self.area_kernel(),
+                        kernel: self.kernel(),
                         estimate,
                         sampler,
                     },
@@ -309,13 +301,12 @@ impl Solver {
             if !self.hierarchy.mesh.divide(&refinement.wanted) {
                 break;
             }
+            self.extend_to_new_elements();
             if let Some(field) = &mut self.direct {
                 let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
-                self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed);
+                self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
             }
-            self.extend_to_new_elements();
         }
-        self.area.pull(&self.hierarchy, |_| 1.0);
         self.pull();
         Some(())
     }
@@ -327,7 +318,8 @@ impl Solver {
             if cancel.is_cancelled() {
                 return None;
             }
-            let gathered = gather::gather(self.kernel(), &self.links, self.settings.push);
+            let mut gathered = gather::gather(self.kernel(), &self.links, self.settings.push);
+            self.scale_to_closure(&mut gathered);
             let change = gather::area_sum(&self.hierarchy, |leaf| {
                 (gathered[leaf] - self.linked[leaf]).abs()
             });
@@ -349,11 +341,18 @@ impl Solver {
         }
     }
 
+    /// Scale the colours of all leaves so that their form factors add to the closure.
+    fn scale_to_closure(&self, irradiance: &mut [Vec4]) {
+        for leaf in self.hierarchy.mesh.leaves() {
+            let closure = self.closures[self.hierarchy.mesh.elements[leaf].patch as usize];
+            irradiance[leaf] = scaled_to_closure(irradiance[leaf], closure);
+        }
+    }
+
     /// Bytes held.
     fn memory_bytes(&self) -> u64 {
         let own = self.hierarchy.memory_bytes()
             + self.rays.memory_bytes()
-            + self.area.memory_bytes()
             + self.power.memory_bytes()
             + self.links.memory_bytes()
             + size_of_val(self.area_sums.as_slice())
@@ -370,7 +369,21 @@ impl Solver {
     }
 }
 
+/// Form factors that add to less than this share of the closure are not trusted to stand for what is missing, and
+/// those that add to more than its inverse are cut. Nearer to 1, and coarse links stay as wrong as they are; further,
+/// and the noise of a few rays is blown up.
+const LEAST_ROW: f32 = 0.3;
+
+/// Irradiance scaled so that its form factors, whose sum is `w`, add to the closure. `w` stays as it is.
+fn scaled_to_closure(irradiance: Vec4, closure: f32) -> Vec4 {
+    let row = irradiance.w.max(LEAST_ROW * closure);
+    let scale = if row > 0.0 { closure / row } else { 1.0 };
+    (irradiance.truncate() * scale).extend(irradiance.w)
+}
+
 /// A colour that is safe to show: finite and not negative.
-fn displayable(color: Vec3A) -> Vec3 {
-    Vec3::from(color).map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
+fn displayable(color: Vec4) -> Vec3 {
+    color
+        .truncate()
+        .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
 }

@@ -4,12 +4,13 @@
 //! the clusters' centroids: light of clusters at its centroid, light of links to elements at each of its corners. A
 //! vertex takes the mean of the leaves that share it, so light is never carried over a crease or a material border.
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::scaled_to_closure;
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
-    transport::{Kernel, Link, LinkStore, luminance, self_irradiance},
+    transport::{Kernel, Link, LinkStore, self_irradiance},
 };
 
 /// Corners are moved this share of the way to the centroid before light is evaluated there: exactly on an edge, a
@@ -22,15 +23,19 @@ pub(super) struct LeafLight {
     /// The leaf.
     pub element: u32,
     /// Linked irradiance at its corners.
-    pub corners: [Vec3A; 3],
+    pub corners: [Vec4; 3],
     /// Linked irradiance at its centroid.
-    pub centre: Vec3A,
+    pub centre: Vec4,
     /// Sum of the errors of its links (luminance).
     pub error: f32,
 }
 
 /// Linked irradiance of all leaves, in the order of the tree.
-pub(super) fn gather_leaves(kernel: Kernel<'_, Vec3A>, links: &LinkStore) -> Vec<LeafLight> {
+pub(super) fn gather_leaves(
+    kernel: Kernel<'_>,
+    links: &LinkStore,
+    closures: &[f32],
+) -> Vec<LeafLight> {
     let hierarchy = kernel.hierarchy;
     let leaf_clusters: Vec<usize> = (0..hierarchy.clusters.len())
         .filter(|&index| hierarchy.clusters[index].is_leaf())
@@ -43,6 +48,14 @@ pub(super) fn gather_leaves(kernel: Kernel<'_, Vec3A>, links: &LinkStore) -> Vec
             let mut found = Vec::new();
             for patch in hierarchy.clusters[cluster].patches() {
                 gather_patch(kernel, links, &chain, patch, &mut found);
+            }
+            for leaf in &mut found {
+                let closure =
+                    closures[hierarchy.mesh.elements[leaf.element as usize].patch as usize];
+                leaf.centre = scaled_to_closure(leaf.centre, closure);
+                leaf.corners = leaf
+                    .corners
+                    .map(|corner| scaled_to_closure(corner, closure));
             }
             found
         })
@@ -72,7 +85,7 @@ fn chain_above<'a>(
 
 /// Light of all leaves of one patch.
 fn gather_patch(
-    kernel: Kernel<'_, Vec3A>,
+    kernel: Kernel<'_>,
     links: &LinkStore,
     chain: &[(usize, &[Link])],
     patch: usize,
@@ -124,18 +137,18 @@ fn gather_patch(
 }
 
 fn chain_irradiance(
-    kernel: Kernel<'_, Vec3A>,
+    kernel: Kernel<'_>,
     receiver: usize,
     link: &Link,
     point: Vec3,
     normal: Vec3,
-) -> Vec3A {
+) -> Vec4 {
     if link.source.index() == receiver {
         return self_irradiance(
             kernel.hierarchy,
             receiver,
             kernel.tables.clusters[receiver].total(),
-        );
+        ) * link.visibility;
     }
     debug_assert!(
         !matches!(kernel.hierarchy.kind(link.source), Kind::Cluster(index) if index == receiver)
@@ -146,7 +159,7 @@ fn chain_irradiance(
 /// Area-weighted means of the leaves about each vertex.
 pub(super) struct VertexMeans {
     /// Linked irradiance.
-    pub irradiance: Vec<Vec3A>,
+    pub irradiance: Vec<Vec4>,
     /// Sum of link errors.
     pub error: Vec<f32>,
 }
@@ -156,7 +169,7 @@ impl VertexMeans {
     /// its ends.
     pub(super) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight]) -> Self {
         let count = hierarchy.mesh.vertices.len();
-        let (mut irradiance, mut error) = (vec![Vec3A::ZERO; count], vec![0.0f32; count]);
+        let (mut irradiance, mut error) = (vec![Vec4::ZERO; count], vec![0.0f32; count]);
         let mut weight = vec![0.0f32; count];
         for leaf in leaves {
             let element = &hierarchy.mesh.elements[leaf.element as usize];
@@ -179,10 +192,4 @@ impl VertexMeans {
         }
         Self { irradiance, error }
     }
-}
-
-/// Linked irradiance, error and luminance range of a leaf that interpolation between its corners gets wrong.
-pub(super) fn curvature(leaf: &LeafLight) -> f32 {
-    let mean = (leaf.corners[0] + leaf.corners[1] + leaf.corners[2]) / 3.0;
-    luminance((leaf.centre - mean).abs())
 }

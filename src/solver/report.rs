@@ -1,7 +1,5 @@
 //! The figures of a step: counts, energy balance and row sums.
 
-use glam::Vec3A;
-
 use super::{Solver, StepReport, gather};
 use crate::transport::luminance;
 
@@ -32,8 +30,8 @@ impl Solver {
         });
         let sent = gather::area_sum(&self.hierarchy, |leaf| {
             let patch = self.hierarchy.patch_of(leaf);
-            let emitted = Vec3A::from(patch.emission * std::f32::consts::PI);
-            Vec3A::from(patch.reflectance) * (self.linked[leaf] + self.direct_of(leaf)) + emitted
+            let emitted = (patch.emission * std::f32::consts::PI).extend(0.0);
+            patch.reflectance.extend(0.0) * (self.linked[leaf] + self.direct_of(leaf)) + emitted
         });
         let sum = sent.element_sum();
         if sum > 0.0 {
@@ -58,7 +56,7 @@ impl Solver {
         let mean = gather::area_sum(&self.hierarchy, |leaf| {
             self.linked[leaf] + self.direct_of(leaf)
         }) / self.hierarchy.area.max(f64::MIN_POSITIVE);
-        let reference = f64::from(luminance(mean.as_vec3().into()));
+        let reference = f64::from(luminance(mean.as_vec3().extend(0.0)));
         let root = (sum / self.hierarchy.area.max(f64::MIN_POSITIVE)).sqrt();
         if reference > 0.0 {
             (root / reference) as f32
@@ -69,13 +67,13 @@ impl Solver {
 
     /// Sums of form factors: what leaves receive when everything sends 1.
     fn fill_row_sums(&self, report: &mut StepReport) {
-        let rows = gather::gather(self.area_kernel(), &self.links, self.settings.push);
         let (mut least, mut most, mut sum) = (f32::INFINITY, 0.0f32, 0.0f64);
         for leaf in self.hierarchy.mesh.leaves() {
-            least = least.min(rows[leaf]);
-            most = most.max(rows[leaf]);
-            sum += f64::from(rows[leaf])
-                * f64::from(self.hierarchy.mesh.elements[leaf].area_vector.length());
+            let row = self.linked[leaf].w;
+            least = least.min(row);
+            most = most.max(row);
+            sum +=
+                f64::from(row) * f64::from(self.hierarchy.mesh.elements[leaf].area_vector.length());
         }
         report.row_sum_min = least.min(most);
         report.row_sum_max = most;

@@ -68,7 +68,7 @@ pub struct SolveSettings {
     pub push: Push,
     /// Link threshold at the last step: error of one link's irradiance, weighted by the square root of the receiver's
     /// share of the area, relative to the scene's mean. Above 0 (0 refines until another limit stops it).
-    /// Lower is better and slower: links grow about as 1/ε. Start at 0.01.
+    /// Lower is better and slower: links grow about as 1/ε. Start at 0.005.
     pub epsilon: f32,
     /// Sample pairs p of a link in the `samples` oracle; 1…4096. Cost per link grows with p.
     pub samples: u32,
@@ -93,9 +93,9 @@ impl SolveSettings {
     /// Seconds to a first impression.
     pub const fn draft() -> Self {
         Self {
-            epsilon: 0.08,
+            epsilon: 0.03,
             shadow_samples: 8,
-            mesh_tolerance: 0.04,
+            mesh_tolerance: 0.006,
             min_area: 1e-5,
             max_steps: 3,
             ..Self::normal()
@@ -109,11 +109,11 @@ impl SolveSettings {
             oracle: Oracle::Interval,
             direct: Direct::Auto,
             push: Push::Combined,
-            epsilon: 0.02,
+            epsilon: 0.005,
             samples: 4,
             shadow_samples: 16,
             min_area: 1e-6,
-            mesh_tolerance: 0.01,
+            mesh_tolerance: 0.001,
             crease_degrees: 30.0,
             max_steps: 5,
             tolerance: 1e-3,
@@ -124,11 +124,11 @@ impl SolveSettings {
     /// For the bake that is kept: about 2 % error.
     pub const fn finest() -> Self {
         Self {
-            epsilon: 0.005,
+            epsilon: 0.002,
             shadow_samples: 64,
-            mesh_tolerance: 0.002,
+            mesh_tolerance: 0.0004,
             min_area: 1e-7,
-            max_steps: 8,
+            max_steps: 6,
             tolerance: 1e-4,
             ..Self::normal()
         }

@@ -5,11 +5,11 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use crate::{
     geometry::{irradiance_vector, point_irradiance},
-    hierarchy::{Hierarchy, Kind, NodeId, Quantity, Reading, Tables},
+    hierarchy::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Reading, Tables},
 };
 
 /// An element nearer than this many of its radii is integrated exactly.
@@ -17,28 +17,47 @@ use crate::{
 const NEAR: f32 = 4.0;
 
 /// A vector irradiance: light that arrives at a point, and where from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Incident<Q> {
+///
+/// The paper's has one direction. That is wrong for a source that is as near as it is large: faces edge-on to its centre
+/// would get nothing, though half of it stands above their horizon. `spread` tells which part comes from a whole
+/// half-space instead, and gives a face at angle θ the share (1 + cos θ)/2.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Incident {
     /// Unit direction from the receiving point towards the source: −r of the paper.
     pub towards_source: Vec3,
     /// Irradiance of a face that looks that way.
-    pub strength: Q,
+    pub strength: Vec4,
+    /// Part of it that comes from everywhere in the half-space about the direction, 0…1; 0 in the paper's methods.
+    pub spread: f32,
+}
+
+impl Incident {
+    /// Irradiance of a face of unit normal (eq. 15).
+    pub fn on_face(&self, normal: Vec3) -> Vec4 {
+        let cosine = self.towards_source.dot(normal);
+        self.strength * (cosine.max(0.0) * (1.0 - self.spread) + 0.5 * (1.0 + cosine) * self.spread)
+    }
+
+    /// Add it, times a visibility, to the moments of what arrives.
+    pub fn add_to(&self, moments: &mut Moments<Vec4>, visibility: f32) {
+        moments.add_spread(self.towards_source, self.strength * visibility, self.spread);
+    }
 }
 
 /// Reads the source tables of a hierarchy by one method.
 #[derive(Clone, Copy)]
-pub struct Kernel<'a, Q> {
+pub struct Kernel<'a> {
     /// Where the nodes are.
     pub hierarchy: &'a Hierarchy,
     /// What they send.
-    pub tables: &'a Tables<Q>,
+    pub tables: &'a Tables,
     /// How moments are read; `None` sums over the patches of a cluster (eq. 3).
     pub reading: Option<Reading>,
 }
 
-impl<Q: Quantity> Kernel<'_, Q> {
+impl Kernel<'_> {
     /// ProjectPower (eq. 8): the power that a node sends along a unit direction, per unit solid angle and times π.
-    pub fn projected_power(&self, node: NodeId, unit: Vec3) -> Q {
+    pub fn projected_power(&self, node: NodeId, unit: Vec3) -> Vec4 {
         match self.hierarchy.kind(node) {
             Kind::Cluster(index) => self.cluster_power(index, unit),
             Kind::Element(index) => {
@@ -51,11 +70,11 @@ impl<Q: Quantity> Kernel<'_, Q> {
         }
     }
 
-    fn cluster_power(&self, index: usize, unit: Vec3) -> Q {
+    fn cluster_power(&self, index: usize, unit: Vec3) -> Vec4 {
         if let Some(reading) = self.reading {
             return self.tables.clusters[index].project(unit, reading);
         }
-        let mut sum = Q::default();
+        let mut sum = Vec4::ZERO;
         for patch in self.hierarchy.clusters[index].patches() {
             sum += self.tables.elements[patch]
                 * self.hierarchy.patches[patch].area_vector.dot(unit).max(0.0);
@@ -63,24 +82,32 @@ impl<Q: Quantity> Kernel<'_, Q> {
         sum
     }
 
-    /// Vector irradiance (eq. 14, unoccluded) of a node at a point.
-    /// No more than the brightest patch of the source gives when it fills the view.
-    pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident<Q> {
+    /// Vector irradiance (eq. 14, unoccluded) of a node at a receiver about a point, of the given radius.
+    /// Near the source the strength saturates towards its brightest patch, as that of a disc does exactly on its axis:
+    /// A/π r² becomes A/(π r² + A).
+    pub fn vector_irradiance(&self, source: NodeId, point: Vec3, radius: f32) -> Incident {
+        let separation = point - self.hierarchy.centroid(source);
+        let squared = separation.length_squared();
+        let reach = radius + self.hierarchy.radius(source);
+        let spread = match self.reading {
+            Some(Reading::Bounded) => (reach * reach / squared.max(f32::MIN_POSITIVE)).min(1.0),
+            _ => 0.0,
+        };
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => {
-                let separation = point - self.hierarchy.clusters[index].centroid;
-                let squared = separation.length_squared();
                 let unit = separation / squared.sqrt();
                 if squared <= 0.0 || !unit.is_finite() {
-                    return Incident {
-                        towards_source: Vec3::ZERO,
-                        strength: Q::default(),
-                    };
+                    return Incident::default();
                 }
-                let strength = self.cluster_power(index, unit) * (1.0 / (PI * squared));
+                let power = match spread {
+                    0.0 => self.cluster_power(index, unit),
+                    _ => self.tables.clusters[index].project_spread(unit, spread),
+                };
+                let strength = power * (1.0 / (PI * squared));
                 Incident {
                     towards_source: -unit,
-                    strength: strength.lower_of(self.tables.brightest[index]),
+                    strength: strength.saturated(self.tables.brightest[index]),
+                    spread,
                 }
             }
             Kind::Element(index) => {
@@ -94,18 +121,16 @@ impl<Q: Quantity> Kernel<'_, Q> {
                 Incident {
                     towards_source,
                     strength: self.tables.elements[index] * length,
+                    spread,
                 }
             }
         }
     }
 
     /// Irradiance (eqs 12 and 15, unoccluded) of a face of unit normal at a point.
-    pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Q {
+    pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Vec4 {
         match self.hierarchy.kind(source) {
-            Kind::Cluster(_) => {
-                let incident = self.vector_irradiance(source, point);
-                incident.strength * incident.towards_source.dot(normal).max(0.0)
-            }
+            Kind::Cluster(_) => self.vector_irradiance(source, point, 0.0).on_face(normal),
             Kind::Element(index) => {
                 self.tables.elements[index]
                     * element_form_factor(self.hierarchy, index, point, normal)

@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec3, Vec4};
 
 use super::{Kernel, PairSampler, luminance};
 use crate::{
@@ -43,10 +43,8 @@ const IN_PLANE: f32 = 1e-5;
 /// Judges pairs of nodes.
 #[derive(Clone, Copy)]
 pub struct Judge<'a> {
-    /// Reads what sources send.
-    pub power: Kernel<'a, Vec3A>,
-    /// Reads the area that receivers show.
-    pub area: Kernel<'a, f32>,
+    /// Reads what sources send, and the area that receivers show.
+    pub kernel: Kernel<'a>,
     /// How errors are estimated.
     pub estimate: Estimate,
     /// Draws sample points.
@@ -55,18 +53,17 @@ pub struct Judge<'a> {
 
 impl Judge<'_> {
     fn hierarchy(&self) -> &Hierarchy {
-        self.power.hierarchy
+        self.kernel.hierarchy
     }
 
-    fn tables(&self) -> &Tables<Vec3A> {
-        self.power.tables
+    fn tables(&self) -> &Tables {
+        self.kernel.tables
     }
 
     /// Judge a pair of different nodes, neither above the other.
     pub fn judge(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> Judgement {
         let brightest = luminance(self.tables().brightest(self.hierarchy(), source));
-        if brightest <= 0.0 || !self.can_face(source, receiver) || !self.can_face(receiver, source)
-        {
+        if !self.can_face(source, receiver) || !self.can_face(receiver, source) {
             return Judgement::Nothing;
         }
         match self.estimate {
@@ -75,24 +72,15 @@ impl Judge<'_> {
         }
     }
 
-    /// Judge the exchange of a cluster with itself: all of it is in doubt.
-    /// A ray that leaves a patch is taken to meet another before it leaves the box with the odds of their areas.
-    pub fn judge_self(&self, cluster: NodeId) -> Judgement {
-        let Kind::Cluster(index) = self.hierarchy().kind(cluster) else {
-            return Judgement::Nothing;
-        };
-        let irradiance = luminance(self_irradiance(
-            self.hierarchy(),
-            index,
-            self.tables().clusters[index].total(),
-        ));
-        if irradiance > 0.0 {
-            Judgement::Transfer {
-                irradiance,
-                error: irradiance,
-            }
-        } else {
-            Judgement::Nothing
+    /// Luminance of the irradiance that a cluster gives itself if all of its light falls on it; all of it is in doubt.
+    pub fn judge_self(&self, cluster: NodeId) -> f32 {
+        match self.hierarchy().kind(cluster) {
+            Kind::Cluster(index) => luminance(self_irradiance(
+                self.hierarchy(),
+                index,
+                self.tables().clusters[index].total(),
+            )),
+            Kind::Element(_) => 0.0,
         }
     }
 
@@ -123,7 +111,7 @@ impl Judge<'_> {
                 let cluster = &hierarchy.clusters[index];
                 let (min, max) = self.bounds(to);
                 let (least, most) = (min - cluster.max, max - cluster.min);
-                let faces = self.area.tables.clusters[index].six_faces();
+                let faces = self.tables().clusters[index].six_faces().map(|face| face.w);
                 let slack = IN_PLANE * cluster.area;
                 (0..3).any(|axis| {
                     (most[axis] > 0.0 && faces[2 * axis] > slack)
@@ -159,7 +147,7 @@ impl Judge<'_> {
         }
         let unit = (to - from) / distance;
         let total = luminance(self.tables().power(hierarchy, source));
-        let value = luminance(self.power.projected_power(source, unit));
+        let value = luminance(self.kernel.projected_power(source, unit));
         let swing = total * (reach / distance).asin();
         let (near, far) = (distance - reach, distance + reach);
         let upper = ((value + swing).min(total) / (PI * near * near)).min(brightest);
@@ -206,24 +194,17 @@ impl Judge<'_> {
         if squared <= 0.0 || !unit.is_finite() || area <= 0.0 {
             return f32::INFINITY;
         }
-        let power = luminance(self.power.projected_power(source, unit));
-        power * self.area.projected_power(receiver, -unit) / (PI * squared * area)
+        let power = luminance(self.kernel.projected_power(source, unit));
+        power * self.kernel.projected_power(receiver, -unit).w / (PI * squared * area)
     }
 }
 
-/// Mean irradiance that a cluster of the given power gives itself, from the odds that a ray meets a patch of it.
-pub(crate) fn self_irradiance<Q: crate::hierarchy::Quantity>(
-    hierarchy: &Hierarchy,
-    index: usize,
-    power: Q,
-) -> Q {
-    let cluster = &hierarchy.clusters[index];
-    let size = cluster.max - cluster.min;
-    let hull = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
-    let sum = cluster.area + hull;
-    if sum > 0.0 {
-        power * (1.0 / sum)
+/// Mean irradiance that a cluster of the given power would give itself if all of its light fell on it.
+pub(crate) fn self_irradiance(hierarchy: &Hierarchy, index: usize, power: Vec4) -> Vec4 {
+    let area = hierarchy.clusters[index].area;
+    if area > 0.0 {
+        power * (1.0 / area)
     } else {
-        Q::default()
+        Vec4::ZERO
     }
 }

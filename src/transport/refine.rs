@@ -5,6 +5,8 @@
 //! one. Links that are good enough stay as they are: nothing is traced again.
 
 use super::{Judge, Judgement, Link, kernel::element_form_factor};
+use glam::Vec3;
+
 use crate::{
     geometry::Random,
     hierarchy::{Hierarchy, Kind, NodeId},
@@ -19,6 +21,13 @@ const MOST_RAYS: u32 = 8;
 /// Share of a partly visible transfer that counts as error: shadows vary over the receiver, and neither node's
 /// table knows how.
 const PARTIAL_VISIBILITY: f32 = 0.5;
+
+/// Part of a transfer that may get through although no sampled ray did: a few rays prove little. Smaller, and pairs that
+/// were once found blocked stay so; larger, and refinement goes on behind walls.
+const DOUBT: f32 = 0.1;
+
+/// Normals agree when their vector sum is shorter than their total area by less than this.
+const SAME_DIRECTION: f32 = 1e-6;
 
 /// Links of some receivers, in the order of the walk.
 #[derive(Clone, Debug, Default)]
@@ -78,7 +87,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     }
 
     fn hierarchy(&self) -> &'a Hierarchy {
-        self.judge.power.hierarchy
+        self.judge.kernel.hierarchy
     }
 
     /// Refine a receiver and all below it; `sources` are handed down from above.
@@ -138,6 +147,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 decision,
                 link.source,
                 receiver,
+                Some(link),
                 out,
                 &mut pending,
                 down,
@@ -151,6 +161,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 decision,
                 source,
                 receiver,
+                None,
                 out,
                 &mut pending,
                 down,
@@ -175,6 +186,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         decision: Decision,
         source: NodeId,
         receiver: NodeId,
+        known: Option<&Link>,
         out: &mut Refinement,
         pending: &mut Vec<NodeId>,
         down: &mut Vec<NodeId>,
@@ -193,7 +205,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 if self.hierarchy().children(receiver).is_empty() {
                     // The element will be divided after this pass; until then its link stays.
                     *is_wanted = true;
-                    let link = self.link(source, receiver, f32::INFINITY, 1, out);
+                    let link = known
+                        .copied()
+                        .unwrap_or_else(|| self.link(source, receiver, f32::INFINITY, 1, out));
                     out.links.push(link);
                 } else {
                     down.push(source);
@@ -212,7 +226,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     ) -> Decision {
         let weight = self.weight(receiver);
         if source == receiver {
-            return self.decide_self(source, weight);
+            return self.decide_self(source, weight, known, out);
         }
         let mut random = self.random(source, receiver);
         let (irradiance, error) = match self.judge.judge(source, receiver, &mut random) {
@@ -227,32 +241,67 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let link = match known {
             Some(link) => *link,
             None => {
-                let importance = irradiance * weight / self.threshold.max(f32::MIN_POSITIVE);
-                let ray_count = (importance.min(64.0).ceil() as u32).clamp(1, MOST_RAYS);
+                let ray_count = self.ray_count(irradiance * weight, MOST_RAYS);
                 self.link(source, receiver, error, ray_count, out)
             }
         };
         let partial = 2.0 * (link.visibility * (1.0 - link.visibility)).max(0.0).sqrt();
-        let error = error * link.visibility + PARTIAL_VISIBILITY * irradiance * partial;
+        let error = error * link.visibility.max(DOUBT) + PARTIAL_VISIBILITY * irradiance * partial;
         if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
             return decision;
         }
         Decision::Keep(Link { error, ..link })
     }
 
-    fn decide_self(&self, cluster: NodeId, weight: f32) -> Decision {
-        match self.judge.judge_self(cluster) {
-            Judgement::Nothing => Decision::Drop,
-            Judgement::Transfer { error, .. } if error * weight <= self.threshold => {
-                Decision::Keep(Link {
-                    source: cluster,
-                    visibility: 1.0,
-                    error,
-                    form_factor: 0.0,
-                })
-            }
-            Judgement::Transfer { .. } => Decision::DivideReceiver,
+    fn decide_self(
+        &self,
+        cluster: NodeId,
+        weight: f32,
+        known: Option<&Link>,
+        out: &mut Refinement,
+    ) -> Decision {
+        let irradiance = self.judge.judge_self(cluster);
+        if irradiance <= 0.0 || self.faces_one_way(cluster) {
+            return Decision::Drop;
         }
+        let fraction = match known {
+            Some(link) => link.visibility,
+            None => {
+                let ray_count = self.ray_count(irradiance * weight, 2 * MOST_RAYS);
+                out.ray_count += u64::from(ray_count);
+                self.judge.sampler.self_fraction(
+                    cluster,
+                    ray_count,
+                    &mut self.random(cluster, cluster),
+                )
+            }
+        };
+        let error = irradiance * fraction.max(DOUBT);
+        if error * weight > self.threshold {
+            return Decision::DivideReceiver;
+        }
+        Decision::Keep(Link {
+            source: cluster,
+            visibility: fraction,
+            error,
+            form_factor: 0.0,
+        })
+    }
+
+    /// Whether all faces of a cluster look the same way: then none sees another.
+    fn faces_one_way(&self, cluster: NodeId) -> bool {
+        let Kind::Cluster(index) = self.hierarchy().kind(cluster) else {
+            return true;
+        };
+        let moments = &self.judge.kernel.tables.clusters[index];
+        let vector = Vec3::from_array(moments.linear.map(|along| along.w));
+        vector.length() >= (1.0 - SAME_DIRECTION) * moments.total().w
+    }
+
+    /// Rays for a transfer, the more the more it matters.
+    fn ray_count(&self, weighted: f32, most: u32) -> u32 {
+        let importance = weighted / self.threshold.max(f32::MIN_POSITIVE);
+        (importance.min(64.0).ceil() as u32).clamp(2, most)
     }
 
     /// Which node to divide: the larger that can be.

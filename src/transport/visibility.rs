@@ -4,11 +4,11 @@
 //! light that it carries: of a few candidate point pairs one is kept with probability proportional to its unoccluded
 //! transfer, and the outcome of its ray counts with their mean weight (resampled importance sampling, Talbot 2005).
 
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
 
 use super::luminance;
 use crate::{
-    geometry::{Random, RayTree, triangle_point},
+    geometry::{Random, RayTree, cosine_direction, triangle_point},
     hierarchy::{Hierarchy, Kind, NodeId, Tables},
     scene::TriangleId,
 };
@@ -32,7 +32,7 @@ pub struct PairSampler<'a> {
     /// Where the nodes are.
     pub hierarchy: &'a Hierarchy,
     /// What they send.
-    pub tables: &'a Tables<Vec3A>,
+    pub tables: &'a Tables,
     /// Running sums of the patch areas, in tree order, one more than there are patches.
     pub area_sums: &'a [f64],
     /// What blocks.
@@ -121,6 +121,26 @@ impl PairSampler<'_> {
         } else {
             1.0
         }
+    }
+
+    /// Which part of the light that leaves a cluster falls on the cluster itself, by cosine-weighted rays from random
+    /// points; 0…1. It is 0 for flat and convex clusters, whatever their box.
+    pub fn self_fraction(&self, cluster: NodeId, ray_count: u32, random: &mut Random) -> f32 {
+        let Kind::Cluster(index) = self.hierarchy.kind(cluster) else {
+            return 0.0;
+        };
+        let range = self.hierarchy.clusters[index].patches();
+        let mut met = 0;
+        for _ in 0..ray_count {
+            let from = self.sample(cluster, random);
+            let direction = cosine_direction(from.normal, random.uniform_2d());
+            let hit = self
+                .rays
+                .closest(from.point, direction, Some(from.triangle));
+            let patch = hit.and_then(|hit| self.hierarchy.patch_met(hit.triangle, direction));
+            met += u32::from(patch.is_some_and(|patch| range.contains(&patch)));
+        }
+        met as f32 / ray_count as f32
     }
 }
 

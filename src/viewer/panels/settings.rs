@@ -333,7 +333,7 @@ fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
         row::setting(
             ui,
             "Threads",
-            "Solver threads; 0 takes one for each core. The result is the same.",
+            "How many threads compute; 0 takes one for each core. The result is the same.",
             &mut options.threads,
             &0,
             |ui, value| ui.add(DragValue::new(value).range(0..=256).speed(0.1)),

@@ -1,0 +1,266 @@
+//! The solver against closed forms and against its own promises.
+
+use std::{f32::consts::PI, sync::Arc};
+
+use glam::{DVec3, Vec3};
+use vecrad::{
+    geometry::{RayTree, area_vector},
+    metrics::{MeshLookup, measure_error},
+    reference::{PathSettings, PathTraced, PathTracer},
+    scene::{Scene, SceneBuilder, SceneOptions, Sides, builtin},
+    solver::{Cancel, Direct, Method, Oracle, Push, Snapshot, SolveSettings, Solver},
+};
+
+fn one_sided() -> SceneOptions {
+    SceneOptions {
+        sides: Sides::One,
+        ..SceneOptions::default()
+    }
+}
+
+fn scene(name: &str) -> Arc<Scene> {
+    Arc::new(builtin::builtin(name, &one_sided()).unwrap().unwrap())
+}
+
+fn finish(builder: SceneBuilder) -> Arc<Scene> {
+    Arc::new(builder.finish(&one_sided()).unwrap())
+}
+
+/// All steps of a solve; each state is checked.
+fn solve(scene: &Arc<Scene>, settings: SolveSettings) -> Snapshot {
+    let mut solver = Solver::new(scene.clone(), settings, None);
+    loop {
+        let report = solver.step(&Cancel::default()).unwrap();
+        solver.hierarchy().validate().unwrap();
+        solver.links().validate(solver.hierarchy()).unwrap();
+        let snapshot = solver.snapshot();
+        assert_presentable(&snapshot);
+        if report.is_final {
+            return snapshot;
+        }
+    }
+}
+
+fn assert_presentable(snapshot: &Snapshot) {
+    let light = &snapshot.light;
+    let is_good = |value: &Vec3| value.is_finite() && value.min_element() >= 0.0;
+    assert!(light.irradiance.iter().all(is_good) && light.direct.iter().all(is_good));
+    assert!(light.uncertainty.iter().all(|x| x.is_finite() && *x >= 0.0));
+    assert_eq!(light.irradiance.len(), snapshot.mesh.positions.len());
+}
+
+/// Area-weighted mean irradiance (red) over the display triangles of materials that `counts`.
+fn mean_irradiance(scene: &Scene, snapshot: &Snapshot, counts: impl Fn(&str) -> bool) -> f64 {
+    let (mut sum, mut whole) = (0.0, 0.0);
+    let mesh = &snapshot.mesh;
+    for (index, vertices) in mesh.indices.iter().enumerate() {
+        let triangle = vecrad::scene::TriangleId(mesh.triangle_of[index]);
+        if counts(&scene.material(triangle).name) {
+            let corners = vertices.map(|vertex| mesh.positions[vertex as usize]);
+            let area = f64::from(area_vector(corners).length());
+            let light: f32 = vertices
+                .iter()
+                .map(|&vertex| snapshot.light.irradiance[vertex as usize].x)
+                .sum();
+            sum += area * f64::from(light) / 3.0;
+            whole += area;
+        }
+    }
+    sum / whole
+}
+
+/// Form factor from the receiving plate to the emitting one, as the solver lights it.
+fn plates_form_factor(builder: SceneBuilder, direct: Direct) -> f64 {
+    let scene = finish(builder);
+    let settings = SolveSettings {
+        direct,
+        epsilon: 0.002,
+        ..SolveSettings::normal()
+    };
+    let snapshot = solve(&scene, settings);
+    let emitted = scene
+        .materials
+        .iter()
+        .map(|m| m.emission.x)
+        .fold(0.0, f32::max);
+    let is_receiver = |name: &str| {
+        let material = scene
+            .materials
+            .iter()
+            .find(|material| material.name == name);
+        material.is_some_and(|material| material.emission == Vec3::ZERO)
+    };
+    mean_irradiance(&scene, &snapshot, is_receiver) / f64::from(PI * emitted)
+}
+
+#[test]
+fn plates_have_their_closed_form_factors_sampled_and_linked() {
+    // Unit squares face to face at distance 1, and at right angles with a common edge (Howell's catalogue, C-11, C-14).
+    const PARALLEL: f64 = 0.199_825;
+    const PERPENDICULAR: f64 = 0.200_044;
+    for direct in [Direct::Sampled, Direct::Linked] {
+        let parallel = plates_form_factor(builtin::plates(1.0), direct);
+        assert!(
+            (parallel / PARALLEL - 1.0).abs() < 0.005,
+            "{direct:?}: {parallel}"
+        );
+        let perpendicular = plates_form_factor(builtin::perpendicular_plates(), direct);
+        assert!(
+            (perpendicular / PERPENDICULAR - 1.0).abs() < 0.005,
+            "{direct:?}: {perpendicular}"
+        );
+    }
+}
+
+#[test]
+fn a_furnace_has_radiosity_emission_over_one_minus_reflectance() {
+    for (reflectance, direct) in [
+        (0.5f32, Direct::Sampled),
+        (0.9, Direct::Sampled),
+        (0.5, Direct::Linked),
+        (0.9, Direct::Linked),
+    ] {
+        let scene = finish(builtin::furnace(reflectance, 1.0, 4));
+        let settings = SolveSettings {
+            direct,
+            tolerance: 1e-4,
+            ..SolveSettings::normal()
+        };
+        let snapshot = solve(&scene, settings);
+        // B = E_m / (1 − ρ) and B = E_m + ρ E, with the exitance E_m = π.
+        let expected = f64::from(PI) / (1.0 - f64::from(reflectance));
+        let found = mean_irradiance(&scene, &snapshot, |_| true);
+        assert!(
+            (found / expected - 1.0).abs() < 0.005,
+            "ρ {reflectance} {direct:?}: {found} for {expected}"
+        );
+    }
+}
+
+#[test]
+fn scaling_and_moving_a_scene_leaves_irradiance_unchanged() {
+    let settings = SolveSettings::draft();
+    let original = solve(&scene("cornell"), settings.clone());
+    let mut builder = builtin::find_builtin("cornell").unwrap().builder();
+    for position in &mut builder.positions {
+        // A power of two, so that rounding is the same.
+        *position = *position * 1024.0 + DVec3::new(0.0, 0.0, 0.0);
+    }
+    let scaled = solve(&finish(builder), settings);
+    assert_eq!(
+        original.light.irradiance.len(),
+        scaled.light.irradiance.len()
+    );
+    for (a, b) in original
+        .light
+        .irradiance
+        .iter()
+        .zip(&scaled.light.irradiance)
+    {
+        assert!(a.abs_diff_eq(*b, 1e-4 * a.max_element()), "{a} {b}");
+    }
+}
+
+#[test]
+fn every_method_oracle_and_push_stays_presentable() {
+    let scene = scene("cornell");
+    for method in [
+        Method::Bounded,
+        Method::SixFace,
+        Method::Single,
+        Method::Exact,
+        Method::Isotropic,
+    ] {
+        for oracle in [Oracle::Interval, Oracle::Samples] {
+            for push in [Push::Combined, Push::AtOnce] {
+                let settings = SolveSettings {
+                    method,
+                    oracle,
+                    push,
+                    ..SolveSettings::draft()
+                };
+                solve(&scene, settings);
+            }
+        }
+    }
+}
+
+fn truth(scene: &Arc<Scene>) -> PathTraced {
+    let rays = Arc::new(RayTree::new(scene));
+    let settings = PathSettings {
+        point_count: 1000,
+        samples_per_pass: 256,
+        ..PathSettings::default()
+    };
+    let mut tracer = PathTracer::new(scene.clone(), rays, settings);
+    assert!(tracer.pass(&|| false));
+    tracer.result()
+}
+
+fn error(scene: &Scene, snapshot: &Snapshot, truth: &PathTraced) -> f64 {
+    let values = MeshLookup::new(scene, &snapshot.mesh).radiance(&snapshot.light, &truth.points);
+    measure_error(&values, &truth.points)
+        .unwrap()
+        .relative_rms_trimmed
+}
+
+#[test]
+fn error_falls_as_the_threshold_falls() {
+    let scene = scene("room-1022");
+    let truth = truth(&scene);
+    for method in [Method::Bounded, Method::SixFace, Method::Exact] {
+        let errors = [0.15, 0.03, 0.006].map(|epsilon| {
+            let settings = SolveSettings {
+                method,
+                epsilon,
+                max_steps: 3,
+                ..SolveSettings::normal()
+            };
+            error(&scene, &solve(&scene, settings), &truth)
+        });
+        assert!(
+            errors[0] > errors[1] && errors[1] > errors[2],
+            "{method:?}: {errors:?}"
+        );
+    }
+}
+
+#[test]
+fn the_default_preset_is_within_eight_percent_of_path_tracing() {
+    for name in ["cornell", "room-1022"] {
+        let scene = scene(name);
+        let error = error(
+            &scene,
+            &solve(&scene, SolveSettings::normal()),
+            &truth(&scene),
+        );
+        assert!(error < 0.08, "{name}: {error}");
+    }
+}
+
+#[test]
+fn a_scene_without_emitters_is_black() {
+    let mut builder = builtin::plates(1.0);
+    for material in &mut builder.materials {
+        material.emission = Vec3::ZERO;
+    }
+    let snapshot = solve(&finish(builder), SolveSettings::draft());
+    assert!(
+        snapshot
+            .light
+            .irradiance
+            .iter()
+            .all(|light| *light == Vec3::ZERO)
+    );
+}
+
+#[test]
+fn a_cancelled_step_leaves_the_last_light() {
+    let mut solver = Solver::new(scene("cornell"), SolveSettings::draft(), None);
+    solver.step(&Cancel::default()).unwrap();
+    let before = solver.snapshot();
+    let cancel = Cancel::default();
+    cancel.cancel();
+    assert!(solver.step(&cancel).is_none());
+    assert_eq!(before.light, solver.snapshot().light);
+}
