@@ -257,6 +257,7 @@ pub fn viewport_ui(
     let response = ui.allocate_rect(rect, egui::Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Scene"));
     let picked = navigation::navigate(ui, &response, state);
+    ui.painter().rect_filled(rect, 0.0, ui.visuals().panel_fill);
     if let Some(viewport) = viewport {
         viewport.paint(ui, rect, state);
     }

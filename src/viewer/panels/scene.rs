@@ -6,7 +6,12 @@ use eframe::egui::{self, RichText};
 
 use crate::{
     scene::builtin::builtins,
-    viewer::{action::Action, loader::SceneSource, state::State, theme},
+    viewer::{
+        action::Action,
+        loader::SceneSource,
+        state::{Severity, State},
+        theme,
+    },
 };
 
 /// What the viewport says while there is no scene.
@@ -17,6 +22,11 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
         ui.vertical_centered(|ui| {
             ui.label(RichText::new("Open a scene to light it").heading());
             ui.add_space(6.0);
+            let last = state.messages.all.last();
+            if let Some(error) = last.filter(|message| message.severity == Severity::Error) {
+                ui.colored_label(theme::BAD, &error.text);
+                ui.add_space(6.0);
+            }
             ui.label("Drop an OBJ file here, choose one, or type its path.");
             ui.add_space(8.0);
             if ui
