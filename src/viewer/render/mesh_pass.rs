@@ -298,7 +298,7 @@ fn pipeline(
                 entry_point: Some(vertex),
                 compilation_options: Default::default(),
                 buffers: if kind == Kind::Edge {
-                    &layouts[..1]
+                    &layouts[..2]
                 } else {
                     &layouts
                 },

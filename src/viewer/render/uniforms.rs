@@ -86,7 +86,7 @@ impl ViewUniforms {
         let mut floats = Vec::with_capacity(FLOAT_COUNT);
         floats.extend(camera.clip_from_frame(aspect).to_cols_array());
         floats.extend([eye.x, eye.y, eye.z, flag(camera.orthographic)]);
-        floats.extend([backward.x, backward.y, backward.z, 0.0]);
+        floats.extend([backward.x, backward.y, backward.z, flag(view.backs)]);
         floats.extend([low, high, flag(view.logarithmic), theme::BACK_LIGHTNESS]);
         let is_preview = picture.is_unlit && view.mode.is_light();
         floats.extend([
