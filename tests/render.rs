@@ -320,6 +320,7 @@ fn the_selected_cluster_is_outlined() {
         light: &snapshot.light,
         camera: &camera(),
         view: &view,
+        is_unlit: false,
         range: [0.0, 1.0],
         overlay: &overlay,
         background: Vec3::ZERO,

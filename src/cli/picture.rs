@@ -12,12 +12,13 @@ use super::{
     output,
 };
 use crate::{
+    geometry::RayTree,
     scene::{Scene, builtin},
     solver::Snapshot,
     viewer::{
         CameraRequest,
-        camera::{Camera, UpAxis},
-        loader,
+        camera::UpAxis,
+        loader, opening,
         render::headless,
         view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
     },
@@ -160,9 +161,7 @@ impl PictureFlags {
             Some(found) => loader::builtin_camera(found, scene),
             None => {
                 let (min, max) = loader::bounds(scene);
-                let mut camera = Camera::default();
-                camera.frame_box(min, max, size[0] as f32 / size[1] as f32);
-                camera
+                opening::deepest_view(scene, &RayTree::new(scene), min, max)
             }
         };
         let camera = self.view.camera(up).apply(opening, &scene.frame);

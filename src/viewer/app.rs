@@ -20,7 +20,7 @@ use super::{
     panels, pick, saver,
     saver::Notice,
     session::{self, Recent, Session},
-    start::{Faults, Options},
+    start::{self, CameraRequest, Faults, Options},
     state::{RunStatus, Selection, Severity, State},
     theme,
     viewport::{Viewport, viewport_ui},
@@ -45,6 +45,8 @@ pub struct App {
     notices: (Sender<Notice>, Receiver<Notice>),
     /// Set from the command line for the first scene only.
     first: Option<Options>,
+    /// A new title for the window.
+    title: Option<String>,
     /// Camera and view stay as they are when the scene being read arrives.
     keeps_view: bool,
 }
@@ -94,6 +96,7 @@ impl App {
             dialog_is_open: false,
             notices: mpsc::channel(),
             first: None,
+            title: None,
             keeps_view: false,
         };
         app.state.rig.target.up = options.camera.up;
@@ -163,6 +166,9 @@ impl App {
             self.state.view.exposure = exposure;
         }
         self.state.false_color_range = light_range::false_color_range(snapshot, &self.state.view);
+        self.state
+            .cluster_counts
+            .update(&snapshot.clusters, self.state.view.clusters.level);
         self.look_up();
     }
 
@@ -175,6 +181,10 @@ impl App {
         ) else {
             return;
         };
+        let is_current = |held: &Arc<_>| Arc::ptr_eq(held, snapshot);
+        if selection.of.as_ref().is_some_and(is_current) {
+            return;
+        }
         let triangle = selection.pick.triangle;
         selection.of = Some(snapshot.clone());
         selection.probe = pick::probe(snapshot, &selection.pick);
@@ -219,6 +229,7 @@ impl App {
             self.open_view(&loaded);
         }
         self.keeps_view = true;
+        self.title = Some(start::title(&loaded.source));
         self.state.selection = None;
         self.state.cluster = None;
         self.state.run.snapshot = None;
@@ -234,7 +245,15 @@ impl App {
     /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
     fn open_view(&mut self, loaded: &LoadedScene) {
         let frame = &loaded.scene.frame;
-        let mut camera = self.state.opening_camera(loaded);
+        let mut camera = loaded.viewpoint;
+        if loaded.source.path().is_some() {
+            // The axis chosen before holds for the next file, too; built-in scenes know theirs.
+            let chosen = CameraRequest {
+                up: self.state.rig.target.up,
+                ..CameraRequest::default()
+            };
+            camera = chosen.apply(camera, frame);
+        }
         match session::load(&loaded.source, frame) {
             Some(Ok(saved)) => {
                 camera = saved.camera.unwrap_or(camera);
@@ -306,18 +325,18 @@ impl App {
             }
             Action::ClearRecent => self.state.recent = Recent::default(),
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
-            other => self.change_view(other),
+            other => self.change_view(&other),
         }
         ctx.request_repaint();
     }
 
     /// Actions that change only how the scene is shown.
-    fn change_view(&mut self, action: Action) {
+    fn change_view(&mut self, action: &Action) {
         let state = &mut self.state;
         match action {
-            Action::Mode(mode) => state.view.mode = mode,
+            Action::Mode(mode) => state.view.mode = *mode,
             Action::ExposureBy(step) => {
-                state.view.exposure += step;
+                state.view.exposure += *step;
                 state.view.auto_exposure = false;
             }
             Action::AutoExposure => state.view.auto_exposure = true,
@@ -334,24 +353,20 @@ impl App {
                 state.view.clusters.shown = !state.view.clusters.shown;
             }
             Action::ClusterLevelBy(step) => {
-                let deepest = state
-                    .run
-                    .snapshot
-                    .as_ref()
-                    .map_or(0, |snapshot| clusters::deepest_level(&snapshot.clusters));
+                let deepest = state.cluster_counts.deepest;
                 let level = &mut state.view.clusters.level;
-                *level = level.saturating_add_signed(step).min(deepest);
+                *level = level.saturating_add_signed(*step).min(deepest);
                 state.view.clusters.shown = true;
             }
             Action::FrameAll => state.frame_all(),
-            Action::LookFrom(view) => state.rig.target.look_from(view),
+            Action::LookFrom(view) => state.rig.target.look_from(*view),
             Action::ToggleProjection => {
                 state.rig.target.orthographic = !state.rig.target.orthographic;
                 state.rig.current.orthographic = state.rig.target.orthographic;
             }
             Action::Up(up) => {
-                state.rig.target.up = up;
-                state.rig.current.up = up;
+                state.rig.target.up = *up;
+                state.rig.current.up = *up;
             }
             Action::TogglePanels => state.panels.shown = !state.panels.shown,
             Action::ToggleHelp => state.panels.help = !state.panels.help,
@@ -586,6 +601,9 @@ impl eframe::App for App {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         self.drain();
+        if let Some(title) = self.title.take() {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
+        }
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
@@ -623,6 +641,7 @@ impl eframe::App for App {
                 if self.state.loaded.is_none() && self.state.loading.is_none() {
                     panels::scene::empty_ui(ui, rect, &mut self.state, &mut actions);
                 }
+                panels::scene::waiting_ui(ui, rect, &self.state);
                 panels::legend::legend_ui(ui, rect, &self.state);
                 picked
             })

@@ -84,7 +84,7 @@ impl Camera {
             up,
             ..Self::default()
         };
-        let away = camera.from_scene(eye - target);
+        let away = camera.to_y_up(eye - target);
         let distance = away.length();
         let away = away.try_normalize().unwrap_or(Vec3::Z);
         Self {
@@ -97,7 +97,7 @@ impl Camera {
     }
 
     /// Scene directions to directions with y up.
-    fn from_scene(&self, v: Vec3) -> Vec3 {
+    fn to_y_up(self, v: Vec3) -> Vec3 {
         match self.up {
             UpAxis::Y => v,
             UpAxis::Z => Vec3::new(v.x, v.z, -v.y),
@@ -227,8 +227,7 @@ impl Camera {
         let radius = (0.5 * (max - min).length()).max(MIN_DISTANCE);
         let narrow = (0.5 * self.fov_y_radians).tan() * aspect.min(1.0);
         self.pivot = 0.5 * (min + max);
-        // The box rarely fills its sphere, so a little less than the sphere is shown.
-        self.distance = (0.9 * radius / narrow.atan().sin()).clamp(MIN_DISTANCE, MAX_DISTANCE);
+        self.distance = (radius / narrow.atan().sin()).clamp(MIN_DISTANCE, MAX_DISTANCE);
     }
 
     /// Look along an axis.

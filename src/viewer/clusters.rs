@@ -1,5 +1,7 @@
 //! Cluster boxes as lines: which boxes of the tree, in which colours; the face powers of one as arrows.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::{
@@ -11,6 +13,30 @@ use crate::solver::ClusterBox;
 
 /// Boxes drawn at most. More are a grey fog and slow on a software adapter.
 const MAX_BOXES: usize = 200_000;
+
+/// Counts of a tree at a level, kept because large trees take milliseconds to count.
+#[derive(Default)]
+pub struct ClusterCounts {
+    of: Option<(Arc<Vec<ClusterBox>>, u32)>,
+    /// Deepest level.
+    pub deepest: u32,
+    /// Boxes that the level shows.
+    pub shown: usize,
+}
+
+impl ClusterCounts {
+    /// Count again if the tree or the level is another.
+    pub fn update(&mut self, clusters: &Arc<Vec<ClusterBox>>, level: u32) {
+        let is_current = |(held, counted): &(Arc<Vec<ClusterBox>>, u32)| {
+            Arc::ptr_eq(held, clusters) && *counted == level
+        };
+        if !self.of.as_ref().is_some_and(is_current) {
+            self.deepest = deepest_level(clusters);
+            self.shown = at_level(clusters, level).count();
+            self.of = Some((clusters.clone(), level));
+        }
+    }
+}
 
 /// Deepest level of a tree; 0 without one.
 pub fn deepest_level(clusters: &[ClusterBox]) -> u32 {

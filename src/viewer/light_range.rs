@@ -8,9 +8,9 @@ use crate::solver::Snapshot;
 /// Vertices looked at. Fewer miss small bright spots; more take longer than a frame of a large scene may.
 const SAMPLES: usize = 20_000;
 /// Display value that the middle of the light is exposed to. Brighter washes out, darker hides the corners.
-const MIDDLE_GRAY: f32 = 0.22;
+const MIDDLE_GRAY: f32 = 0.24;
 /// Display value that the bright end of the light stays below.
-const BRIGHT_END: f32 = 1.2;
+const BRIGHT_END: f32 = 1.6;
 /// Below this nothing counts as light, in W/(sr·m²).
 const DARKNESS: f32 = 1e-12;
 

@@ -12,7 +12,10 @@ use std::{
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::camera::{Camera, UpAxis};
+use super::{
+    camera::{Camera, UpAxis},
+    opening,
+};
 use crate::{
     geometry::RayTree,
     scene::{self, Scene, SceneOptions, builtin},
@@ -63,8 +66,10 @@ pub struct LoadedScene {
     pub min: Vec3,
     /// Upper corner in frame units.
     pub max: Vec3,
-    /// A view that the scene brings along.
-    pub viewpoint: Option<Camera>,
+    /// Triangles that emit.
+    pub emitter_count: usize,
+    /// The view to open with: the one that the scene brings along, or the one that sees most.
+    pub viewpoint: Camera,
 }
 
 /// A scene on its way.
@@ -128,8 +133,12 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
         }
     };
     let (min, max) = bounds(&scene);
+    let rays = RayTree::new(&scene);
+    let viewpoint = viewpoint.unwrap_or_else(|| opening::deepest_view(&scene, &rays, min, max));
+    let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
-        rays: RayTree::new(&scene),
+        emitter_count: scene.surfaces.iter().filter(emits).count(),
+        rays,
         scene: Arc::new(scene),
         source,
         min,

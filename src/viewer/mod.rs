@@ -11,6 +11,7 @@ pub mod clusters;
 pub mod light_range;
 pub mod loader;
 pub mod navigation;
+pub mod opening;
 pub mod panels;
 pub mod pick;
 pub mod render;

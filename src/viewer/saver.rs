@@ -54,7 +54,10 @@ impl Saving {
             (_, false) => DynamicImage::from(DynamicImage::from(self.display).into_rgb8()),
         };
         match picture.save(&self.path) {
-            Ok(()) => (Severity::Note, format!("saved {}", self.path.display())),
+            Ok(()) => {
+                let place = std::path::absolute(&self.path).unwrap_or(self.path);
+                (Severity::Note, format!("saved {}", place.display()))
+            }
             Err(error) => {
                 let text = format!("cannot save {}: {error}", self.path.display());
                 (Severity::Error, text)

@@ -111,10 +111,8 @@ pub enum ViewerError {
 /// See [`ViewerError`].
 pub fn run(options: Options) -> Result<(), ViewerError> {
     let faults = Arc::new(Faults::default());
-    let title = options.source.as_ref().map_or_else(
-        || "vecrad".to_owned(),
-        |source| format!("{} – vecrad", source.label()),
-    );
+    let source = options.source.as_ref();
+    let title = source.map_or_else(|| "vecrad".to_owned(), title);
     let app_faults = faults.clone();
     let ended = eframe::run_native(
         "vecrad",
@@ -125,6 +123,11 @@ pub fn run(options: Options) -> Result<(), ViewerError> {
         return Err(ViewerError::DeviceLost(reason.clone()));
     }
     ended.map_err(|error| describe(&error))
+}
+
+/// Title of the window that shows a scene.
+pub(super) fn title(source: &SceneSource) -> String {
+    format!("{} – vecrad", source.label())
 }
 
 fn native_options(title: &str) -> eframe::NativeOptions {
@@ -148,12 +151,25 @@ fn native_options(title: &str) -> eframe::NativeOptions {
 
 /// One sentence for what eframe says.
 fn describe(error: &eframe::Error) -> ViewerError {
-    let text = error.to_string().replace('\n', " ");
+    let text = essence(&error.to_string());
     match error {
         eframe::Error::Wgpu(_) => ViewerError::NoAdapter(text),
         eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => ViewerError::NoDisplay(text),
         _ => ViewerError::Other(text),
     }
+}
+
+/// What an error says, without the places in other people's source that it names.
+fn essence(text: &str) -> String {
+    let text = text.replace('\n', " ");
+    let said = match text.rsplit_once(".rs:") {
+        Some((_, place)) => place.split_once(": ").map_or(place, |(_, said)| said),
+        None => &text,
+    };
+    said.trim_start_matches("WGPU error: ")
+        .trim_end_matches(": {}")
+        .trim_end_matches('.')
+        .to_owned()
 }
 
 /// What the graphics device complained of, from whatever thread.
@@ -217,4 +233,20 @@ fn first_line(text: &str) -> String {
         .take(3)
         .collect::<Vec<_>>()
         .join(": ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::essence;
+
+    #[test]
+    fn errors_are_short() {
+        let long = "winit EventLoopError: os error at /a/b/mod.rs:765: DISPLAY is not set.";
+        assert_eq!(essence(long), "DISPLAY is not set");
+        let empty = "WGPU error: Failed to create surface for any enabled backend: {}";
+        assert_eq!(
+            essence(empty),
+            "Failed to create surface for any enabled backend"
+        );
+    }
 }

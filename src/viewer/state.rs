@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    camera::{Camera, CameraRig},
+    camera::CameraRig,
+    clusters::ClusterCounts,
     loader::{LoadedScene, Loader},
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
@@ -247,6 +248,8 @@ pub struct State {
     pub selection: Option<Selection>,
     /// The selected cluster.
     pub cluster: Option<usize>,
+    /// Counts of the cluster tree at the level that is shown.
+    pub cluster_counts: ClusterCounts,
     /// Ends of the false colours in use.
     pub false_color_range: [f32; 2],
     /// What was said.
@@ -274,18 +277,6 @@ impl State {
         if let Some(loaded) = &self.loaded {
             self.rig.target.frame_box(loaded.min, loaded.max, aspect);
         }
-    }
-
-    /// The view that a scene opens with: its own, or all of it.
-    pub fn opening_camera(&self, loaded: &LoadedScene) -> Camera {
-        loaded.viewpoint.unwrap_or_else(|| {
-            let mut camera = Camera {
-                up: self.rig.target.up,
-                ..Camera::default()
-            };
-            camera.frame_box(loaded.min, loaded.max, self.aspect());
-            camera
-        })
     }
 
     /// The last report.

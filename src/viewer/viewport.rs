@@ -42,6 +42,7 @@ struct PictureKey {
     overlay: Overlay,
     camera: Camera,
     view: ViewSettings,
+    is_unlit: bool,
     range: [f32; 2],
     size: [u32; 2],
     background: Vec3,
@@ -56,6 +57,7 @@ impl PartialEq for PictureKey {
             && Arc::ptr_eq(&self.overlay.segments, &other.overlay.segments)
             && self.camera == other.camera
             && self.view == other.view
+            && self.is_unlit == other.is_unlit
             && self.range == other.range
             && self.size == other.size
             && self.background == other.background
@@ -159,6 +161,7 @@ impl Viewport {
             overlay: self.overlay.clone(),
             camera: state.rig.current,
             view: state.view.clone(),
+            is_unlit: snapshot.step == 0,
             range: state.false_color_range,
             size,
             background,
@@ -227,6 +230,7 @@ fn picture(key: &PictureKey, pixels_per_point: f32) -> Picture<'_> {
         light: &key.light,
         camera: &key.camera,
         view: &key.view,
+        is_unlit: key.is_unlit,
         range: key.range,
         overlay: &key.overlay,
         background: key.background,
@@ -253,6 +257,7 @@ pub fn viewport_ui(
     let response = ui.allocate_rect(rect, egui::Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Scene"));
     let picked = navigation::navigate(ui, &response, state);
+    ui.painter().rect_filled(rect, 0.0, ui.visuals().panel_fill);
     if let Some(viewport) = viewport {
         viewport.paint(ui, rect, state);
     }

@@ -5,13 +5,7 @@ use eframe::egui::{self, Slider};
 use super::{count, figure, row};
 use crate::{
     solver::ClusterBox,
-    viewer::{
-        action::Action,
-        clusters::{at_level, deepest_level, path_to},
-        state::State,
-        theme,
-        view::ClusterColor,
-    },
+    viewer::{action::Action, clusters::path_to, state::State, theme, view::ClusterColor},
 };
 
 /// Show the controls; wishes go into `actions`.
@@ -25,7 +19,7 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
         ui.weak("There are no clusters yet.");
         return;
     }
-    let deepest = deepest_level(clusters);
+    let deepest = state.cluster_counts.deepest;
     let label = ui
         .label("Level")
         .on_hover_text("[ for larger, ] for smaller clusters");
@@ -34,10 +28,9 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
     let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
     let label = ui.label("Colour");
     row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);
-    let shown = at_level(clusters, overlay.level).count();
     ui.weak(format!(
         "{} boxes of {} clusters; dark is little, red is much.",
-        count(shown as u64),
+        count(state.cluster_counts.shown as u64),
         count(clusters.len() as u64)
     ));
     match state

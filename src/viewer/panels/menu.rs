@@ -123,11 +123,21 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     ui.separator();
     item(ui, table, actions, "Panels", Action::TogglePanels);
     item(ui, table, actions, "Full screen", Action::ToggleFullScreen);
-    ui.menu_button("Theme", |ui| {
-        let mut preference = ui.ctx().options(|options| options.theme_preference);
-        preference.buttons(ui);
-        ui.ctx().set_theme(preference);
-    });
+    ui.menu_button("Theme", theme_menu);
+}
+
+fn theme_menu(ui: &mut egui::Ui) {
+    let present = ui.ctx().options(|options| options.theme_preference);
+    for (label, preference) in [
+        ("As the system", egui::ThemePreference::System),
+        ("Dark", egui::ThemePreference::Dark),
+        ("Light", egui::ThemePreference::Light),
+    ] {
+        if ui.selectable_label(present == preference, label).clicked() {
+            ui.ctx().set_theme(preference);
+            ui.close();
+        }
+    }
 }
 
 fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {

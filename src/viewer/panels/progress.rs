@@ -19,9 +19,8 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
         _ => step as f32 / steps as f32,
     };
     let text = match status {
-        RunStatus::Running | RunStatus::Paused => {
-            format!("{}, step {step} of {steps}", status.label())
-        }
+        RunStatus::Running => format!("Computing step {} of {steps}", (step + 1).min(steps)),
+        RunStatus::Paused => format!("Paused after step {step} of {steps}"),
         _ => status.label(),
     };
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));

@@ -6,7 +6,12 @@ use eframe::egui::{self, RichText};
 
 use crate::{
     scene::builtin::builtins,
-    viewer::{action::Action, loader::SceneSource, state::State},
+    viewer::{
+        action::Action,
+        loader::SceneSource,
+        state::{Severity, State},
+        theme,
+    },
 };
 
 /// What the viewport says while there is no scene.
@@ -17,6 +22,11 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
         ui.vertical_centered(|ui| {
             ui.label(RichText::new("Open a scene to light it").heading());
             ui.add_space(6.0);
+            let last = state.messages.all.last();
+            if let Some(error) = last.filter(|message| message.severity == Severity::Error) {
+                ui.colored_label(theme::BAD, &error.text);
+                ui.add_space(6.0);
+            }
             ui.label("Drop an OBJ file here, choose one, or type its path.");
             ui.add_space(8.0);
             if ui
@@ -42,6 +52,24 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
             ui.weak("Left drag orbits, middle drag pans, the wheel zooms. F1 shows all keys.");
         });
     });
+}
+
+/// What the viewport says while there is nothing to show yet.
+pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
+    let text = match (&state.loading, &state.loaded) {
+        (Some(loading), None) => format!("Reading {}…", loading.source().label()),
+        (_, Some(loaded)) if state.run.snapshot.is_none() && state.run.status.is_busy() => {
+            format!("Building the clusters of {}…", loaded.source.label())
+        }
+        _ => return,
+    };
+    ui.painter().text(
+        rect.center(),
+        egui::Align2::CENTER_CENTER,
+        text,
+        egui::FontId::proportional(15.0),
+        theme::secondary_text(ui.visuals()),
+    );
 }
 
 /// A field for a path, for when there is no file dialog.

@@ -25,14 +25,10 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 count(scene.objects.len() as u64),
                 "Named runs of triangles",
             );
-            let emitters = scene
-                .surfaces
-                .iter()
-                .filter(|surface| surface.emission != glam::Vec3::ZERO);
             row::figure(
                 ui,
                 "Emitters",
-                count(emitters.count() as u64),
+                count(loaded.emitter_count as u64),
                 "Triangles that emit light",
             );
             row::figure(

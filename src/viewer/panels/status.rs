@@ -4,7 +4,7 @@ use eframe::egui::{self, RichText};
 
 use super::{count, figure, seconds};
 use crate::viewer::{
-    state::{RunStatus, Severity, State},
+    state::{Message, RunStatus, Severity, State},
     theme,
 };
 
@@ -12,7 +12,7 @@ use crate::viewer::{
 pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
     ui.horizontal(|ui| {
         if let Some(loading) = &state.loading {
-            ui.spinner();
+            // No spinner: turning it would take the processor from the reading.
             ui.label(format!("Reading {}", loading.source().label()));
         }
         let color = match &state.run.status {
@@ -41,16 +41,21 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
 
 fn messages_button(ui: &mut egui::Ui, state: &mut State) {
     let unseen = state.messages.unseen();
-    let Some(last) = unseen.last() else { return };
-    let worst = |severity| unseen.iter().any(|message| message.severity == severity);
-    let color = if worst(Severity::Error) {
-        theme::BAD
-    } else if worst(Severity::Warning) {
-        theme::WARNING
-    } else {
-        theme::GOOD
+    // The worst comes first, the newest of them.
+    let rank = |message: &&Message| match message.severity {
+        Severity::Note => 0,
+        Severity::Warning => 1,
+        Severity::Error => 2,
     };
-    let mut text = last.text.clone();
+    let Some(worst) = unseen.iter().max_by_key(rank) else {
+        return;
+    };
+    let color = match worst.severity {
+        Severity::Note => theme::GOOD,
+        Severity::Warning => theme::WARNING,
+        Severity::Error => theme::BAD,
+    };
+    let mut text = worst.text.clone();
     if text.chars().count() > 90 {
         text = text.chars().take(90).chain(['…']).collect();
     }

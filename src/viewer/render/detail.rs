@@ -14,6 +14,9 @@ use crate::{
 /// Textures larger than this are shown smaller: light, not texture, is what is looked at.
 const MAX_SIDE: u32 = 2048;
 
+/// A run of indices with the number of its group.
+pub(super) type DetailRange = (Range<u32>, usize);
+
 /// The groups of a scene's materials.
 pub(super) struct DetailSet {
     layout: wgpu::BindGroupLayout,
@@ -106,7 +109,7 @@ impl DetailSet {
         &self,
         scene: &Scene,
         mesh: &DisplayMesh,
-    ) -> (Vec<[u32; 3]>, Vec<(Range<u32>, usize)>) {
+    ) -> (Vec<[u32; 3]>, Vec<DetailRange>) {
         let count = mesh.indices.len();
         if self.textured.is_empty() || mesh.texcoords.is_empty() {
             return (mesh.indices.clone(), vec![(0..3 * count as u32, 0)]);
@@ -117,7 +120,7 @@ impl DetailSet {
         };
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by_key(|&index| group(index));
-        let mut ranges: Vec<(Range<u32>, usize)> = Vec::new();
+        let mut ranges: Vec<DetailRange> = Vec::new();
         for (place, &index) in order.iter().enumerate() {
             let (start, end) = (3 * place as u32, 3 * place as u32 + 3);
             match ranges.last_mut() {

@@ -97,6 +97,7 @@ pub fn picture(
         mesh: &snapshot.mesh,
         light: &snapshot.light,
         camera,
+        is_unlit: snapshot.step == 0,
         range: light_range::false_color_range(snapshot, &view),
         view: &view,
         overlay: &overlay,

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use wgpu::util::DeviceExt as _;
 
-use super::{DEPTH_FORMAT, Gpu, Picture, RenderError, detail::DetailSet};
+use super::{
+    DEPTH_FORMAT, Gpu, Picture, RenderError,
+    detail::{DetailRange, DetailSet},
+};
 use crate::{
     solver::{DisplayMesh, VertexLight},
     viewer::view::{ViewMode, ViewSettings},
@@ -47,8 +50,7 @@ struct MeshBuffers {
     emission: wgpu::Buffer,
     light: wgpu::Buffer,
     indices: wgpu::Buffer,
-    /// Index ranges, each with the number of its detail.
-    ranges: Vec<(std::ops::Range<u32>, usize)>,
+    ranges: Vec<DetailRange>,
     /// Made when edges are first shown.
     edges: Option<(wgpu::Buffer, u32)>,
 }
@@ -296,7 +298,7 @@ fn pipeline(
                 entry_point: Some(vertex),
                 compilation_options: Default::default(),
                 buffers: if kind == Kind::Edge {
-                    &layouts[..1]
+                    &layouts[..2]
                 } else {
                     &layouts
                 },

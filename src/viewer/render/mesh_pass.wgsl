@@ -96,6 +96,8 @@ fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
         case 7u: { return vec4<f32>(false_color(luminance(surface.light)), 0.0); }
         case 8u: { return vec4<f32>(false_color(luminance(surface.emission + surface.reflectance * surface.light / PI)), 0.0); }
         case 9u: { return vec4<f32>(false_color(surface.light.x), 0.0); }
+        // No light yet: the surfaces as a lamp beside the eye would show them.
+        case 10u: { return vec4<f32>(reflectance * (0.15 + 0.6 * facing), 0.0); }
         default: { return exposed(radiance); }
     }
 }
@@ -110,12 +112,28 @@ fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
     return vec4<f32>(vec3<f32>(view.range.w) * (0.4 + 0.6 * facing), 0.0);
 }
 
+struct Edge {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) facing: f32,
+};
+
 @vertex
-fn vs_edge(@location(0) position: vec3<f32>) -> @builtin(position) vec4<f32> {
-    return lifted(view.clip_from_frame * vec4<f32>(position, 1.0));
+fn vs_edge(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> Edge {
+    var to_eye = view.eye.xyz - position;
+    if (view.eye.w > 0.5) {
+        to_eye = view.backward.xyz;
+    }
+    var out: Edge;
+    out.clip = lifted(view.clip_from_frame * vec4<f32>(position, 1.0));
+    out.facing = dot(normal, to_eye);
+    return out;
 }
 
+// Edges of faces that are looked through are not drawn, else they would hide what is behind.
 @fragment
-fn fs_edge() -> @location(0) vec4<f32> {
+fn fs_edge(edge: Edge) -> @location(0) vec4<f32> {
+    if (edge.facing < 0.0 && view.backward.w < 0.5) {
+        discard;
+    }
     return vec4<f32>(0.008, 0.012, 0.02, view.viewport.w);
 }

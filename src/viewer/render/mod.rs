@@ -163,6 +163,8 @@ pub struct Picture<'a> {
     pub camera: &'a Camera,
     /// How.
     pub view: &'a ViewSettings,
+    /// Whether there is no light yet: light modes then show the surfaces as they are.
+    pub is_unlit: bool,
     /// Ends of the false colours.
     pub range: [f32; 2],
     /// Lines on top.

@@ -10,6 +10,8 @@ const FLOAT_COUNT: usize = 16 + 5 * 4 + 9 * 4;
 const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
 /// Width of segments in points.
 const LINE_POINTS: f32 = 2.5;
+/// Number by which the shader knows surfaces without light.
+const PREVIEW_MODE: f32 = 10.0;
 /// Opacity of element edges over light, and over the grey solid.
 const EDGE_OPACITY: [f32; 2] = [0.45, 0.8];
 
@@ -84,10 +86,15 @@ impl ViewUniforms {
         let mut floats = Vec::with_capacity(FLOAT_COUNT);
         floats.extend(camera.clip_from_frame(aspect).to_cols_array());
         floats.extend([eye.x, eye.y, eye.z, flag(camera.orthographic)]);
-        floats.extend([backward.x, backward.y, backward.z, 0.0]);
+        floats.extend([backward.x, backward.y, backward.z, flag(view.backs)]);
         floats.extend([low, high, flag(view.logarithmic), theme::BACK_LIGHTNESS]);
+        let is_preview = picture.is_unlit && view.mode.is_light();
         floats.extend([
-            f32::from(view.mode.shader_number()),
+            if is_preview {
+                PREVIEW_MODE
+            } else {
+                f32::from(view.mode.shader_number())
+            },
             view.exposure_factor(),
             flag(view.tone_map == ToneMap::None),
             flag(view.texture_detail),

@@ -3,7 +3,7 @@ struct View {
     clip_from_frame: mat4x4<f32>,
     // xyz: position of the eye; w: 1 where the projection is parallel.
     eye: vec4<f32>,
-    // xyz: direction to the viewer, for parallel projection.
+    // xyz: direction to the viewer, for parallel projection; w: 1 where backs are drawn.
     backward: vec4<f32>,
     // Low and high end of the false colours; 1 where they are logarithmic; lightness of the backs.
     range: vec4<f32>,
