@@ -68,7 +68,13 @@ pub fn open_gpu() -> Result<Gpu, HeadlessError> {
     let (device, queue) =
         pollster::block_on(adapter.request_device(&Gpu::device_descriptor(&adapter)))
             .map_err(|error| none(&error))?;
-    Ok(Gpu::new(&adapter, device, queue))
+    let gpu = Gpu::new(&adapter, device, queue);
+    // Nobody waits for the next frame.
+    let sample_count = gpu.most_samples;
+    Ok(Gpu {
+        sample_count,
+        ..gpu
+    })
 }
 
 /// Draw a snapshot at a size in pixels. Automatic exposure and ranges are taken from its light, as in the window.

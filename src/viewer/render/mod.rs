@@ -73,6 +73,8 @@ pub struct Gpu {
     pub adapter_name: String,
     /// Samples a pixel.
     pub sample_count: u32,
+    /// Samples a pixel where time does not matter.
+    pub most_samples: u32,
     /// Format of the linear picture.
     pub linear_format: wgpu::TextureFormat,
 }
@@ -89,13 +91,9 @@ impl Gpu {
             && features
                 .flags
                 .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
+        let most_samples = if multisampled && drawable { 4 } else { 1 };
         // A processor that plays adapter takes twice as long for four samples.
-        let sample_count = if multisampled && drawable && about.device_type != wgpu::DeviceType::Cpu
-        {
-            4
-        } else {
-            1
-        };
+        let is_slow = about.device_type == wgpu::DeviceType::Cpu;
         Self {
             device,
             queue,
@@ -103,7 +101,8 @@ impl Gpu {
                 "{} ({:?}, {})",
                 about.name, about.device_type, about.backend
             ),
-            sample_count,
+            sample_count: if is_slow { 1 } else { most_samples },
+            most_samples,
             linear_format: if drawable {
                 LINEAR_FORMAT
             } else {
