@@ -39,10 +39,8 @@ pub(super) struct Limits {
 /// Direct light on a mesh.
 pub(super) struct DirectField {
     lights: Lights,
-    /// By vertex; shorter than the vertices where some are new.
-    vertices: Vec<DirectLight>,
-    /// For vertices that only close an edge: the ends of that edge, whose mean they take.
-    ends: Vec<Option<[u32; 2]>>,
+    /// By vertex, where it was sampled; shorter than the vertices where some are new.
+    vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
     centres: Vec<Option<DirectLight>>,
 }
@@ -70,19 +68,15 @@ impl DirectField {
         Self {
             lights,
             vertices: Vec::new(),
-            ends: Vec::new(),
             centres: Vec::new(),
         }
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid.
     pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
-        let known = |vertex: u32| {
-            self.vertices
-                .get(vertex as usize)
-                .map_or(Vec4::ZERO, DirectLight::irradiance)
-        };
-        let [a, b, c] = hierarchy.mesh.elements[element].vertices.map(known);
+        let [a, b, c] = hierarchy.mesh.elements[element]
+            .vertices
+            .map(|vertex| self.corner(vertex));
         let corners = a + b + c;
         match self.centres.get(element).copied().flatten() {
             Some(centre) => centre.irradiance() * 0.75 + corners * (0.25 / 3.0),
@@ -90,20 +84,29 @@ impl DirectField {
         }
     }
 
-    /// Direct irradiance at a vertex and its standard error (luminance).
-    pub(super) fn vertex(&self, vertex: usize) -> (Vec4, f32) {
-        let Some(light) = self.vertices.get(vertex) else {
-            return (Vec4::ZERO, 0.0);
-        };
-        match self.ends[vertex] {
-            Some([a, b]) => {
-                // Ends were made before the vertices between them, so this descends.
-                let ((a, a_error), (b, b_error)) =
-                    (self.vertex(a as usize), self.vertex(b as usize));
+    /// Direct irradiance at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
+    /// mean of its ends.
+    pub(super) fn vertex(&self, hierarchy: &Hierarchy, vertex: u32) -> (Vec4, f32) {
+        if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
+            return (light.irradiance(), light.error());
+        }
+        match hierarchy.mesh.vertices[vertex as usize].ends {
+            // Ends were made before the vertices between them, so this descends.
+            Some(ends) => {
+                let [(a, a_error), (b, b_error)] = ends.map(|end| self.vertex(hierarchy, end));
                 ((a + b) * 0.5, (a_error + b_error) * 0.5)
             }
-            None => (light.irradiance(), light.error()),
+            None => (Vec4::ZERO, 0.0),
         }
+    }
+
+    /// Direct irradiance at a corner of a leaf.
+    fn corner(&self, vertex: u32) -> Vec4 {
+        self.vertices
+            .get(vertex as usize)
+            .copied()
+            .flatten()
+            .map_or(Vec4::ZERO, |light| light.irradiance())
     }
 
     /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot.
@@ -128,7 +131,7 @@ impl DirectField {
         Some(ray_count)
     }
 
-    /// Sample the vertices that are new. Returns the rays shot.
+    /// Sample the corners of leaves that were not sampled yet. Returns the rays shot.
     ///
     /// A share of the rays comes first. Where they agree with those of all vertices of the same elements there is no
     /// shadow border, and they are enough. (To trust a vertex's own rays alone would be biased: where a twentieth of
@@ -141,41 +144,33 @@ impl DirectField {
         seed: u64,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let first = self.vertices.len();
-        let count = hierarchy.mesh.vertices.len();
-        if first == count {
-            return Some(0);
+        self.vertices.resize(hierarchy.mesh.vertices.len(), None);
+        let receivers = self.unsampled(hierarchy);
+        for &(vertex, _) in &receivers {
+            self.vertices[vertex as usize] = Some(DirectLight::default());
         }
-        self.vertices.resize(count, DirectLight::default());
-        self.ends.resize(count, None);
-        let receivers = vertex_receivers(hierarchy, first);
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, 0..probing, seed, cancel);
-        let disputed = self.disputed(hierarchy, first);
+        let disputed = self.disputed(hierarchy);
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
-            .filter(|&(vertex, _)| disputed[vertex as usize - first])
+            .filter(|&(vertex, _)| disputed[vertex as usize])
             .collect();
         self.shoot(rays, &rest, probing..samples, seed, cancel);
         if cancel.is_cancelled() {
-            self.vertices.truncate(first);
-            self.ends.truncate(first);
+            for &(vertex, _) in &receivers {
+                self.vertices[vertex as usize] = None;
+            }
             return None;
         }
-        let mut is_known = vec![false; count - first];
-        for &(vertex, _) in &receivers {
-            is_known[vertex as usize - first] = true;
-        }
-        for index in first..count {
-            if !is_known[index - first] {
-                self.ends[index] = hierarchy.mesh.vertices[index].ends;
-            }
-        }
+        let shot = |&(vertex, _): &(u32, Receiver)| {
+            self.vertices[vertex as usize].map_or(0, |light| light.shot)
+        };
         Some(
-            self.vertices[first..]
+            receivers
                 .iter()
-                .map(|light| u64::from(light.shot))
+                .map(|receiver| u64::from(shot(receiver)))
                 .sum(),
         )
     }
@@ -191,29 +186,26 @@ impl DirectField {
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
         let mut known: Vec<DirectLight> = receivers
             .iter()
-            .map(|&(vertex, _)| self.vertices[vertex as usize])
+            .map(|&(vertex, _)| self.vertices[vertex as usize].unwrap_or_default())
             .collect();
         self.lights
             .shoot(rays, &places, samples, seed, &mut known, cancel);
         for (&(vertex, _), light) in receivers.iter().zip(known) {
-            self.vertices[vertex as usize] = light;
+            self.vertices[vertex as usize] = Some(light);
         }
     }
 
-    /// Which vertices from `first` on share an element with one whose rays had another outcome.
-    fn disputed(&self, hierarchy: &Hierarchy, first: usize) -> Vec<bool> {
-        let mut disputed = vec![false; self.vertices.len() - first];
+    /// Which vertices share an element with one whose rays had another outcome.
+    fn disputed(&self, hierarchy: &Hierarchy) -> Vec<bool> {
+        let mut disputed = vec![false; self.vertices.len()];
         for leaf in hierarchy.mesh.leaves() {
             let corners = hierarchy.mesh.elements[leaf]
                 .vertices
                 .map(|vertex| vertex as usize);
-            if corners.iter().all(|&vertex| vertex < first) {
-                continue;
-            }
-            let [a, b, c] = corners.map(|vertex| &self.vertices[vertex]);
-            if !(a.agrees_with(b) && b.agrees_with(c) && c.agrees_with(a)) {
-                for vertex in corners.into_iter().filter(|&vertex| vertex >= first) {
-                    disputed[vertex - first] = true;
+            let [a, b, c] = corners.map(|vertex| self.vertices[vertex].unwrap_or_default());
+            if !(a.agrees_with(&b) && b.agrees_with(&c) && c.agrees_with(&a)) {
+                for vertex in corners {
+                    disputed[vertex] = true;
                 }
             }
         }
@@ -232,7 +224,7 @@ impl DirectField {
     /// How much the luminance of the corners varies, times the weight of the element, relative to the mean.
     fn spread(&self, hierarchy: &Hierarchy, element: usize, mean: f32) -> f32 {
         let corners = hierarchy.mesh.elements[element].vertices;
-        let values = corners.map(|vertex| luminance(self.vertices[vertex as usize].irradiance()));
+        let values = corners.map(|vertex| luminance(self.corner(vertex)));
         let range = values.iter().copied().fold(0.0, f32::max)
             - values.iter().copied().fold(f32::MAX, f32::min);
         let share = hierarchy.mesh.elements[element].area_vector.length() / hierarchy.area as f32;
@@ -302,9 +294,7 @@ impl DirectField {
                 if area * 0.25 < limits.min_area {
                     return false;
                 }
-                let [a, b, c] = element
-                    .vertices
-                    .map(|vertex| self.vertices[vertex as usize].irradiance());
+                let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
                 let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
                 let weight = (area / hierarchy.area as f32).sqrt() / mean.max(f32::MIN_POSITIVE);
                 bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
@@ -319,52 +309,47 @@ impl DirectField {
     }
 }
 
-/// Where to sample each vertex from `first` on that is a corner of a leaf: a little inside the leaf whose normal is
-/// nearest to the mean normal about the vertex.
-fn vertex_receivers(hierarchy: &Hierarchy, first: usize) -> Vec<(u32, Receiver)> {
-    let mesh = &hierarchy.mesh;
-    let count = mesh.vertices.len().saturating_sub(first);
-    let mut normals = vec![Vec3::ZERO; count];
-    for leaf in mesh.leaves() {
-        for &vertex in &mesh.elements[leaf].vertices {
-            if vertex as usize >= first {
-                normals[vertex as usize - first] += mesh.elements[leaf].area_vector;
+impl DirectField {
+    /// Where to sample each corner of a leaf that was not sampled yet: a little inside the leaf whose normal is nearest
+    /// to the mean normal about the vertex.
+    fn unsampled(&self, hierarchy: &Hierarchy) -> Vec<(u32, Receiver)> {
+        let mesh = &hierarchy.mesh;
+        let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
+        for leaf in mesh.leaves() {
+            for &vertex in &mesh.elements[leaf].vertices {
+                normals[vertex as usize] += mesh.elements[leaf].area_vector;
             }
         }
-    }
-    let mut chosen: Vec<Option<(f32, u32)>> = vec![None; count];
-    for leaf in mesh.leaves() {
-        let normal = hierarchy.patch_of(leaf).normal;
-        for &vertex in &mesh.elements[leaf].vertices {
-            if vertex as usize >= first {
-                let slot = vertex as usize - first;
-                let likeness = normals[slot].dot(normal);
-                if chosen[slot].is_none_or(|(best, _)| likeness > best) {
-                    chosen[slot] = Some((likeness, leaf as u32));
+        let mut chosen: Vec<Option<(f32, u32)>> = vec![None; mesh.vertices.len()];
+        for leaf in mesh.leaves() {
+            let normal = hierarchy.patch_of(leaf).normal;
+            for vertex in mesh.elements[leaf].vertices.map(|vertex| vertex as usize) {
+                let likeness = normals[vertex].dot(normal);
+                let is_best = chosen[vertex].is_none_or(|(best, _)| likeness > best);
+                if self.vertices[vertex].is_none() && is_best {
+                    chosen[vertex] = Some((likeness, leaf as u32));
                 }
             }
         }
+        let receiver = |(vertex, choice): (usize, Option<(f32, u32)>)| {
+            let (_, leaf) = choice?;
+            let patch = hierarchy.patch_of(leaf as usize);
+            let centroid = mesh.elements[leaf as usize].centroid;
+            let point = mesh.position(vertex as u32).lerp(centroid, INSET);
+            let normal = normals[vertex].try_normalize().unwrap_or(patch.normal);
+            Some((
+                vertex as u32,
+                Receiver {
+                    point,
+                    normal,
+                    triangle: patch.triangle,
+                },
+            ))
+        };
+        chosen
+            .into_iter()
+            .enumerate()
+            .filter_map(receiver)
+            .collect()
     }
-    let receiver = |(slot, choice): (usize, Option<(f32, u32)>)| {
-        let (_, leaf) = choice?;
-        let vertex = (first + slot) as u32;
-        let patch = hierarchy.patch_of(leaf as usize);
-        let point = mesh
-            .position(vertex)
-            .lerp(mesh.elements[leaf as usize].centroid, INSET);
-        let normal = normals[slot].try_normalize().unwrap_or(patch.normal);
-        Some((
-            vertex,
-            Receiver {
-                point,
-                normal,
-                triangle: patch.triangle,
-            },
-        ))
-    };
-    chosen
-        .into_iter()
-        .enumerate()
-        .filter_map(receiver)
-        .collect()
 }

@@ -124,7 +124,7 @@ impl Solver {
             let (direct, noise) = self
                 .direct
                 .as_ref()
-                .map(|field| field.vertex(vertex))
+                .map(|field| field.vertex(&self.hierarchy, vertex as u32))
                 .unwrap_or_default();
             light.irradiance.push(displayable(linked + direct));
             light.direct.push(displayable(direct));
