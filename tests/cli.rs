@@ -136,3 +136,93 @@ fn a_scene_that_cannot_be_read_ends_with_code_3() {
         assert!(error_of(&output).starts_with("error: "), "{arguments:?}");
     }
 }
+
+#[test]
+fn files_that_cannot_be_lit_end_with_code_3_and_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("folder.obj")).unwrap();
+    for (name, bytes) in [
+        ("empty.obj", &b""[..]),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"),
+        ("picture.obj", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"),
+        ("flat.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
+        ("nan.obj", b"v nan 0 0\nv 1 0 0\nv 0 inf 0\nf 1 2 3\n"),
+        (
+            "range.obj",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\nf -7 1 2\n",
+        ),
+    ] {
+        fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let files = [
+        "empty.obj",
+        "points.obj",
+        "picture.obj",
+        "flat.obj",
+        "nan.obj",
+        "range.obj",
+        "folder.obj",
+    ];
+    for name in files {
+        let output = vecrad(folder.path(), &["solve", name, "--export", "lit.ply"]);
+        let sentence = error_of(&output);
+        assert_eq!(output.status.code(), Some(3), "{name}: {sentence}");
+        assert!(sentence.contains(name), "{name}: {sentence}");
+        assert!(!folder.path().join("lit.ply").exists(), "{name}");
+    }
+}
+
+#[test]
+fn curable_files_are_lit_with_warnings_on_standard_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    let lamp = "newmtl lamp\nKd 0.5\nKe 1 1 1\nillum 2.0\nnewmtl bright\nKd 1.5 1.5 1.5\n";
+    fs::write(folder.path().join("a.mtl"), lamp).unwrap();
+    for (name, text, warning) in [
+        (
+            "bom.obj",
+            format!("\u{feff}mtllib a.mtl\n{square}usemtl lamp\nf 1 2 3 4\n"),
+            "",
+        ),
+        (
+            "continued.obj",
+            format!("mtllib a.mtl\r\n{square}usemtl lamp\r\nf 1 2 \\\r\n3 4\r\n"),
+            "",
+        ),
+        (
+            "bad-index.obj",
+            format!("mtllib a.mtl\n{square}usemtl lamp\nf 1 2 3 4\nf 1 2 99\n"),
+            "bad-index.obj:8",
+        ),
+        (
+            "unknown.obj",
+            format!("mtllib a.mtl\n{square}usemtl nothing\nf 1 2 3 4\n"),
+            "nothing",
+        ),
+        (
+            "no-mtl.obj",
+            format!("mtllib gone.mtl\n{square}f 1 2 3 4\n"),
+            "gone.mtl",
+        ),
+        (
+            "clamped.obj",
+            format!("mtllib a.mtl\n{square}usemtl bright\nf 1 2 3 4\n"),
+            "0.98",
+        ),
+        (
+            "dark.obj",
+            format!("{square}f 1 2 3 4\n"),
+            "nothing emits light",
+        ),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        let output = vecrad(
+            folder.path(),
+            &["solve", name, "--export", "lit.ply", "--preset", "draft"],
+        );
+        let messages = error_of(&output);
+        assert_eq!(output.status.code(), Some(0), "{name}: {messages}");
+        assert!(messages.contains(warning), "{name}: {messages}");
+        assert!(folder.path().join("lit.ply").exists(), "{name}");
+    }
+}

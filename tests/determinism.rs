@@ -13,7 +13,7 @@ use vecrad::{
 
 fn light(threads: usize) -> Arc<Snapshot> {
     let none: Option<&Path> = None;
-    let scene = cli::load(none, Some("plates"), &SceneOptions::default()).unwrap();
+    let scene = cli::load(none, Some("room-1022"), &SceneOptions::default()).unwrap();
     let mut worker = WorkerHandle::spawn(Arc::new(|| {})).unwrap();
     let options = RunOptions {
         threads,
@@ -31,16 +31,18 @@ fn light(threads: usize) -> Arc<Snapshot> {
 }
 
 #[test]
-fn one_and_eight_threads_give_the_same_bits() {
-    let (one, eight) = (light(1), light(8));
+fn any_number_of_threads_gives_the_same_bits() {
+    let (one, two, eight) = (light(1), light(2), light(8));
     let bits = |snapshot: &Snapshot| -> Vec<[u32; 3]> {
         let irradiance = snapshot.light.irradiance.iter();
         irradiance
             .map(|light| light.to_array().map(f32::to_bits))
             .collect()
     };
-    assert_eq!(one.mesh, eight.mesh);
-    assert_eq!(bits(&one), bits(&eight));
+    for other in [two, eight] {
+        assert_eq!(one.mesh, other.mesh);
+        assert_eq!(bits(&one), bits(&other));
+    }
     assert!(
         one.light
             .irradiance

@@ -38,7 +38,7 @@ pub(super) struct Limits {
 
 /// Direct light on a mesh.
 pub(super) struct DirectField {
-    lights: Lights,
+    pub(super) lights: Lights,
     /// By vertex, where it was sampled; shorter than the vertices where some are new.
     vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.

@@ -164,15 +164,15 @@ fn probe(
     first: u32,
     seed: u64,
 ) -> u32 {
-    let mut random = Random::new(seed, patch as u64);
-    let shifts = [random.uniform_2d(), random.uniform_2d()];
+    let mut random = Random::new(seed, (u64::from(first) << 32) | patch as u64);
+    let shift = random.uniform_2d();
     let [a, b, c] = hierarchy.mesh.corners(patch);
     let patch = &hierarchy.patches[patch];
-    let is_met = |index: u32| {
-        let at = triangle_point(low_discrepancy_2d(first + index, shifts[0]));
+    let mut is_met = |index: u32| {
+        // Only the directions are stratified: a point from the same sequence would go with its direction.
+        let at = triangle_point(random.uniform_2d());
         let origin: Vec3 = a * at.x + b * at.y + c * at.z;
-        let direction =
-            cosine_direction(patch.normal, low_discrepancy_2d(first + index, shifts[1]));
+        let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
         rays.closest(origin, direction, Some(patch.triangle))
             .is_some_and(|hit| {
                 let triangle = hit.triangle.index();

@@ -9,7 +9,7 @@ use std::{f32::consts::PI, ops::Range};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::Cancel;
+use super::{Cancel, Direct};
 use crate::{
     geometry::{Random, RayTree, low_discrepancy_2d, point_irradiance, triangle_point},
     hierarchy::{Hierarchy, Patch},
@@ -17,8 +17,9 @@ use crate::{
     transport::luminance,
 };
 
-/// More emitting patches than this are linked instead: each point would have to look at all of them.
-const MOST_SAMPLED: usize = 512;
+/// An emitting patch is sampled if it gives at least one part in this many of all light. So at most as many patches are,
+/// and every vertex looks at all of them; of the others, so many give so little each that links blur them together.
+const LEAST_SAMPLED_SHARE: f64 = 512.0;
 
 /// An emitting patch.
 #[derive(Clone, Copy, Debug)]
@@ -44,13 +45,32 @@ pub(super) struct Receiver {
 /// The emitters that are sampled.
 pub(super) struct Lights {
     emitters: Vec<Emitter>,
+    /// By patch.
+    is_sampled: Vec<bool>,
 }
 
 impl Lights {
-    /// All emitting patches of a hierarchy.
-    pub(super) fn new(scene: &Scene, hierarchy: &Hierarchy) -> Self {
-        let emits = |patch: &&Patch| patch.emission != Vec3::ZERO;
-        let emitters = hierarchy.patches.iter().filter(emits).map(|patch| {
+    /// The emitting patches of a hierarchy that are worth sampling: all of them, none, or those that give a good part of
+    /// the light by themselves, so that lamps of many small faces stay with the links.
+    pub(super) fn new(scene: &Scene, hierarchy: &Hierarchy, mode: Direct) -> Self {
+        let power = |patch: &Patch| f64::from(luminance(patch.emission.extend(0.0)) * patch.area);
+        let total: f64 = hierarchy.patches.iter().map(power).sum();
+        let least = match mode {
+            Direct::Auto => total / LEAST_SAMPLED_SHARE,
+            Direct::Sampled => 0.0,
+            Direct::Linked => f64::INFINITY,
+        };
+        let is_sampled: Vec<bool> = hierarchy
+            .patches
+            .iter()
+            .map(|patch| patch.emission != Vec3::ZERO && power(patch) >= least)
+            .collect();
+        let sampled = hierarchy
+            .patches
+            .iter()
+            .zip(&is_sampled)
+            .filter(|(_, is_sampled)| **is_sampled);
+        let emitters = sampled.map(|(patch, _)| {
             let [a, b, c] = scene.corners(patch.triangle);
             Emitter {
                 corners: if patch.is_back { [a, c, b] } else { [a, b, c] },
@@ -62,12 +82,18 @@ impl Lights {
         });
         Self {
             emitters: emitters.collect(),
+            is_sampled,
         }
     }
 
-    /// Whether few enough patches emit for sampling them at every vertex.
-    pub(super) fn are_few(&self) -> bool {
-        self.emitters.len() <= MOST_SAMPLED
+    /// Whether nothing is sampled.
+    pub(super) fn is_empty(&self) -> bool {
+        self.emitters.is_empty()
+    }
+
+    /// Whether the emission of a patch is sampled and so must not travel over links.
+    pub(super) fn is_sampled(&self, patch: usize) -> bool {
+        self.is_sampled[patch]
     }
 
     /// Shoot a range of the shadow rays of many points, and add what they find to what is known of each.

@@ -89,19 +89,14 @@ impl Solver {
     pub fn new(scene: Arc<Scene>, settings: SolveSettings, memory_limit: Option<u64>) -> Self {
         let rays = RayTree::new(&scene);
         let hierarchy = Hierarchy::new(&scene, settings.crease_degrees);
-        let lights = Lights::new(&scene, &hierarchy);
-        let is_sampled = match settings.direct {
-            Direct::Auto => lights.are_few(),
-            Direct::Sampled => true,
-            Direct::Linked => false,
-        };
+        let lights = Lights::new(&scene, &hierarchy, settings.direct);
         let (closures, ray_count) = closure::closures(&scene, &hierarchy, &rays, settings.seed);
         let mut solver = Self {
             closures,
             area_sums: PairSampler::area_sums(&hierarchy),
             power: Tables::default(),
             links: LinkStore::default(),
-            direct: is_sampled.then(|| DirectField::new(lights)),
+            direct: (!lights.is_empty()).then(|| DirectField::new(lights)),
             linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
             mean_irradiance: 0.0,
@@ -203,10 +198,17 @@ impl Solver {
         let patch = self.hierarchy.patch_of(element);
         let reflected =
             patch.reflectance * (self.linked[element] + self.direct_of(element)).truncate();
-        match self.direct {
-            Some(_) => reflected.extend(1.0),
-            None => (reflected + patch.emission * std::f32::consts::PI).extend(1.0),
-        }
+        let index = self.hierarchy.mesh.elements[element].patch as usize;
+        let is_sampled = self
+            .direct
+            .as_ref()
+            .is_some_and(|field| field.lights.is_sampled(index));
+        let emitted = if is_sampled {
+            Vec3::ZERO
+        } else {
+            patch.emission * std::f32::consts::PI
+        };
+        (reflected + emitted).extend(1.0)
     }
 
     /// Bring the source tables up to date with the irradiance of the leaves.
