@@ -9,7 +9,7 @@
 //! * [`hierarchy`]: clusters, patches, elements and their directional tables;
 //! * [`transport`]: node pairs, that is kernel, link, oracle and refinement;
 //! * [`solver`]: one progressive step after the other, as a value without threads, clocks or globals;
-//! * [`reference`]: the truth by other means, sharing no transport code;
+//! * [`mod@reference`]: the truth by other means, sharing no transport code;
 //! * [`metrics`]: error measures and reports;
 //! * [`export`] writes files;
 //! * [`worker`]: the solver thread;

@@ -42,7 +42,7 @@ fn matrix_of(scene: &Scene) -> MatrixSolution {
         &MatrixSettings::default(),
         &never,
     )
-    .unwrap()
+    .expect("the matrix is small")
 }
 
 /// Mean irradiance over the first plate, whose triangles are equal.
