@@ -42,8 +42,6 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
         .show(ui, |plot| {
             plot.line(line("Residual", |report| report.residual).color(theme::axis_color(2)));
-            plot.line(
-                line("Estimated error", |report| report.estimated_error).color(theme::SELECTED),
-            );
+            plot.line(line("Error bound", |report| report.estimated_error).color(theme::SELECTED));
         });
 }

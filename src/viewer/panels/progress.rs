@@ -105,9 +105,9 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
         row::figure(
             ui,
-            "Estimated error",
+            "Error bound",
             format!("{} %", figure(f64::from(100.0 * report.estimated_error))),
-            "From the links' own estimates, relative to the mean irradiance",
+            "Sum of the intervals of all links, relative to the mean irradiance; far above the real error",
         );
         row::figure(
             ui,
