@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Cluster, Hierarchy},
-    scene::Scene,
 };
 
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
@@ -91,12 +90,7 @@ impl Closure {
 }
 
 /// Closure of every patch, and the rays shot.
-pub(super) fn closures(
-    scene: &Scene,
-    hierarchy: &Hierarchy,
-    rays: &RayTree,
-    seed: u64,
-) -> (Vec<Closure>, u64) {
+pub(super) fn closures(hierarchy: &Hierarchy, rays: &RayTree, seed: u64) -> (Vec<Closure>, u64) {
     let groups = groups(hierarchy);
     let closed: Vec<bool> = groups
         .par_iter()
@@ -104,7 +98,7 @@ pub(super) fn closures(
             let range = cluster.patches();
             (0..GROUP_RAYS).all(|ray| {
                 let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
-                probe(scene, hierarchy, rays, patch, 1, ray, seed) == 1
+                probe(hierarchy, rays, patch, 1, ray, seed) == 1
             })
         })
         .collect();
@@ -122,12 +116,7 @@ pub(super) fn closures(
         .collect();
     let found: Vec<Closure> = patches
         .par_iter()
-        .map(|&patch| {
-            Closure::of(
-                probe(scene, hierarchy, rays, patch, count as u32, 0, seed),
-                count,
-            )
-        })
+        .map(|&patch| Closure::of(probe(hierarchy, rays, patch, count as u32, 0, seed), count))
         .collect();
     for (patch, closure) in patches.into_iter().zip(found) {
         closures[patch] = closure;
@@ -156,7 +145,6 @@ fn groups(hierarchy: &Hierarchy) -> Vec<&Cluster> {
 
 /// How many of some cosine-weighted rays from a patch meet a lit side; `first` numbers them within the patch.
 fn probe(
-    scene: &Scene,
     hierarchy: &Hierarchy,
     rays: &RayTree,
     patch: usize,
@@ -174,11 +162,7 @@ fn probe(
         let origin: Vec3 = a * at.x + b * at.y + c * at.z;
         let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
         rays.closest(origin, direction, Some(patch.triangle))
-            .is_some_and(|hit| {
-                let triangle = hit.triangle.index();
-                scene.triangles[triangle].two_sided
-                    || scene.surfaces[triangle].area_vector.dot(direction) < 0.0
-            })
+            .is_some_and(|hit| hierarchy.patch_met(hit.triangle, direction).is_some())
     };
     (0..count).filter(|&index| is_met(index)).count() as u32
 }

@@ -90,7 +90,7 @@ impl Solver {
         let rays = RayTree::new(&scene);
         let hierarchy = Hierarchy::new(&scene, settings.crease_degrees);
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
-        let (closures, ray_count) = closure::closures(&scene, &hierarchy, &rays, settings.seed);
+        let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed);
         let mut solver = Self {
             closures,
             area_sums: PairSampler::area_sums(&hierarchy),

@@ -61,17 +61,7 @@ fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
     );
     row::figures(ui, "cluster", |ui| {
         row::figure(ui, "Patches", count(u64::from(cluster.patch_count)), "");
-        row::figure(
-            ui,
-            "Size",
-            format!(
-                "{} × {} × {}",
-                figure(size.x),
-                figure(size.y),
-                figure(size.z)
-            ),
-            "In the file's units",
-        );
+        row::size(ui, size);
         row::figure(ui, "Area", power(cluster.area), "Of its patches");
         row::figure(
             ui,

@@ -108,6 +108,17 @@ pub fn figure(ui: &mut egui::Ui, name: &str, value: impl Into<String>, explanati
     ui.end_row();
 }
 
+/// The size of a box in the file's units, as a [`figure`].
+pub fn size(ui: &mut egui::Ui, size: glam::DVec3) {
+    let [x, y, z] = size.to_array().map(super::figure);
+    figure(
+        ui,
+        "Size",
+        format!("{x} × {y} × {z}"),
+        "In the file's units",
+    );
+}
+
 /// A grid for [`figure`].
 pub fn figures(ui: &mut egui::Ui, id: &str, add: impl FnOnce(&mut egui::Ui)) {
     egui::Grid::new(id)

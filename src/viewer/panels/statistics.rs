@@ -31,17 +31,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 count(loaded.emitter_count as u64),
                 "Triangles that emit light",
             );
-            row::figure(
-                ui,
-                "Size",
-                format!(
-                    "{} × {} × {}",
-                    figure(size.x),
-                    figure(size.y),
-                    figure(size.z)
-                ),
-                "In the file's units",
-            );
+            row::size(ui, size);
         }
         if let Some(secs) = state.run.prepare_secs {
             row::figure(
