@@ -80,7 +80,7 @@ fn vector_irradiance_pushed_to_a_face_is_equation_12_per_area() {
     let exact = source.patches[0].area_vector.dot(separation) * -normal.dot(separation)
         / (PI * squared * squared);
     for node in [Hierarchy::ROOT, NodeId(1)] {
-        let found = kernel.vector_irradiance(node, point, 0.0).on_face(normal).x;
+        let found = kernel.vector_irradiance(node, point).on_face(normal).x;
         // At 900 units the cluster of 71 units saturates by its own form factor, about 0.001.
         assert!(
             (found / exact - 1.0).abs() < 5e-3,

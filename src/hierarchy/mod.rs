@@ -13,7 +13,7 @@ mod validate;
 
 pub use directional::{Moments, Quantity, Reading};
 pub use mesh::{Element, Mesh, Vertex};
-pub use tables::Tables;
+pub use tables::{Tables, luminance};
 
 use glam::Vec3;
 

@@ -110,7 +110,7 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
             );
         } else {
             kernel
-                .vector_irradiance(link.source, cluster.centroid, cluster.radius)
+                .vector_irradiance(link.source, cluster.centroid)
                 .add_to(&mut sum, link.visibility);
         }
     }
@@ -173,7 +173,7 @@ fn push_one(
         return;
     }
     let receiver = &hierarchy.clusters[cluster];
-    let incident = kernel.vector_irradiance(source, receiver.centroid, receiver.radius);
+    let incident = kernel.vector_irradiance(source, receiver.centroid);
     for (sum, patch) in sums.iter_mut().zip(patches) {
         *sum += incident.on_face(patch.normal) * visibility;
     }

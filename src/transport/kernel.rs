@@ -82,15 +82,14 @@ impl Kernel<'_> {
         sum
     }
 
-    /// Vector irradiance (eq. 14, unoccluded) of a node at a receiver about a point, of the given radius.
-    /// Near the source the strength saturates towards its brightest patch, as that of a disc does exactly on its axis:
+    /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards its brightest patch, as that of a disc does exactly on its axis:
     /// A/π r² becomes A/(π r² + A).
-    pub fn vector_irradiance(&self, source: NodeId, point: Vec3, radius: f32) -> Incident {
-        let separation = point - self.hierarchy.centroid(source);
+    pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident {
+        let separation = point - self.tables.centre(self.hierarchy, source);
         let squared = separation.length_squared();
-        let reach = radius + self.hierarchy.radius(source);
+        let radius = self.hierarchy.radius(source);
         let spread = match self.reading {
-            Some(Reading::Bounded) => (reach * reach / squared.max(f32::MIN_POSITIVE)).min(1.0),
+            Some(Reading::Bounded) => (radius * radius / squared.max(f32::MIN_POSITIVE)).min(1.0),
             _ => 0.0,
         };
         match self.hierarchy.kind(source) {
@@ -127,10 +126,38 @@ impl Kernel<'_> {
         }
     }
 
+    /// Mean form factor (unoccluded) from the patches of a receiver to a source, as tables tell it: what the receiver's
+    /// links would give if everything sent 1.
+    pub fn mean_form_factor(&self, source: NodeId, receiver: NodeId) -> f32 {
+        let point = self.hierarchy.centroid(receiver);
+        match self.hierarchy.kind(receiver) {
+            Kind::Element(index) => {
+                let normal = self.hierarchy.patch_of(index).normal;
+                self.irradiance(source, point, normal).w
+            }
+            Kind::Cluster(index) => {
+                let incident = self.vector_irradiance(source, point);
+                let moments = &self.tables.clusters[index];
+                let area = moments.total().w;
+                let vector = Vec3::from_array(moments.linear.map(|along| along.w));
+                let facing = self.cluster_power(index, incident.towards_source).w;
+                let cosine = vector.dot(incident.towards_source);
+                let about = 0.5 * (area + cosine);
+                if area > 0.0 {
+                    incident.strength.w
+                        * (facing * (1.0 - incident.spread) + about * incident.spread)
+                        / area
+                } else {
+                    0.0
+                }
+            }
+        }
+    }
+
     /// Irradiance (eqs 12 and 15, unoccluded) of a face of unit normal at a point.
     pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Vec4 {
         match self.hierarchy.kind(source) {
-            Kind::Cluster(_) => self.vector_irradiance(source, point, 0.0).on_face(normal),
+            Kind::Cluster(_) => self.vector_irradiance(source, point).on_face(normal),
             Kind::Element(index) => {
                 self.tables.elements[index]
                     * element_form_factor(self.hierarchy, index, point, normal)

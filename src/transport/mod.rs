@@ -13,9 +13,4 @@ pub use oracle::{Estimate, Judge, Judgement};
 pub use refine::{Refinement, Refiner};
 pub use visibility::PairSampler;
 
-use glam::Vec4;
-
-/// Luminance of linear RGB (Rec. 709), by which errors of colours are weighed; `w` does not count.
-pub fn luminance(color: Vec4) -> f32 {
-    color.dot(Vec4::new(0.2126, 0.7152, 0.0722, 0.0))
-}
+pub use crate::hierarchy::luminance;

@@ -72,16 +72,24 @@ impl Judge<'_> {
         }
     }
 
-    /// Luminance of the irradiance that a cluster gives itself if all of its light falls on it; all of it is in doubt.
-    pub fn judge_self(&self, cluster: NodeId) -> f32 {
-        match self.hierarchy().kind(cluster) {
-            Kind::Cluster(index) => luminance(self_irradiance(
-                self.hierarchy(),
-                index,
-                self.tables().clusters[index].total(),
-            )),
-            Kind::Element(_) => 0.0,
-        }
+    /// Whether two nodes may touch, and at least one of them is a cluster: then neither knows the other as more than a
+    /// direction that may be any.
+    pub fn is_too_near_for_tables(&self, source: NodeId, receiver: NodeId) -> bool {
+        let hierarchy = self.hierarchy();
+        let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
+        let are_elements = [source, receiver]
+            .iter()
+            .all(|&node| matches!(hierarchy.kind(node), Kind::Element(_)));
+        !are_elements
+            && hierarchy
+                .centroid(source)
+                .distance(hierarchy.centroid(receiver))
+                <= reach
+    }
+
+    /// Luminance of the brightest patch of a node.
+    pub fn brightest(&self, node: NodeId) -> f32 {
+        luminance(self.tables().brightest(self.hierarchy(), node))
     }
 
     /// Whether any face of `from` can look at any point of `to`.

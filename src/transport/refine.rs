@@ -18,6 +18,20 @@ const TASK_PATCHES: u32 = 256;
 /// Rays of one link at most.
 const MOST_RAYS: u32 = 8;
 
+/// Rays that find which part of a cluster's light falls on the cluster itself. These links are few and carry much.
+const SELF_RAYS: u32 = 16;
+
+/// Share of its brightest patch's light by which the exchange of a cluster within itself may be wrong. Larger, and links
+/// within convex objects are sought in vain; smaller, and bright corners are blurred.
+const SELF_SHARE: f32 = 0.2;
+
+/// Largest factor by which rays may raise what tables say of near nodes. Larger, and a few lucky rays make a firefly;
+/// smaller, and light is lost where tables see a source edge-on.
+const MOST_CORRECTION: f32 = 64.0;
+
+/// Rays of a link between near nodes, at least and at most.
+const NEAR_RAYS: std::ops::RangeInclusive<u32> = 4..=16;
+
 /// Share of a partly visible transfer that counts as error: shadows vary over the receiver, and neither node's
 /// table knows how.
 const PARTIAL_VISIBILITY: f32 = 0.5;
@@ -245,6 +259,10 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 self.link(source, receiver, error, ray_count, out)
             }
         };
+        if self.judge.is_too_near_for_tables(source, receiver) {
+            // What few rays have seen must not decide: of pairs that see little, only those found blind would stay.
+            return Decision::Keep(Link { error, ..link });
+        }
         let partial = 2.0 * (link.visibility * (1.0 - link.visibility)).max(0.0).sqrt();
         let error = error * link.visibility.max(DOUBT) + PARTIAL_VISIBILITY * irradiance * partial;
         if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
@@ -260,26 +278,27 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         known: Option<&Link>,
         out: &mut Refinement,
     ) -> Decision {
-        let irradiance = self.judge.judge_self(cluster);
-        if irradiance <= 0.0 || self.faces_one_way(cluster) {
+        let error = self.judge.brightest(cluster);
+        if error <= 0.0 || self.faces_one_way(cluster) {
             return Decision::Drop;
+        }
+        // What few rays have seen must not decide: of clusters that see little of themselves, only those found blind would
+        // stay.
+        if error * SELF_SHARE * weight > self.threshold {
+            return Decision::DivideReceiver;
         }
         let fraction = match known {
             Some(link) => link.visibility,
             None => {
-                let ray_count = self.ray_count(irradiance * weight, 2 * MOST_RAYS);
-                out.ray_count += u64::from(ray_count);
-                self.judge.sampler.self_fraction(
+                out.ray_count += u64::from(SELF_RAYS);
+                self.judge.sampler.seen_fraction(
                     cluster,
-                    ray_count,
+                    cluster,
+                    SELF_RAYS,
                     &mut self.random(cluster, cluster),
                 )
             }
         };
-        let error = irradiance * fraction.max(DOUBT);
-        if error * weight > self.threshold {
-            return Decision::DivideReceiver;
-        }
         Decision::Keep(Link {
             source: cluster,
             visibility: fraction,
@@ -351,12 +370,22 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         out: &mut Refinement,
     ) -> Link {
         let mut random = self.random(source, receiver);
-        out.ray_count += u64::from(ray_count);
-        let visibility = self
-            .judge
-            .sampler
-            .visibility(source, receiver, ray_count, &mut random);
         let hierarchy = self.hierarchy();
+        let sampler = self.judge.sampler;
+        let visibility = if self.judge.is_too_near_for_tables(source, receiver) {
+            let ray_count = (2 * ray_count).clamp(*NEAR_RAYS.start(), *NEAR_RAYS.end());
+            out.ray_count += u64::from(ray_count);
+            let seen = sampler.seen_fraction(source, receiver, ray_count, &mut random);
+            let expected = self.judge.kernel.mean_form_factor(source, receiver);
+            if expected > 0.0 {
+                (seen / expected).min(MOST_CORRECTION)
+            } else {
+                0.0
+            }
+        } else {
+            out.ray_count += u64::from(ray_count);
+            sampler.visibility(source, receiver, ray_count, &mut random)
+        };
         let form_factor = match (hierarchy.kind(source), hierarchy.kind(receiver)) {
             (Kind::Element(from), Kind::Element(to)) => {
                 visibility * area_form_factor(hierarchy, from, to)

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::luminance;
 use crate::{
-    geometry::{Random, RayTree, cosine_direction, triangle_point},
+    geometry::{Random, RayTree, barycentric_in_plane, cosine_direction, triangle_point},
     hierarchy::{Hierarchy, Kind, NodeId, Tables},
     scene::TriangleId,
 };
@@ -123,24 +123,46 @@ impl PairSampler<'_> {
         }
     }
 
-    /// Which part of the light that leaves a cluster falls on the cluster itself, by cosine-weighted rays from random
-    /// points; 0…1. It is 0 for flat and convex clusters, whatever their box.
-    pub fn self_fraction(&self, cluster: NodeId, ray_count: u32, random: &mut Random) -> f32 {
-        let Kind::Cluster(index) = self.hierarchy.kind(cluster) else {
-            return 0.0;
-        };
-        let range = self.hierarchy.clusters[index].patches();
+    /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of
+    /// the receiver; 0…1. For a cluster and itself it is the part of its light that falls on itself: 0 where it is flat
+    /// or convex, whatever its box.
+    pub fn seen_fraction(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        ray_count: u32,
+        random: &mut Random,
+    ) -> f32 {
         let mut met = 0;
         for _ in 0..ray_count {
-            let from = self.sample(cluster, random);
+            let from = self.sample(receiver, random);
             let direction = cosine_direction(from.normal, random.uniform_2d());
             let hit = self
                 .rays
                 .closest(from.point, direction, Some(from.triangle));
-            let patch = hit.and_then(|hit| self.hierarchy.patch_met(hit.triangle, direction));
-            met += u32::from(patch.is_some_and(|patch| range.contains(&patch)));
+            met += u32::from(hit.is_some_and(|hit| {
+                let point = from.point + direction * hit.distance;
+                self.hierarchy
+                    .patch_met(hit.triangle, direction)
+                    .is_some_and(|patch| self.holds(source, patch, point))
+            }));
         }
-        met as f32 / ray_count as f32
+        met as f32 / ray_count.max(1) as f32
+    }
+
+    /// Whether a point of a patch belongs to a node.
+    fn holds(&self, node: NodeId, patch: usize, point: Vec3) -> bool {
+        match self.hierarchy.kind(node) {
+            Kind::Cluster(index) => self.hierarchy.clusters[index].patches().contains(&patch),
+            Kind::Element(index) => {
+                let element = &self.hierarchy.mesh.elements[index];
+                element.patch as usize == patch
+                    && (element.parent == u32::MAX
+                        || barycentric_in_plane(point, self.hierarchy.mesh.corners(index))
+                            .min_element()
+                            >= 0.0)
+            }
+        }
     }
 }
 
