@@ -12,6 +12,7 @@ pub mod progress;
 pub mod row;
 pub mod scene;
 pub mod settings;
+pub mod sides;
 pub mod statistics;
 pub mod status;
 pub mod toolbar;
