@@ -111,7 +111,10 @@ impl App {
 }
 
 impl eframe::App for App {
-    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+    fn logic(&mut self, ctx: &egui::Context, frame: &mut eframe::Frame) {
+        if let Some(secs) = frame.info().cpu_usage {
+            self.state.frame_times.push(secs);
+        }
         if self.faults.is_lost() {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
@@ -175,6 +178,7 @@ impl eframe::App for App {
         for action in actions {
             self.perform(&ctx, action);
         }
+        self.ask();
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

@@ -26,6 +26,7 @@ impl App {
             Action::Stop => self.stop(),
             Action::Reset => {
                 if self.state.loaded.is_some() {
+                    self.state.inspections.close();
                     self.worker.reset();
                 }
             }
@@ -34,6 +35,7 @@ impl App {
                 let effect = self.worker.change_settings(settings);
                 self.state.run.last_effect = Some(effect);
                 if effect == Effect::Restarts {
+                    self.state.inspections.close();
                     self.state.cluster = None;
                 }
             }
@@ -93,10 +95,10 @@ impl App {
             Action::ToggleClusters => {
                 state.view.clusters.shown = !state.view.clusters.shown;
             }
+            Action::ToggleLinks => state.view.links.shown = !state.view.links.shown,
             Action::ClusterLevelBy(step) => {
                 let deepest = state.cluster_counts.deepest;
-                let level = &mut state.view.clusters.level;
-                *level = level.saturating_add_signed(*step).min(deepest);
+                state.view.clusters.go_down(*step, deepest);
                 state.view.clusters.shown = true;
             }
             Action::FrameAll => state.frame_all(),
@@ -175,9 +177,9 @@ impl App {
                 if let Some(snapshot) = &self.state.run.snapshot
                     && self.state.view.clusters.shown
                 {
-                    let level = self.state.view.clusters.level;
+                    let shown = &self.state.view.clusters;
                     self.state.cluster =
-                        clusters::containing(&snapshot.clusters, pick.point, level);
+                        clusters::containing(&snapshot.clusters, pick.point, shown);
                 }
                 self.look_up();
             }

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use super::{
     super::{
-        light_range,
+        inspection, light_range,
         loader::{Loader, SceneSource},
         pick,
         state::Severity,
     },
     App,
 };
+use crate::worker::Event;
 
 impl App {
     /// Take note of everything that arrived since the last frame.
@@ -44,6 +45,15 @@ impl App {
 
     fn drain_worker(&mut self) {
         for event in self.worker.events() {
+            match &event {
+                Event::Started => self.state.inspections.close(),
+                Event::Prepared { .. } => self.state.inspections.open(),
+                Event::Inspected(inspection) => {
+                    self.state.inspections.note(inspection.clone());
+                    self.state.correct_cluster();
+                }
+                _ => {}
+            }
             self.state.run.note(event);
         }
         let Some(latest) = self.worker.latest() else {
@@ -61,6 +71,14 @@ impl App {
         }
     }
 
+    /// Ask the solver about what is selected, if it was not asked yet.
+    pub(super) fn ask(&mut self) {
+        let wanted = inspection::wanted(&self.state);
+        if let Some(subjects) = self.state.inspections.question(&wanted) {
+            self.worker.inspect(subjects);
+        }
+    }
+
     /// Let exposure and range follow the newest light.
     pub(super) fn follow_light(&mut self) {
         let Some(snapshot) = &self.state.run.snapshot else {
@@ -74,7 +92,7 @@ impl App {
         self.state.false_color_range = light_range::false_color_range(snapshot, &self.state.view);
         self.state
             .cluster_counts
-            .update(&snapshot.clusters, self.state.view.clusters.level);
+            .update(&snapshot.clusters, &self.state.view.clusters);
         self.look_up();
     }
 

@@ -47,6 +47,7 @@ impl App {
         self.title = Some(start::title(&loaded.source));
         self.state.selection = None;
         self.state.cluster = None;
+        self.state.inspections.close();
         self.state.run.snapshot = None;
         self.state.run.last_effect = None;
         self.worker.start(

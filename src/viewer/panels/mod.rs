@@ -3,8 +3,10 @@
 pub mod clusters;
 pub mod help;
 pub mod legend;
+pub mod links;
 pub mod menu;
 pub mod messages;
+pub mod path;
 pub mod picture;
 pub mod plot;
 pub mod probe;

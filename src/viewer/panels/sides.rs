@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::{clusters, messages, plot, probe, progress, row, settings, statistics};
+use super::{clusters, links, messages, plot, probe, progress, row, settings, statistics};
 use crate::viewer::{action::Action, state::State};
 
 /// Show the light's panel on the left and the look's on the right; wishes go into `actions`.
@@ -38,6 +38,9 @@ pub fn side_panels(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
                     });
                     row::section(ui, "Clusters", true, |ui| {
                         clusters::clusters_ui(ui, state, actions);
+                    });
+                    row::section(ui, "Links", true, |ui| {
+                        links::links_ui(ui, state);
                     });
                     row::section(ui, "Convergence", true, |ui| {
                         plot::plot_ui(ui, state);

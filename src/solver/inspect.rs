@@ -1,0 +1,324 @@
+//! What a solve knows of one node: the links that light it, and the clusters above it.
+//!
+//! A leaf receives over its own links and those of everything above it. Each link is read at the leaf's centroid, as
+//! `reconstruct` reads it, so that the shares add to the light that is shown. A cluster is read as one receiver: the
+//! mean over its faces of what its links, and those above, bring to its centroid.
+
+use std::f32::consts::PI;
+
+use glam::{Vec3, Vec4};
+
+use super::{Solver, reconstruct::chain_irradiance};
+use crate::{
+    geometry::barycentric_in_plane,
+    hierarchy::{Hierarchy, Kind, NodeId, Reading},
+    transport::{Kernel, Link, luminance},
+};
+
+/// What to look into.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Subject {
+    /// The leaf below an element that holds a point: elements may be divided between a picture and a question.
+    Element {
+        /// The element, as a node.
+        node: NodeId,
+        /// A point of it, frame units.
+        point: Vec3,
+    },
+    /// A cluster.
+    Cluster(NodeId),
+}
+
+/// Where a node is, frame units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The node.
+    pub node: NodeId,
+    /// Lower corner of its box.
+    pub min: Vec3,
+    /// Upper corner of its box.
+    pub max: Vec3,
+    /// The point that stands for it.
+    pub centre: Vec3,
+}
+
+/// A link that lights what is inspected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InspectedLink {
+    /// Where the light comes from; equal to the receiver for light within a cluster.
+    pub source: Place,
+    /// Who holds the link: what is inspected, or a node above it.
+    pub receiver: Place,
+    /// Unoccluded fraction, 0…1.
+    pub visibility: f32,
+    /// Its share of the irradiance of what is inspected, W/m², linear RGB.
+    pub irradiance: Vec3,
+    /// Its share of the sum of form factors, visibility included.
+    pub form_factor: f32,
+    /// Estimated error of the receiver's irradiance (luminance); infinite where it is not known.
+    pub error: f32,
+}
+
+/// One node on the way from the root.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathNode {
+    /// Where it is.
+    pub place: Place,
+    /// Depth; the root has 0. Elements go on below the clusters.
+    pub level: u32,
+    /// Patches below it, or `None` for an element.
+    pub patch_count: Option<u32>,
+    /// Area of its patches, or its own, square frame units.
+    pub area: f32,
+    /// Luminance of the power that leaves it, over links and over samples, frame units.
+    pub power: f32,
+    /// Where most of what links carry from it goes, a unit vector; +z where it goes everywhere alike.
+    pub main_direction: Vec3,
+    /// Lower and upper bound of the luminance of the power that links carry from it along that direction (eq. 8).
+    pub power_bounds: [f32; 2],
+    /// Links that it receives over.
+    pub link_count: u32,
+    /// Sum of their estimated errors (luminance irradiance).
+    pub error: f32,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inspection {
+    /// What was asked.
+    pub subject: Subject,
+    /// The last whole step.
+    pub step: u32,
+    /// All links that light it, the strongest first.
+    pub links: Vec<InspectedLink>,
+    /// Irradiance over links: the sum of their shares, W/m².
+    pub linked: Vec3,
+    /// Irradiance by samples, straight from emitters, W/m²; 0 for clusters.
+    pub direct: Vec3,
+    /// Sum of form factors. 1 for a leaf of a closed scene; a cluster also receives below itself, and has less.
+    pub row_sum: f32,
+    /// From the root to what is inspected.
+    pub path: Vec<PathNode>,
+}
+
+impl Solver {
+    /// What the solve knows of a node, or `None` where there is no such node.
+    pub fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        let hierarchy = &self.hierarchy;
+        let node = match *subject {
+            Subject::Cluster(node) => (node.index() < hierarchy.clusters.len()).then_some(node)?,
+            Subject::Element { node, point } => self.leaf_at(node, point)?,
+        };
+        let path = self.path_to(node);
+        let mut links = self.links_along(&path, node);
+        let row_sum = links.iter().map(|link| link.form_factor).sum();
+        let (direct, scale) = match hierarchy.kind(node) {
+            Kind::Element(leaf) => (
+                self.direct_of(leaf).truncate(),
+                self.closure_factor(leaf, row_sum),
+            ),
+            Kind::Cluster(_) => (Vec3::ZERO, 1.0),
+        };
+        for link in &mut links {
+            link.irradiance *= scale;
+        }
+        links.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+        Some(Inspection {
+            subject: *subject,
+            step: self.step,
+            linked: links.iter().map(|link| link.irradiance).sum(),
+            direct,
+            row_sum,
+            path: path
+                .iter()
+                .enumerate()
+                .map(|(level, &node)| self.path_node(node, level as u32))
+                .collect(),
+            links,
+        })
+    }
+
+    /// The leaf below an element that holds a point of it.
+    fn leaf_at(&self, node: NodeId, point: Vec3) -> Option<NodeId> {
+        let mesh = &self.hierarchy.mesh;
+        let base = self.hierarchy.clusters.len();
+        let mut index = node.index().checked_sub(base)?;
+        let depth_inside =
+            |child: usize| barycentric_in_plane(point, mesh.corners(child)).min_element();
+        loop {
+            let element = mesh.elements.get(index)?;
+            if element.is_leaf() {
+                return Some(NodeId((base + index) as u32));
+            }
+            let first = element.first_child as usize;
+            index =
+                (first..first + 4).max_by(|&a, &b| depth_inside(a).total_cmp(&depth_inside(b)))?;
+        }
+    }
+
+    /// From the root to a node.
+    fn path_to(&self, node: NodeId) -> Vec<NodeId> {
+        let hierarchy = &self.hierarchy;
+        let as_nodes = |clusters: Vec<usize>| clusters.into_iter().map(|at| NodeId(at as u32));
+        match hierarchy.kind(node) {
+            Kind::Cluster(index) => {
+                let first_patch = hierarchy.clusters[index].start as usize;
+                let mut path: Vec<NodeId> =
+                    as_nodes(hierarchy.clusters_over(first_patch).collect()).collect();
+                // All clusters over its first patch that are not below it.
+                path.retain(|above| *above <= node);
+                path
+            }
+            Kind::Element(index) => {
+                let elements = &hierarchy.mesh.elements;
+                let mut below = vec![index];
+                let mut at = index;
+                while elements[at].parent != u32::MAX {
+                    at = elements[at].parent as usize;
+                    below.push(at);
+                }
+                let base = hierarchy.clusters.len();
+                let mut path: Vec<NodeId> = as_nodes(
+                    hierarchy
+                        .clusters_over(elements[index].patch as usize)
+                        .collect(),
+                )
+                .collect();
+                path.extend(below.iter().rev().map(|at| NodeId((base + at) as u32)));
+                path
+            }
+        }
+    }
+
+    /// The links of all nodes of a path, as its end receives over them; not yet scaled to the closure.
+    fn links_along(&self, path: &[NodeId], node: NodeId) -> Vec<InspectedLink> {
+        let kernel = self.kernel();
+        let mut found = Vec::new();
+        for &receiver in path {
+            let place = self.place(receiver);
+            for link in self.links.of(receiver) {
+                let share = match self.hierarchy.kind(node) {
+                    Kind::Cluster(index) => mean_irradiance(kernel, index, receiver, link),
+                    Kind::Element(leaf) => {
+                        let point = self.hierarchy.mesh.elements[leaf].centroid;
+                        let normal = self.hierarchy.patch_of(leaf).normal;
+                        chain_irradiance(kernel, receiver.index(), link, point, normal)
+                    }
+                };
+                found.push(InspectedLink {
+                    source: self.place(link.source),
+                    receiver: place,
+                    visibility: link.visibility,
+                    irradiance: share.truncate(),
+                    form_factor: share.w,
+                    error: link.error,
+                });
+            }
+        }
+        found
+    }
+
+    /// By what the light of a leaf is scaled so that its form factors add to the closure.
+    fn closure_factor(&self, leaf: usize, row_sum: f32) -> f32 {
+        let elements = &self.hierarchy.mesh.elements;
+        let patch = elements[leaf].patch;
+        let sums = self
+            .leaves
+            .iter()
+            .filter(|other| elements[other.element as usize].patch == patch)
+            .fold((0.0, 0.0), |(areas, rows), other| {
+                let area = elements[other.element as usize].area_vector.length();
+                (areas + area, rows + area * other.centre.w)
+            });
+        self.closures[patch as usize].factor_for(row_sum, sums)
+    }
+
+    fn place(&self, node: NodeId) -> Place {
+        let (min, max) = self.hierarchy.bounds(node);
+        Place {
+            node,
+            min,
+            max,
+            centre: self.hierarchy.centroid(node),
+        }
+    }
+
+    fn path_node(&self, node: NodeId, level: u32) -> PathNode {
+        let (patch_count, main_direction) = match self.hierarchy.kind(node) {
+            Kind::Cluster(index) => {
+                let cluster = &self.hierarchy.clusters[index];
+                let linear = self.power.clusters[index].linear.map(luminance);
+                (
+                    Some(cluster.end - cluster.start),
+                    Vec3::from_array(linear).try_normalize().unwrap_or(Vec3::Z),
+                )
+            }
+            Kind::Element(index) => (None, self.hierarchy.patch_of(index).normal),
+        };
+        let links = self.links.of(node);
+        PathNode {
+            place: self.place(node),
+            level,
+            patch_count,
+            area: self.hierarchy.node_area(node),
+            power: self.power_of(node),
+            main_direction,
+            power_bounds: self.power_bounds(node, main_direction),
+            link_count: links.len() as u32,
+            error: links.iter().map(|link| link.error).sum(),
+        }
+    }
+
+    /// Luminance of the power that leaves a node, sampled emission included.
+    fn power_of(&self, node: NodeId) -> f32 {
+        match self.hierarchy.kind(node) {
+            // Boxes are renewed with each whole step.
+            Kind::Cluster(index) => self.snapshot.clusters[index].power,
+            Kind::Element(index) => {
+                let emission = if self.is_sampled(index) {
+                    self.hierarchy.patch_of(index).emission * PI
+                } else {
+                    Vec3::ZERO
+                };
+                let radiosity = self.power.elements[index] + emission.extend(0.0);
+                luminance(radiosity) * self.hierarchy.node_area(node)
+            }
+        }
+    }
+
+    /// Bounds of the linked power along a direction; those of an element are one.
+    fn power_bounds(&self, node: NodeId, direction: Vec3) -> [f32; 2] {
+        match self.hierarchy.kind(node) {
+            Kind::Cluster(index) => {
+                let (least, most) = self.power.clusters[index].bounds(direction);
+                [luminance(least), luminance(most)]
+            }
+            Kind::Element(_) => [luminance(self.kernel().projected_power(node, direction)); 2],
+        }
+    }
+}
+
+/// Mean irradiance over the faces of a cluster, at its centroid, by a link of itself or of a cluster above.
+fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Link) -> Vec4 {
+    let hierarchy: &Hierarchy = kernel.hierarchy;
+    let cluster = &hierarchy.clusters[index];
+    if link.source == receiver {
+        // Light within a cluster comes from everywhere alike.
+        return chain_irradiance(kernel, receiver.index(), link, cluster.centroid, Vec3::ZERO);
+    }
+    let incident = kernel.vector_irradiance(link.source, cluster.centroid, cluster.radius);
+    let moments = &kernel.tables.clusters[index];
+    let area = cluster.area.max(f32::MIN_POSITIVE);
+    // The shares that faces take by `Incident::on_face`, in the mean.
+    let reading = kernel.reading.unwrap_or(Reading::Bounded);
+    let towards = incident.towards_source;
+    let facing = moments.project(towards, reading).w / area;
+    let cosine = Vec3::from_array(moments.linear.map(|along| along.w)).dot(towards) / area;
+    let share = facing * (1.0 - incident.spread) + 0.5 * (1.0 + cosine) * incident.spread;
+    incident.strength * (share * link.visibility)
+}
+
+/// By which links are ordered: luminance of what they bring.
+fn strength(link: &InspectedLink) -> f32 {
+    luminance(link.irradiance.extend(0.0))
+}
