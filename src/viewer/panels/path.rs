@@ -12,6 +12,9 @@ use crate::{
 /// Height of the list; longer ones scroll. Deep trees have forty entries.
 const MOST_HEIGHT: f32 = 230.0;
 
+/// Smaller than other text, so that an entry fits into the panel.
+const FONT_SIZE: f32 = 11.0;
+
 /// Show the nodes, the root first; a click on a cluster selects it.
 pub fn path_ui(
     ui: &mut egui::Ui,
@@ -26,6 +29,10 @@ pub fn path_ui(
         .id_salt("path")
         .max_height(MOST_HEIGHT)
         .show(ui, |ui| {
+            // Lines as close as those of a list.
+            ui.spacing_mut().interact_size.y = 16.0;
+            ui.spacing_mut().item_spacing.y = 1.0;
+            ui.spacing_mut().button_padding = egui::vec2(4.0, 1.0);
             for node in path {
                 node_ui(ui, node, frame, selected, actions);
             }
@@ -39,11 +46,11 @@ fn node_ui(
     selected: Option<usize>,
     actions: &mut Vec<Action>,
 ) {
-    let small = |text: String| RichText::new(text).small();
+    let small = |text: String| RichText::new(text).size(FONT_SIZE);
     let explanation = explanation(node, frame);
     let Some(patch_count) = node.patch_count else {
         ui.label(small(format!(
-            "Element {} · {} links",
+            " Element {} · {} links",
             node.place.node.0,
             count(u64::from(node.link_count))
         )))
