@@ -102,7 +102,7 @@ fn frame_ui(ui: &mut egui::Ui, state: &State) {
             ui,
             "CPU per frame",
             format!("{} ms (most {})", ms(middle), ms(most)),
-            "Time that the window takes of the processor for a frame, without the graphics adapter; middle and largest of the last frames",
+            "Time that the window works on a frame, without waiting for the screen; other work on the same cores lengthens it. Middle and largest of the last frames",
         );
     });
 }
