@@ -10,6 +10,7 @@ mod direct;
 mod display;
 mod gather;
 mod inspect;
+mod inspection;
 mod reconstruct;
 mod report;
 mod settings;
@@ -22,7 +23,7 @@ use std::sync::{
 
 use glam::{Vec3, Vec4};
 
-pub use inspect::{InspectedLink, Inspection, PathNode, Place, Subject};
+pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
