@@ -12,7 +12,7 @@ use vecrad::{
     solver::{ClusterBox, DisplayMesh, Snapshot, VertexLight},
     viewer::{
         camera::{Camera, UpAxis},
-        clusters,
+        cluster_lines,
         render::{
             Overlay, Picture, Renderer, Target,
             headless::{self, HeadlessError, HeadlessPicture},
@@ -73,6 +73,7 @@ fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
         power: 1.0,
         direction_spread: 0.0,
         link_count: 0,
+        source_count: 0,
         error: 0.0,
         face_power: [0.0; 6],
     };
@@ -308,8 +309,9 @@ fn the_selected_cluster_is_outlined() {
     let target = Target::new(renderer.gpu(), SIZE).expect("a small picture");
     let overlay = Overlay {
         boxes: Arc::default(),
-        segments: Arc::new(clusters::outline(
-            &snapshot.clusters[0],
+        segments: Arc::new(cluster_lines::outline(
+            snapshot.clusters[0].min,
+            snapshot.clusters[0].max,
             Vec3::new(0.0, 0.0, 1.0),
         )),
     };

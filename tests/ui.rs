@@ -18,7 +18,7 @@ use vecrad::{
         loader::SceneSource,
         start::Faults,
         state::{RunStatus, Severity},
-        view::ViewMode,
+        view::{ClusterCut, LinkEnd, ViewMode},
     },
     worker::{Effect, StopReason},
 };
@@ -43,6 +43,27 @@ fn plates() -> Harness<'static, App> {
     });
     wait_for(&mut harness, |app| {
         matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    harness
+}
+
+/// A window that has lit the box, with the middle of its back wall picked.
+fn picked_in_the_box() -> Harness<'static, App> {
+    let mut harness = window(Options {
+        source: Some(SceneSource::Builtin("cornell".to_owned())),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    let at = harness.get_by_label("Scene").rect().center();
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.drop_at(at);
+    wait_for(&mut harness, |app| {
+        app.state.inspections.element().is_some()
     });
     harness
 }
@@ -197,6 +218,85 @@ fn a_click_picks_and_shows_the_light() {
     harness.key_press(egui::Key::Escape);
     harness.run_steps(2);
     assert!(harness.state().state.selection.is_none());
+}
+
+#[test]
+fn a_picked_element_tells_its_row_sum_and_a_path_to_choose_from() {
+    let mut harness = picked_in_the_box();
+    harness.get_by_label("Row sum");
+    harness.get_by_label("Path from the root");
+    harness.get_by_label_contains("Level 0 ·").click();
+    wait_for(&mut harness, |app| {
+        app.state.cluster == Some(0) && app.state.inspections.of(LinkEnd::Cluster).is_some()
+    });
+    let state = &harness.state().state;
+    let inspection = state.inspections.element().expect("it was answered");
+    let probe = state.selection.as_ref().and_then(|picked| picked.probe);
+    let shown = probe.expect("the wall is lit").irradiance;
+    let said = inspection.linked + inspection.direct;
+    assert!(
+        (said - shown).abs().max_element() < 0.3 * shown.max_element(),
+        "the element has {said}, its vertices {shown}"
+    );
+    assert_eq!(inspection.step, state.settings.max_steps);
+}
+
+#[test]
+fn links_are_shown_by_a_key_and_their_light_is_told() {
+    let mut harness = picked_in_the_box();
+    harness.key_press(egui::Key::L);
+    harness.run_steps(2);
+    assert!(harness.state().state.view.links.shown);
+    harness.get_by_label_contains("of their light");
+    harness.state_mut().state.view.links.most = 1;
+    harness.run_steps(2);
+    harness.get_by_label_contains("1 of ");
+    harness.state_mut().state.view.links.of = LinkEnd::Cluster;
+    harness.run_steps(2);
+    harness.get_by_label_contains("to select a cluster");
+    perform(&mut harness, Action::SelectCluster(2));
+    wait_for(&mut harness, |app| {
+        app.state.inspections.of(LinkEnd::Cluster).is_some()
+    });
+    harness.key_press(egui::Key::L);
+    harness.run_steps(2);
+    assert!(!harness.state().state.view.links.shown);
+}
+
+#[test]
+fn a_new_start_forgets_what_the_solver_said() {
+    let mut harness = picked_in_the_box();
+    let mut other = harness.state().state.settings.clone();
+    other.seed += 1;
+    perform(&mut harness, Action::Settings(other));
+    // The point is still picked: the new run is asked, and answers.
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+            && app
+                .state
+                .inspections
+                .element()
+                .is_some_and(|told| told.step == app.state.settings.max_steps)
+    });
+}
+
+#[test]
+fn clusters_are_cut_by_size_and_by_use() {
+    let mut harness = picked_in_the_box();
+    let shown = |harness: &Harness<'static, App>| harness.state().state.cluster_counts.shown;
+    harness.state_mut().state.view.clusters.cut = ClusterCut::Size;
+    harness.state_mut().state.view.clusters.size = 0.5;
+    harness.run_steps(2);
+    let before = shown(&harness);
+    harness.key_press(egui::Key::CloseBracket);
+    harness.run_steps(2);
+    let overlay = harness.state().state.view.clusters;
+    assert_eq!((overlay.shown, overlay.size), (true, 0.25));
+    assert!(shown(&harness) > before, "smaller boxes are more");
+    harness.state_mut().state.view.clusters.cut = ClusterCut::Used;
+    harness.run_steps(2);
+    assert!(shown(&harness) > 0);
+    harness.get_by_label_contains("boxes of");
 }
 
 #[test]

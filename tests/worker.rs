@@ -13,8 +13,9 @@ use std::{
 
 use glam::{DVec3, Vec3};
 use vecrad::{
+    hierarchy::NodeId,
     scene::{Material, Scene, SceneBuilder, SceneOptions},
-    solver::{Cancel, Snapshot, SolveSettings, StepReport},
+    solver::{Cancel, Inspection, Snapshot, SolveSettings, StepReport, Subject},
     worker::{Effect, Event, Job, RunOptions, Stepper, StopReason, WorkerHandle},
 };
 
@@ -23,6 +24,9 @@ const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Slower than a test may last: such a step ends by being cancelled.
 const FOREVER: Duration = Duration::from_secs(600);
+
+/// The node that the fake solver knows of.
+const NODE: Subject = Subject::Cluster(NodeId(0));
 
 /// What the fake solver does, and what it was seen doing.
 #[derive(Default)]
@@ -41,6 +45,8 @@ struct Script {
     begun: Mutex<Vec<u32>>,
     /// Steps that saw the cancellation.
     cancelled: AtomicU32,
+    /// Nodes that were inspected.
+    inspected: AtomicU32,
     /// Steppers that were dropped.
     dropped: AtomicU32,
 }
@@ -78,6 +84,20 @@ impl Stepper for FakeSolver {
             step: self.step,
             ..Snapshot::default()
         }
+    }
+
+    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        self.script.inspected.fetch_add(1, Ordering::SeqCst);
+        // It knows of one node only.
+        (*subject == NODE).then(|| Inspection {
+            subject: *subject,
+            step: self.step,
+            links: Vec::new(),
+            linked: Vec3::ZERO,
+            direct: Vec3::ZERO,
+            row_sum: 0.0,
+            path: Vec::new(),
+        })
     }
 
     fn change_settings(&mut self, settings: SolveSettings) {
@@ -390,4 +410,106 @@ fn every_event_wakes_the_owner() {
     let events = wait_for(&worker, is_finished);
     drop(worker);
     assert_eq!(wakes.load(Ordering::SeqCst) as usize, events.len());
+}
+
+/// Steps that the answers among some events are of.
+fn answers(events: &[Event]) -> Vec<u32> {
+    events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Inspected(inspection) => Some(inspection.step),
+            _ => None,
+        })
+        .collect()
+}
+
+#[test]
+fn a_question_is_answered_while_the_run_rests_and_after_its_end() {
+    let script = Arc::new(Script {
+        step_time: FOREVER,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 1);
+    worker.pause();
+    wait_for(&worker, |event| *event == Event::Paused);
+    let unknown = Subject::Cluster(NodeId(9));
+    worker.inspect(vec![unknown, NODE]);
+    let events = wait_for(&worker, |event| matches!(event, Event::Inspected(_)));
+    assert_eq!(events.len(), 1, "nothing is announced again: {events:?}");
+    assert_eq!(answers(&events), [0]);
+    assert_eq!(script.inspected.load(Ordering::SeqCst), 2);
+    assert_eq!(script.begun.lock().unwrap().len(), 1, "it still rests");
+
+    worker.stop();
+    wait_for(&worker, is_finished);
+    worker.inspect(vec![NODE]);
+    let events = wait_for(&worker, |event| matches!(event, Event::Inspected(_)));
+    assert_eq!(events.len(), 1, "{events:?}");
+}
+
+#[test]
+fn a_question_is_answered_after_each_step_and_interrupts_none() {
+    let script = Arc::new(Script {
+        step_time: Duration::from_millis(20),
+        steps: 4,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 1);
+    worker.inspect(vec![NODE]);
+    let is_last =
+        |event: &Event| matches!(event, Event::Inspected(inspection) if inspection.step == 4);
+    let events = wait_for(&worker, is_last);
+    assert_eq!(answers(&events), [1, 2, 3, 4]);
+    assert_eq!(*script.begun.lock().unwrap(), [1, 2, 3, 4]);
+    assert_eq!(script.cancelled.load(Ordering::SeqCst), 0);
+    let ends = events.iter().filter(|event| is_finished(event)).count();
+    assert_eq!(ends, 1, "{events:?}");
+    // Nothing more is asked: nothing more is said.
+    worker.inspect(Vec::new());
+    assert!(worker.next_event(Duration::from_millis(60)).is_none());
+}
+
+#[test]
+fn pausing_during_a_question_is_still_announced() {
+    let script = Arc::new(Script {
+        step_time: Duration::from_millis(1),
+        steps: 1_000_000,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    for _ in 0..20 {
+        worker.inspect(vec![NODE]);
+        worker.pause();
+        wait_for(&worker, |event| *event == Event::Paused);
+        worker.resume();
+        wait_for(&worker, |event| *event == Event::Continued);
+    }
+    assert_eq!(script.made.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn a_question_about_an_older_run_is_dropped() {
+    let script = Arc::new(Script {
+        steps: 2,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    // One answer is given and not read, one question is never answered.
+    worker.inspect(vec![NODE]);
+    let begin = Instant::now();
+    while script.inspected.load(Ordering::SeqCst) == 0 {
+        assert!(begin.elapsed() < PATIENCE);
+        thread::sleep(Duration::from_millis(1));
+    }
+    worker.start(triangle(), short(), one_thread());
+    let events = wait_for(&worker, is_finished);
+    assert!(answers(&events).is_empty(), "{events:?}");
+    assert_eq!(script.inspected.load(Ordering::SeqCst), 1);
 }

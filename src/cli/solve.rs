@@ -193,7 +193,7 @@ fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result
             }
             Some(Event::Finished(reason)) => break reason,
             Some(Event::Failed(message)) => bail!("the solver failed: {message}"),
-            Some(Event::Started | Event::Paused | Event::Continued) => {}
+            Some(Event::Started | Event::Paused | Event::Continued | Event::Inspected(_)) => {}
         }
     };
     progress.finish();

@@ -15,7 +15,7 @@ use crate::{
         solve_matrix,
     },
     scene::Scene,
-    solver::{Cancel, Snapshot, SolveSettings, Solver, StepReport},
+    solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
     worker::{Job, MakeStepper, Stepper},
 };
 
@@ -160,6 +160,10 @@ impl Stepper for MeasuredSolver {
                 .insert(snapshot.step, error);
         }
         snapshot
+    }
+
+    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        self.solver.inspect(subject)
     }
 
     fn change_settings(&mut self, settings: SolveSettings) {

@@ -166,6 +166,29 @@ impl Hierarchy {
         (patch != u32::MAX).then_some(patch as usize)
     }
 
+    /// The clusters that hold a patch, the root first.
+    pub fn clusters_over(&self, patch: usize) -> impl Iterator<Item = usize> + '_ {
+        std::iter::successors(Some(0), move |&index: &usize| {
+            let cluster = &self.clusters[index];
+            let first = cluster.first_child as usize;
+            (!cluster.is_leaf()).then(|| {
+                let is_second = patch >= self.clusters[first].end as usize;
+                first + usize::from(is_second)
+            })
+        })
+    }
+
+    /// Box around a node.
+    pub fn bounds(&self, node: NodeId) -> (Vec3, Vec3) {
+        match self.kind(node) {
+            Kind::Cluster(index) => (self.clusters[index].min, self.clusters[index].max),
+            Kind::Element(index) => {
+                let [a, b, c] = self.mesh.corners(index);
+                (a.min(b).min(c), a.max(b).max(c))
+            }
+        }
+    }
+
     /// Number of nodes of both kinds.
     pub fn node_count(&self) -> usize {
         self.clusters.len() + self.mesh.elements.len()

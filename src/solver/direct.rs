@@ -96,6 +96,11 @@ impl Lights {
         self.is_sampled[patch]
     }
 
+    /// The patches that are sampled.
+    pub(super) fn sampled_patches(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.is_sampled.len()).filter(|&patch| self.is_sampled[patch])
+    }
+
     /// Shoot a range of the shadow rays of many points, and add what they find to what is known of each.
     /// When cancelled, some points are left out and all must be asked again.
     pub(super) fn shoot(

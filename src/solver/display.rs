@@ -1,6 +1,6 @@
 //! From the state of a solve to what is shown of it.
 
-use std::sync::Arc;
+use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
@@ -145,7 +145,31 @@ impl Solver {
             };
             boxes.push(self.cluster_box(index, cluster, level));
         }
+        for link in self.links.all() {
+            if let Some(source) = boxes.get_mut(link.source.index()) {
+                source.source_count += 1;
+            }
+        }
+        self.add_sampled_emission(&mut boxes);
         boxes
+    }
+
+    /// Add what tables leave out, since no link carries it: the emission of sampled emitters.
+    fn add_sampled_emission(&self, boxes: &mut [ClusterBox]) {
+        let Some(field) = &self.direct else { return };
+        for index in field.lights.sampled_patches() {
+            let patch = &self.hierarchy.patches[index];
+            let radiosity = luminance((patch.emission * PI).extend(0.0));
+            let vector = patch.area_vector * radiosity;
+            for cluster in self.hierarchy.clusters_over(index) {
+                let shown = &mut boxes[cluster];
+                shown.power += vector.length();
+                for axis in 0..3 {
+                    shown.face_power[2 * axis] += vector[axis].max(0.0);
+                    shown.face_power[2 * axis + 1] += (-vector[axis]).max(0.0);
+                }
+            }
+        }
     }
 
     fn cluster_box(&self, index: usize, cluster: &Cluster, level: u32) -> ClusterBox {
@@ -167,6 +191,7 @@ impl Solver {
                 0.0
             },
             link_count: links.len() as u32,
+            source_count: 0,
             error: links.iter().map(|link| link.error).sum(),
             face_power: moments.six_faces().map(luminance),
         }

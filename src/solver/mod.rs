@@ -9,6 +9,8 @@ mod closure;
 mod direct;
 mod display;
 mod gather;
+mod inspect;
+mod inspection;
 mod reconstruct;
 mod report;
 mod settings;
@@ -21,6 +23,7 @@ use std::sync::{
 
 use glam::{Vec3, Vec4};
 
+pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
@@ -198,17 +201,20 @@ impl Solver {
         let patch = self.hierarchy.patch_of(element);
         let reflected =
             patch.reflectance * (self.linked[element] + self.direct_of(element)).truncate();
-        let index = self.hierarchy.mesh.elements[element].patch as usize;
-        let is_sampled = self
-            .direct
-            .as_ref()
-            .is_some_and(|field| field.lights.is_sampled(index));
-        let emitted = if is_sampled {
+        let emitted = if self.is_sampled(element) {
             Vec3::ZERO
         } else {
             patch.emission * std::f32::consts::PI
         };
         (reflected + emitted).extend(1.0)
+    }
+
+    /// Whether the emission of an element is sampled, and so not sent over links.
+    fn is_sampled(&self, element: usize) -> bool {
+        let patch = self.hierarchy.mesh.elements[element].patch as usize;
+        self.direct
+            .as_ref()
+            .is_some_and(|field| field.lights.is_sampled(patch))
     }
 
     /// Bring the source tables up to date with the irradiance of the leaves.

@@ -145,7 +145,8 @@ fn gather_patch(
     }
 }
 
-fn chain_irradiance(
+/// What a face receives over a link of a cluster above it.
+pub(super) fn chain_irradiance(
     kernel: Kernel<'_>,
     receiver: usize,
     link: &Link,

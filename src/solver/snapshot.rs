@@ -56,13 +56,15 @@ pub struct ClusterBox {
     pub patch_count: u32,
     /// Sum of the patch areas, square frame units.
     pub area: f32,
-    /// Luminance of the power that leaves it, frame units.
+    /// Luminance of the power that leaves it, over links and over samples, frame units.
     pub power: f32,
     /// 1 − |Σ S| / Σ |S| : 0 when all normals agree, 1 when they cancel.
     pub direction_spread: f32,
     /// Links that this node receives over.
     pub link_count: u32,
-    /// Sum of the estimated errors of its links (luminance irradiance).
+    /// Links by which this node sends to others, or to itself.
+    pub source_count: u32,
+    /// Sum of the estimated errors of the links that it receives over (luminance irradiance).
     pub error: f32,
     /// Luminance of the power along the box normals, +x −x +y −y +z −z.
     pub face_power: [f32; 6],

@@ -61,6 +61,11 @@ impl LinkStore {
         }
     }
 
+    /// All links, grouped by receiver.
+    pub fn all(&self) -> &[Link] {
+        &self.links
+    }
+
     /// Number of links.
     pub fn len(&self) -> usize {
         self.links.len()

@@ -117,7 +117,7 @@ impl Judge<'_> {
             }
             Kind::Cluster(index) => {
                 let cluster = &hierarchy.clusters[index];
-                let (min, max) = self.bounds(to);
+                let (min, max) = hierarchy.bounds(to);
                 let (least, most) = (min - cluster.max, max - cluster.min);
                 let faces = self.tables().clusters[index].six_faces().map(|face| face.w);
                 let slack = IN_PLANE * cluster.area;
@@ -125,17 +125,6 @@ impl Judge<'_> {
                     (most[axis] > 0.0 && faces[2 * axis] > slack)
                         || (least[axis] < 0.0 && faces[2 * axis + 1] > slack)
                 })
-            }
-        }
-    }
-
-    fn bounds(&self, node: NodeId) -> (Vec3, Vec3) {
-        let hierarchy = self.hierarchy();
-        match hierarchy.kind(node) {
-            Kind::Cluster(index) => (hierarchy.clusters[index].min, hierarchy.clusters[index].max),
-            Kind::Element(index) => {
-                let [a, b, c] = hierarchy.mesh.corners(index);
-                (a.min(b).min(c), a.max(b).max(c))
             }
         }
     }

@@ -42,7 +42,9 @@ pub enum Action {
     ToggleEdges,
     /// Cluster boxes on or off.
     ToggleClusters,
-    /// Another level of cluster boxes.
+    /// Links of what is selected on or off.
+    ToggleLinks,
+    /// Larger or smaller cluster boxes.
     ClusterLevelBy(i32),
     /// Backs of one-sided faces on or off.
     ToggleBacks,

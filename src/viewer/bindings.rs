@@ -165,6 +165,7 @@ pub fn bindings() -> Vec<Binding> {
             "Smaller clusters",
             Action::ClusterLevelBy(1),
         ),
+        plain(Key::L, View, "Links of what is picked", Action::ToggleLinks),
         plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
         plain(Key::Minus, View, "Darker by ½ EV", Action::ExposureBy(-0.5)),
         plain(

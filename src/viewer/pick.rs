@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::{camera::Camera, light_range::luminance, loader::LoadedScene};
-use crate::{scene::TriangleId, solver::Snapshot};
+use crate::{geometry::barycentric_in_plane, scene::TriangleId, solver::Snapshot};
 
 /// A picked point. The light of it is looked up when it is shown, so that it stays current.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +85,7 @@ pub fn probe(snapshot: &Snapshot, pick: &Pick) -> Option<Probe> {
             continue;
         }
         let corners = mesh.indices[index].map(|corner| mesh.positions[corner as usize]);
-        let weights = barycentric(corners, pick.point);
+        let weights = barycentric_in_plane(pick.point, corners);
         // The element that the point is deepest inside, so that rounding at an edge does no harm.
         if best.is_none_or(|(_, held)| weights.min_element() > held.min_element()) {
             best = Some((index, weights));
@@ -150,16 +150,4 @@ pub fn object_bounds(loaded: &LoadedScene, start: TriangleId, end: TriangleId) -
         .fold((Vec3::MAX, Vec3::MIN), |(min, max), corner| {
             (min.min(corner), max.max(corner))
         })
-}
-
-/// Weights of the corners of a triangle at a point of its plane; they sum to 1. Zero area gives a corner.
-fn barycentric([a, b, c]: [Vec3; 3], point: Vec3) -> Vec3 {
-    let normal = (b - a).cross(c - a);
-    let scale = normal.length_squared();
-    if scale <= 0.0 {
-        return Vec3::X;
-    }
-    let at_b = (point - a).cross(c - a).dot(normal) / scale;
-    let at_c = (b - a).cross(point - a).dot(normal) / scale;
-    Vec3::new(1.0 - at_b - at_c, at_b, at_c)
 }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::{
     camera::CameraRig,
-    clusters::ClusterCounts,
+    clusters::{self, ClusterCounts},
+    frame_time::FrameTimes,
+    inspection::Inspections,
     loader::{LoadedScene, Loader},
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
@@ -99,6 +101,8 @@ impl Run {
                 }
             }
             Event::Stepped(report) => self.reports.push(report),
+            // Kept apart: it is of what is selected, not of the run.
+            Event::Inspected(_) => {}
             Event::Paused => self.status = RunStatus::Paused,
             Event::Continued => self.status = RunStatus::Running,
             Event::Finished(reason) => self.status = RunStatus::Finished(reason),
@@ -250,6 +254,10 @@ pub struct State {
     pub cluster: Option<usize>,
     /// Counts of the cluster tree at the level that is shown.
     pub cluster_counts: ClusterCounts,
+    /// What the solver knows of what is selected.
+    pub inspections: Inspections,
+    /// What frames cost.
+    pub frame_times: FrameTimes,
     /// Ends of the false colours in use.
     pub false_color_range: [f32; 2],
     /// What was said.
@@ -276,6 +284,24 @@ impl State {
         let aspect = self.aspect();
         if let Some(loaded) = &self.loaded {
             self.rig.target.frame_box(loaded.min, loaded.max, aspect);
+        }
+    }
+
+    /// A cluster was guessed from boxes around the picked point; once the solver has said which ones really hold it, take
+    /// the one of those.
+    pub fn correct_cluster(&mut self) {
+        let (Some(index), Some(inspection), Some(snapshot)) =
+            (self.cluster, self.inspections.element(), &self.run.snapshot)
+        else {
+            return;
+        };
+        let over = |at: &usize| {
+            let mut path = inspection.path.iter().map(|node| node.place.node.index());
+            path.any(|node| node == *at)
+        };
+        if !over(&index) {
+            let shown = clusters::shown(&snapshot.clusters, &self.view.clusters);
+            self.cluster = shown.into_iter().rfind(over).or(self.cluster);
         }
     }
 

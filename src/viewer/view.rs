@@ -3,6 +3,10 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use super::overlay::{
+    ClusterColor, ClusterCut, ClusterOverlay, LinkColor, LinkEnd, LinkOverlay,
+};
+
 /// What the surfaces show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -132,67 +136,6 @@ pub enum ToneMap {
     None,
 }
 
-/// What a cluster box's colour tells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ClusterColor {
-    /// Power that leaves the cluster.
-    #[default]
-    Power,
-    /// Area of its patches.
-    Area,
-    /// How much its normals disagree.
-    Spread,
-    /// Links that it receives over.
-    Links,
-    /// Estimated error of these links.
-    Error,
-}
-
-impl ClusterColor {
-    /// All, in menu order.
-    pub const ALL: [Self; 5] = [
-        Self::Power,
-        Self::Area,
-        Self::Spread,
-        Self::Links,
-        Self::Error,
-    ];
-
-    /// Label in menus.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Power => "Power",
-            Self::Area => "Area",
-            Self::Spread => "Direction spread",
-            Self::Links => "Links received",
-            Self::Error => "Estimated error",
-        }
-    }
-}
-
-/// Which clusters are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ClusterOverlay {
-    /// Whether boxes are drawn at all.
-    pub shown: bool,
-    /// Level of the tree whose boxes are drawn; leaves above it are drawn, too.
-    pub level: u32,
-    /// What their colour tells.
-    pub color: ClusterColor,
-}
-
-impl Default for ClusterOverlay {
-    fn default() -> Self {
-        Self {
-            shown: false,
-            level: 3,
-            color: ClusterColor::Power,
-        }
-    }
-}
-
 /// Everything about the picture but the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -217,6 +160,8 @@ pub struct ViewSettings {
     pub texture_detail: bool,
     /// The cluster boxes.
     pub clusters: ClusterOverlay,
+    /// The links of what is selected.
+    pub links: LinkOverlay,
 }
 
 impl ViewSettings {
@@ -244,6 +189,7 @@ impl Default for ViewSettings {
             backs: false,
             texture_detail: true,
             clusters: ClusterOverlay::default(),
+            links: LinkOverlay::default(),
         }
     }
 }

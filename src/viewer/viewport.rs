@@ -10,16 +10,17 @@ use glam::Vec3;
 
 use super::{
     camera::Camera,
-    clusters, navigation,
+    line_cache::LineCache,
+    navigation,
     pick::Pick,
     render::{Gpu, Overlay, Picture, RenderError, Renderer, Target},
     state::{Severity, State},
     theme,
-    view::{ClusterOverlay, ViewSettings},
+    view::ViewSettings,
 };
 use crate::{
     scene::Scene,
-    solver::{ClusterBox, DisplayMesh, VertexLight},
+    solver::{DisplayMesh, VertexLight},
 };
 
 /// The adapter's half of the pane.
@@ -29,8 +30,7 @@ pub struct Viewport {
     target: Option<(Target, TextureId)>,
     /// What the target shows.
     drawn: Option<PictureKey>,
-    overlay: Overlay,
-    overlay_key: Option<OverlayKey>,
+    lines: LineCache,
 }
 
 /// Everything that a picture depends on. Arcs are held, so that an address is not used twice.
@@ -64,13 +64,6 @@ impl PartialEq for PictureKey {
     }
 }
 
-/// What the lines depend on.
-struct OverlayKey {
-    clusters: Arc<Vec<ClusterBox>>,
-    shown: ClusterOverlay,
-    selected: Option<usize>,
-}
-
 impl Viewport {
     /// A pane on the window's device.
     pub fn new(render_state: &RenderState) -> Self {
@@ -84,8 +77,7 @@ impl Viewport {
             renderer: Renderer::new(gpu),
             target: None,
             drawn: None,
-            overlay: Overlay::default(),
-            overlay_key: None,
+            lines: LineCache::default(),
         }
     }
 
@@ -153,12 +145,12 @@ impl Viewport {
     fn key(&mut self, state: &State, size: [u32; 2], background: Vec3) -> Option<PictureKey> {
         let loaded = state.loaded.as_ref()?;
         let snapshot = state.run.snapshot.as_ref()?;
-        self.update_overlay(state, &snapshot.clusters);
+        let overlay = self.lines.overlay(state, &snapshot.clusters).clone();
         Some(PictureKey {
             scene: loaded.scene.clone(),
             mesh: snapshot.mesh.clone(),
             light: snapshot.light.clone(),
-            overlay: self.overlay.clone(),
+            overlay,
             camera: state.rig.current,
             view: state.view.clone(),
             is_unlit: snapshot.step == 0,
@@ -166,32 +158,6 @@ impl Viewport {
             size,
             background,
         })
-    }
-
-    fn update_overlay(&mut self, state: &State, boxes: &Arc<Vec<ClusterBox>>) {
-        let is_current = |key: &OverlayKey| {
-            Arc::ptr_eq(&key.clusters, boxes)
-                && key.shown == state.view.clusters
-                && key.selected == state.cluster
-        };
-        if self.overlay_key.as_ref().is_some_and(is_current) {
-            return;
-        }
-        let selected = state.cluster.and_then(|index| boxes.get(index));
-        let segments = selected.map_or_else(Vec::new, |cluster| {
-            let mut lines = clusters::outline(cluster, theme::SELECTED_LINE);
-            lines.extend(clusters::face_power_arrows(cluster));
-            lines
-        });
-        self.overlay = Overlay {
-            boxes: Arc::new(clusters::boxes(boxes, &state.view.clusters)),
-            segments: Arc::new(segments),
-        };
-        self.overlay_key = Some(OverlayKey {
-            clusters: boxes.clone(),
-            shown: state.view.clusters,
-            selected: state.cluster,
-        });
     }
 
     /// The texture of a target of a size.

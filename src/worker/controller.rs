@@ -1,120 +1,30 @@
 //! The worker thread: a loop that waits for commands, for the solve to come back from the pool, or for the time limit.
 //!
 //! The solve is either at home (in [`Run::stepper`]) or away in the pool, never both, so that nothing is shared and
-//! nothing is locked. A command that comes while it is away cancels the step and is carried out on its return.
+//! nothing is locked. A command that comes while it is away cancels the step and is carried out on its return; a
+//! question waits for the return.
 
 use std::{
-    any::Any,
-    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
         mpsc::{Receiver, Sender},
     },
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::{
-    Effect, Event, Generation, Job, MakeStepper, RunOptions, Slot, Stepper, StopReason, Wake,
+    Effect, Event, Generation, MakeStepper, RunOptions, StopReason,
     message::{Command, Message},
+    outbox::Outbox,
+    run::{Aim, Run},
+    visit::{Outcome, Returned},
 };
 use crate::{
     scene::Scene,
-    solver::{Cancel, Snapshot, SolveSettings, StepReport},
+    solver::{Cancel, SolveSettings},
 };
-
-/// Where events and snapshots leave.
-pub(super) struct Outbox {
-    events: Sender<(Generation, Event)>,
-    slot: Arc<Slot<Snapshot>>,
-    wake: Wake,
-}
-
-impl Outbox {
-    /// Events into a channel, snapshots into a slot, and a call to `wake` for each event.
-    pub(super) fn new(
-        events: Sender<(Generation, Event)>,
-        slot: Arc<Slot<Snapshot>>,
-        wake: Wake,
-    ) -> Self {
-        Self { events, slot, wake }
-    }
-
-    fn send(&self, generation: Generation, event: Event) {
-        // Nobody listens once the handle is being dropped.
-        let _ = self.events.send((generation, event));
-        (self.wake)();
-    }
-}
-
-/// The solve on its way back from the pool.
-pub(super) struct Returned {
-    generation: Generation,
-    outcome: Result<Trip, String>,
-}
-
-/// What a visit to the pool brought.
-struct Trip {
-    stepper: Box<dyn Stepper>,
-    snapshot: Snapshot,
-    errand: Errand,
-    spent: Duration,
-}
-
-/// What the visit was for.
-enum Errand {
-    Prepared,
-    Stepped(Option<StepReport>),
-}
-
-/// What a run is meant to be doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Aim {
-    Run,
-    Rest,
-    End(StopReason),
-    Failed,
-}
-
-/// One run: a scene under settings.
-struct Run {
-    generation: Generation,
-    scene: Arc<Scene>,
-    settings: SolveSettings,
-    settings_changed: bool,
-    options: RunOptions,
-    stepper: Option<Box<dyn Stepper>>,
-    aim: Aim,
-    /// Start, or last continue.
-    since: Instant,
-    /// Running time before that.
-    before: Duration,
-    /// Time spent preparing and stepping.
-    solving: Duration,
-}
-
-impl Run {
-    fn deadline(&self) -> Option<Instant> {
-        let limit = self.options.time_limit?;
-        (self.aim == Aim::Run).then_some(())?;
-        self.since.checked_add(limit)
-    }
-
-    /// Why the run ends after a step with this report, if it does.
-    fn end_after(&self, report: &StepReport) -> Option<StopReason> {
-        if report.is_final {
-            let reached = report.epsilon <= self.settings.epsilon;
-            return Some(if reached {
-                StopReason::Converged
-            } else {
-                StopReason::StepLimit
-            });
-        }
-        let limit = self.options.memory_limit?;
-        (report.memory_bytes >= limit).then_some(StopReason::MemoryLimit)
-    }
-}
 
 /// The solver threads, kept while their number stays.
 struct Pool {
@@ -182,18 +92,18 @@ impl Controller {
         self.messages.recv_timeout(left).ok()
     }
 
-    /// Send the solve to the pool if it is at home and meant to run.
+    /// Send the solve to the pool if it is at home and there is a question, or it is meant to run.
     fn dispatch(&mut self) {
         if self.away.is_some() {
             return;
         }
-        let Some(run) = self.run.as_mut().filter(|run| run.aim == Aim::Run) else {
+        let Some(run) = self.run.as_mut().filter(|run| run.wants_visit()) else {
             return;
         };
         let pool = match pool_of(&mut self.pool, run.options.threads) {
             Ok(pool) => pool,
             Err(error) => {
-                run.aim = Aim::Failed;
+                run.turn_to(Aim::Failed);
                 let message = format!("cannot start the solver threads: {error}");
                 self.outbox.send(run.generation, Event::Failed(message));
                 return;
@@ -201,32 +111,11 @@ impl Controller {
         };
         let cancel = Cancel::default();
         self.away = Some(cancel.clone());
-        let trip: Box<dyn FnOnce() -> Trip + Send> = match run.stepper.take() {
-            Some(mut stepper) => {
-                if std::mem::take(&mut run.settings_changed) {
-                    stepper.change_settings(run.settings.clone());
-                }
-                Box::new(move || step(stepper, &cancel))
-            }
-            None => {
-                run.settings_changed = false;
-                let make = self.make.clone();
-                let job = Job {
-                    scene: run.scene.clone(),
-                    settings: run.settings.clone(),
-                    memory_limit: run.options.memory_limit,
-                };
-                Box::new(move || prepare(&make, job))
-            }
-        };
-        let (generation, inbox) = (run.generation, self.inbox.clone());
+        let visit = run.visit(&self.make, cancel);
+        let inbox = self.inbox.clone();
         pool.spawn(move || {
-            let outcome = catch_unwind(AssertUnwindSafe(trip)).map_err(|panic| describe(&*panic));
             // Nobody waits once the worker has ended.
-            let _ = inbox.send(Message::Returned(Returned {
-                generation,
-                outcome,
-            }));
+            let _ = inbox.send(Message::Returned(visit.pay()));
         });
     }
 
@@ -241,37 +130,37 @@ impl Controller {
             return;
         };
         let generation = run.generation;
-        let trip = match returned.outcome {
+        let trip = match returned.trip {
             Ok(trip) => trip,
             Err(message) => {
-                run.aim = Aim::Failed;
+                run.turn_to(Aim::Failed);
                 self.outbox.send(generation, Event::Failed(message));
                 return;
             }
         };
-        run.solving += trip.spent;
         run.stepper = Some(trip.stepper);
-        self.outbox
-            .slot
-            .publish(generation, Arc::new(trip.snapshot));
-        match trip.errand {
-            Errand::Prepared => {
+        match trip.outcome {
+            Outcome::Prepared(snapshot) => {
+                run.solving += trip.spent;
+                self.outbox.publish(generation, snapshot);
                 let seconds = trip.spent.as_secs_f64();
                 self.outbox.send(generation, Event::Prepared { seconds });
             }
-            Errand::Stepped(Some(mut report)) => {
-                report.elapsed_s = (run.before + run.since.elapsed()).as_secs_f64();
-                report.solve_s = run.solving.as_secs_f64();
-                if let Some(reason) = run.end_after(&report) {
-                    // Lower settings that came during the step ask for more.
-                    let more = run.settings_changed && !reason.can_continue();
-                    if !more {
-                        run.aim = Aim::End(reason);
-                    }
+            Outcome::Stepped(report, snapshot) => {
+                run.solving += trip.spent;
+                self.outbox.publish(generation, snapshot);
+                if let Some(report) = report {
+                    run.ask_again();
+                    let report = run.take_note(report);
+                    self.outbox.send(generation, Event::Stepped(report));
                 }
-                self.outbox.send(generation, Event::Stepped(report));
             }
-            Errand::Stepped(None) => {}
+            Outcome::Inspected(inspections) => {
+                for inspection in inspections {
+                    let event = Event::Inspected(Arc::new(inspection));
+                    self.outbox.send(generation, event);
+                }
+            }
         }
         self.announce_aim();
     }
@@ -313,6 +202,15 @@ impl Controller {
                     run.options = options;
                 }
             }
+            Command::Inspect {
+                generation,
+                subjects,
+            } => {
+                // Nodes of an older run are other nodes in this one.
+                if let Some(run) = self.run.as_mut().filter(|run| run.generation == generation) {
+                    run.ask(subjects);
+                }
+            }
             Command::Shutdown => {}
         }
     }
@@ -325,18 +223,7 @@ impl Controller {
         options: RunOptions,
     ) {
         self.cancel_step();
-        self.run = Some(Run {
-            generation,
-            scene,
-            settings,
-            settings_changed: false,
-            options,
-            stepper: None,
-            aim: Aim::Run,
-            since: Instant::now(),
-            before: Duration::ZERO,
-            solving: Duration::ZERO,
-        });
+        self.run = Some(Run::new(generation, scene, settings, options));
         self.outbox.send(generation, Event::Started);
     }
 
@@ -362,7 +249,7 @@ impl Controller {
                 run.before += run.since.elapsed();
                 run.since = Instant::now();
             }
-            run.aim = aim;
+            run.turn_to(aim);
         }
         self.cancel_step();
         if self.away.is_none() {
@@ -372,14 +259,17 @@ impl Controller {
 
     fn go_on(&mut self) {
         if let Some(run) = &mut self.run {
-            run.aim = Aim::Run;
+            run.turn_to(Aim::Run);
             run.since = Instant::now();
             self.outbox.send(run.generation, Event::Continued);
         }
     }
 
-    fn announce_aim(&self) {
-        let Some(run) = &self.run else { return };
+    fn announce_aim(&mut self) {
+        let Some(run) = self.run.as_mut().filter(|run| !run.announced) else {
+            return;
+        };
+        run.announced = true;
         match run.aim {
             Aim::Run | Aim::Failed => {}
             Aim::Rest => self.outbox.send(run.generation, Event::Paused),
@@ -408,38 +298,4 @@ fn pool_of(held: &mut Option<Pool>, threads: usize) -> Result<&ThreadPool, Threa
         },
     };
     Ok(&held.insert(pool).pool)
-}
-
-fn prepare(make: &MakeStepper, job: Job) -> Trip {
-    let begin = Instant::now();
-    let stepper = make(job);
-    let spent = begin.elapsed();
-    Trip {
-        snapshot: stepper.snapshot(),
-        stepper,
-        errand: Errand::Prepared,
-        spent,
-    }
-}
-
-fn step(mut stepper: Box<dyn Stepper>, cancel: &Cancel) -> Trip {
-    let begin = Instant::now();
-    let report = stepper.step(cancel);
-    let spent = begin.elapsed();
-    Trip {
-        snapshot: stepper.snapshot(),
-        stepper,
-        errand: Errand::Stepped(report),
-        spent,
-    }
-}
-
-/// The text of a panic.
-fn describe(panic: &(dyn Any + Send)) -> String {
-    panic
-        .downcast_ref::<String>()
-        .map(String::as_str)
-        .or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("unknown reason")
-        .to_owned()
 }

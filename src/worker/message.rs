@@ -4,10 +4,10 @@ use std::{sync::Arc, time::Duration};
 
 use serde::Serialize;
 
-use super::{Effect, controller::Returned};
+use super::{Effect, visit::Returned};
 use crate::{
     scene::Scene,
-    solver::{SolveSettings, StepReport},
+    solver::{Inspection, SolveSettings, StepReport, Subject},
 };
 
 /// Which run something belongs to; each start, reset and restart is a new one.
@@ -72,6 +72,8 @@ pub enum Event {
     },
     /// A step is done; its light is in the slot.
     Stepped(StepReport),
+    /// An answer to [`super::WorkerHandle::inspect`].
+    Inspected(Arc<Inspection>),
     /// The run rests until it is continued.
     Paused,
     /// The run goes on from where it stood.
@@ -117,6 +119,13 @@ pub(super) enum Command {
     },
     /// Other limits.
     Options(RunOptions),
+    /// Look into nodes of a run.
+    Inspect {
+        /// The run that the nodes are of.
+        generation: Generation,
+        /// Which ones, now and after each step, instead of those asked for before.
+        subjects: Vec<Subject>,
+    },
     /// End the thread.
     Shutdown,
 }

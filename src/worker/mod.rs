@@ -8,8 +8,11 @@
 mod controller;
 mod effect;
 mod message;
+mod outbox;
+mod run;
 mod slot;
 mod stepper;
+mod visit;
 
 use std::{
     io,
@@ -28,10 +31,11 @@ pub use stepper::{Job, MakeStepper, Stepper};
 
 use crate::{
     scene::Scene,
-    solver::{Snapshot, SolveSettings, Solver},
+    solver::{Snapshot, SolveSettings, Solver, Subject},
 };
-use controller::{Controller, Outbox};
+use controller::Controller;
 use message::{Command, Message};
+use outbox::Outbox;
 
 /// Called from the worker whenever there is something new to see, such as a request to repaint.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
@@ -146,6 +150,16 @@ impl WorkerHandle {
     /// Put other limits or another number of threads in force, from the next step on.
     pub fn change_options(&self, options: RunOptions) {
         self.send(Command::Options(options));
+    }
+
+    /// Ask what the solver knows of some nodes of the present run, instead of those asked for before.
+    /// [`Event::Inspected`] answers for each node that there is: at once while the run rests or has ended, otherwise
+    /// before the next step begins, since interrupting a step would lose what it did; and again after each step.
+    pub fn inspect(&self, subjects: Vec<Subject>) {
+        self.send(Command::Inspect {
+            generation: self.generation,
+            subjects,
+        });
     }
 
     /// The settings in force.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     scene::Scene,
-    solver::{Cancel, Snapshot, SolveSettings, Solver, StepReport},
+    solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
 };
 
 /// A solve that advances step by step.
@@ -14,6 +14,9 @@ pub trait Stepper: Send {
 
     /// The state as it stands.
     fn snapshot(&self) -> Snapshot;
+
+    /// What is known of a node, or `None` where there is no such node. Short: it delays the next step.
+    fn inspect(&self, subject: &Subject) -> Option<Inspection>;
 
     /// Go on under settings whose change does not restart (see [`super::effect_of_change`]).
     fn change_settings(&mut self, settings: SolveSettings);
@@ -39,6 +42,10 @@ impl Stepper for Solver {
 
     fn snapshot(&self) -> Snapshot {
         Self::snapshot(self)
+    }
+
+    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        Self::inspect(self, subject)
     }
 
     fn change_settings(&mut self, settings: SolveSettings) {

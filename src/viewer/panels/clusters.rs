@@ -1,11 +1,18 @@
-//! Cluster boxes: which level, which colour, and the path to the selected cluster.
+//! Cluster boxes: which ones, which colour, and the selected cluster.
 
 use eframe::egui::{self, Slider};
 
-use super::{count, figure, row};
+use super::{count, figure, legend, row};
 use crate::{
     solver::ClusterBox,
-    viewer::{action::Action, clusters::path_to, state::State, theme, view::ClusterColor},
+    viewer::{
+        action::Action,
+        cluster_lines::MAX_BOXES,
+        clusters::path_to,
+        state::State,
+        theme,
+        view::{ClusterColor, ClusterCut, ClusterOverlay},
+    },
 };
 
 /// Show the controls; wishes go into `actions`.
@@ -19,31 +26,66 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
         ui.weak("There are no clusters yet.");
         return;
     }
-    let deepest = state.cluster_counts.deepest;
-    let label = ui
-        .label("Level")
-        .on_hover_text("[ for larger, ] for smaller clusters");
-    ui.add(Slider::new(&mut overlay.level, 0..=deepest))
-        .labelled_by(label.id);
+    cut_ui(ui, overlay, state.cluster_counts.deepest);
     let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
     let label = ui.label("Colour");
     row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);
-    ui.weak(format!(
-        "{} boxes of {} clusters; dark is little, red is much.",
-        count(state.cluster_counts.shown as u64),
-        count(clusters.len() as u64)
-    ));
+    counts_ui(ui, state, clusters.len());
     match state
         .cluster
         .and_then(|index| clusters.get(index).map(|cluster| (index, cluster)))
     {
         Some((index, cluster)) => {
             selected_ui(ui, state, cluster);
-            path_ui(ui, clusters, index, actions);
+            // The probe lists the way to what is picked.
+            if state.inspections.element().is_none() {
+                path_ui(ui, clusters, index, actions);
+            }
         }
         None => {
-            ui.weak("Click a surface to select the cluster around it at this level.");
+            ui.weak("Click a surface to select the cluster around it.");
         }
+    }
+}
+
+/// Which clusters are shown.
+fn cut_ui(ui: &mut egui::Ui, overlay: &mut ClusterOverlay, deepest: u32) {
+    let label = ui.label("Boxes");
+    row::choice(ui, "cluster cut", &mut overlay.cut, &ClusterCut::ALL).labelled_by(label.id);
+    match overlay.cut {
+        ClusterCut::Level => {
+            let label = ui
+                .label("Level")
+                .on_hover_text("[ for larger, ] for smaller clusters");
+            ui.add(Slider::new(&mut overlay.level, 0..=deepest))
+                .labelled_by(label.id);
+        }
+        ClusterCut::Size => {
+            let label = ui
+                .label("Size")
+                .on_hover_text("Part of the scene's extent; [ for larger, ] for smaller clusters");
+            let slider = Slider::new(&mut overlay.size, ClusterOverlay::SIZE_RANGE)
+                .logarithmic(true)
+                .custom_formatter(|value, _| figure(value));
+            ui.add(slider).labelled_by(label.id);
+        }
+        ClusterCut::Used => {}
+    }
+}
+
+fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
+    let shown = state.cluster_counts.shown;
+    legend::scale_ui(ui, "little", "much");
+    ui.weak(format!(
+        "{} boxes of {} clusters.",
+        count(shown as u64),
+        count(cluster_count as u64)
+    ));
+    if shown > MAX_BOXES {
+        ui.weak(format!(
+            "Only {} of them are drawn.",
+            count(MAX_BOXES as u64)
+        ));
     }
 }
 
@@ -80,6 +122,12 @@ fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
             "Links received",
             count(u64::from(cluster.link_count)),
             "",
+        );
+        row::figure(
+            ui,
+            "Links sent",
+            count(u64::from(cluster.source_count)),
+            "Links by which it lights others as one",
         );
         row::figure(
             ui,

@@ -70,6 +70,24 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
     }
 }
 
+/// A scale in a panel: the ramp between what stands for its ends.
+pub fn scale_ui(ui: &mut egui::Ui, low: &str, high: &str) {
+    const SIZE: egui::Vec2 = vec2(110.0, 10.0);
+    const BANDS: usize = 44;
+    ui.horizontal(|ui| {
+        ui.weak(low);
+        let (rect, _) = ui.allocate_exact_size(SIZE, egui::Sense::hover());
+        let band = SIZE.x / BANDS as f32;
+        for index in 0..BANDS {
+            let left = rect.left_top() + vec2(index as f32 * band, 0.0);
+            let color = theme::ramp_color((index as f32 + 0.5) / BANDS as f32);
+            let plate = Rect::from_min_size(left, vec2(band + 0.5, SIZE.y));
+            ui.painter().rect_filled(plate, 0.0, color);
+        }
+        ui.weak(high);
+    });
+}
+
 fn swatches(ui: &egui::Ui, rect: Rect, entries: &[(&str, Color32)]) {
     let painter = ui.painter().with_clip_rect(rect);
     let mut at = rect.right_top() + vec2(-84.0, 14.0);

@@ -3,8 +3,10 @@
 pub mod clusters;
 pub mod help;
 pub mod legend;
+pub mod links;
 pub mod menu;
 pub mod messages;
+pub mod path;
 pub mod picture;
 pub mod plot;
 pub mod probe;
@@ -12,6 +14,7 @@ pub mod progress;
 pub mod row;
 pub mod scene;
 pub mod settings;
+pub mod sides;
 pub mod statistics;
 pub mod status;
 pub mod toolbar;

@@ -3,8 +3,8 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{figure, row};
-use crate::viewer::{action::Action, light_range::luminance, state::State};
+use super::{count, figure, path::path_ui, row};
+use crate::viewer::{action::Action, light_range::luminance, state::State, view::LinkEnd};
 
 /// Show the picked point; wishes go into `actions`.
 pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
@@ -90,12 +90,16 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
                 format!("± {} W/m²", figure(f64::from(probe.uncertainty))),
                 "Estimated error of the irradiance",
             );
+            inspection_rows(ui, state);
         }
     });
     if selection.probe.is_none() {
         ui.weak("This side is the back of a one-sided face: it reflects nothing.");
     }
     object_ui(ui, state);
+    if let Some(inspection) = state.inspections.element() {
+        path_ui(ui, &inspection.path, &scene.frame, state.cluster, actions);
+    }
     ui.horizontal(|ui| {
         if ui
             .button("Show it")
@@ -108,6 +112,51 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             actions.push(Action::ClearSelection);
         }
     });
+}
+
+/// What the solver says of the element.
+fn inspection_rows(ui: &mut egui::Ui, state: &State) {
+    let Some(inspection) = state.inspections.element() else {
+        if state.inspections.is_waiting(LinkEnd::Element) {
+            row::figure(
+                ui,
+                "Row sum",
+                "…",
+                "The solver answers after this step; pausing answers at once",
+            );
+        }
+        return;
+    };
+    let light = |color: Vec3| format!("{} W/m²", figure(f64::from(luminance(color))));
+    row::figure(
+        ui,
+        "Over links",
+        light(inspection.linked),
+        "Irradiance over all links, at the element's centroid",
+    );
+    row::figure(
+        ui,
+        "By samples",
+        light(inspection.direct),
+        "Irradiance straight from emitters that are sampled, mean of the element",
+    );
+    row::figure(
+        ui,
+        "Row sum",
+        figure(f64::from(inspection.row_sum)),
+        "Sum of the form factors of the element's links; 1 in a closed scene",
+    );
+    let own = inspection.path.last().map_or(0, |node| node.link_count);
+    row::figure(
+        ui,
+        "Links",
+        format!(
+            "{} ({} of its own)",
+            count(inspection.links.len() as u64),
+            count(u64::from(own))
+        ),
+        "Links that light the element: its own, and those of all above it",
+    );
 }
 
 fn object_ui(ui: &mut egui::Ui, state: &State) {

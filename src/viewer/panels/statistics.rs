@@ -81,6 +81,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
             );
         }
     });
+    frame_ui(ui, state);
     if !state.adapter_name.is_empty() {
         ui.add_space(2.0);
         ui.weak(&state.adapter_name);
@@ -88,4 +89,20 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
     if cfg!(debug_assertions) {
         ui.weak("Debug build: use --release for full speed.");
     }
+}
+
+/// What a frame of the window costs.
+fn frame_ui(ui: &mut egui::Ui, state: &State) {
+    let Some([middle, most]) = state.frame_times.middle_and_most() else {
+        return;
+    };
+    let ms = |secs: f32| format!("{:.1}", 1000.0 * secs);
+    row::figures(ui, "frames", |ui| {
+        row::figure(
+            ui,
+            "CPU per frame",
+            format!("{} ms (most {})", ms(middle), ms(most)),
+            "Time that the window works on a frame, without waiting for the screen; other work on the same cores lengthens it. Middle and largest of the last frames",
+        );
+    });
 }

@@ -9,7 +9,7 @@ use super::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target};
 use crate::{
     scene::Scene,
     solver::Snapshot,
-    viewer::{camera::Camera, clusters, light_range, theme, view::ViewSettings},
+    viewer::{camera::Camera, cluster_lines, light_range, theme, view::ViewSettings},
 };
 
 /// Why there is no headless picture.
@@ -95,7 +95,7 @@ pub fn picture(
         view.exposure = light_range::auto_exposure(snapshot).unwrap_or(view.exposure);
     }
     let overlay = Overlay {
-        boxes: Arc::new(clusters::boxes(&snapshot.clusters, &view.clusters)),
+        boxes: Arc::new(cluster_lines::boxes(&snapshot.clusters, &view.clusters)),
         segments: Arc::default(),
     };
     let drawn = Picture {

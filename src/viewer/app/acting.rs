@@ -1,0 +1,188 @@
+//! Wishes carried out.
+
+use eframe::egui;
+
+use super::{
+    super::{
+        action::Action,
+        clusters,
+        navigation::Picked,
+        pick, saver,
+        session::Recent,
+        state::{RunStatus, Selection},
+    },
+    App,
+};
+use crate::worker::Effect;
+
+impl App {
+    /// Carry out what was asked for.
+    pub fn perform(&mut self, ctx: &egui::Context, action: Action) {
+        match action {
+            Action::OpenDialog => self.open_dialog(),
+            Action::Load(source) => self.load(source),
+            Action::Reload => self.reload(),
+            Action::PauseContinue => self.pause_or_continue(),
+            Action::Stop => self.stop(),
+            Action::Reset => {
+                if self.state.loaded.is_some() {
+                    self.state.inspections.close();
+                    self.worker.reset();
+                }
+            }
+            Action::Settings(settings) => {
+                self.state.settings = settings.clone();
+                let effect = self.worker.change_settings(settings);
+                self.state.run.last_effect = Some(effect);
+                if effect == Effect::Restarts {
+                    self.state.inspections.close();
+                    self.state.cluster = None;
+                }
+            }
+            Action::Options(options) => {
+                self.state.options = options.clone();
+                self.worker.change_options(options);
+            }
+            Action::Sides(sides) => {
+                self.state.scene_options.sides = sides;
+                self.reload();
+            }
+            Action::FrameSelected => self.frame_selected(),
+            Action::SelectCluster(index) => self.state.cluster = Some(index),
+            Action::ClearSelection => self.clear_selection(),
+            Action::ScreenshotWithWindow => self.save_window(ctx),
+            Action::Screenshot => {
+                let size = self.state.viewport_size;
+                self.save_picture(saver::free_path(&self.scene_name()), size);
+            }
+            Action::PictureDialog => {
+                let path = saver::free_path(&self.scene_name());
+                self.state.panels.picture_text = path.display().to_string();
+                self.state.panels.picture = true;
+            }
+            Action::SavePicture { path, size } => self.save_picture(path, size),
+            Action::SaveSidecar => self.save_sidecar(),
+            Action::ToggleFullScreen => {
+                let is_full = ctx.input(|input| input.viewport().fullscreen.unwrap_or(false));
+                ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!is_full));
+            }
+            Action::ClearRecent => self.state.recent = Recent::default(),
+            Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            other => self.change_view(&other),
+        }
+        ctx.request_repaint();
+    }
+
+    /// Actions that change only how the scene is shown.
+    fn change_view(&mut self, action: &Action) {
+        let state = &mut self.state;
+        match action {
+            Action::Mode(mode) => state.view.mode = *mode,
+            Action::ExposureBy(step) => {
+                state.view.exposure += *step;
+                state.view.auto_exposure = false;
+            }
+            Action::AutoExposure => state.view.auto_exposure = true,
+            Action::ToggleToneMap => {
+                use crate::viewer::view::ToneMap;
+                state.view.tone_map = match state.view.tone_map {
+                    ToneMap::Neutral => ToneMap::None,
+                    ToneMap::None => ToneMap::Neutral,
+                };
+            }
+            Action::ToggleEdges => state.view.edges = !state.view.edges,
+            Action::ToggleBacks => state.view.backs = !state.view.backs,
+            Action::ToggleClusters => {
+                state.view.clusters.shown = !state.view.clusters.shown;
+            }
+            Action::ToggleLinks => state.view.links.shown = !state.view.links.shown,
+            Action::ClusterLevelBy(step) => {
+                let deepest = state.cluster_counts.deepest;
+                state.view.clusters.go_down(*step, deepest);
+                state.view.clusters.shown = true;
+            }
+            Action::FrameAll => state.frame_all(),
+            Action::LookFrom(view) => state.rig.target.look_from(*view),
+            Action::ToggleProjection => {
+                state.rig.target.orthographic = !state.rig.target.orthographic;
+                state.rig.current.orthographic = state.rig.target.orthographic;
+            }
+            Action::Up(up) => {
+                state.rig.target.up = *up;
+                state.rig.current.up = *up;
+            }
+            Action::TogglePanels => state.panels.shown = !state.panels.shown,
+            Action::ToggleHelp => state.panels.help = !state.panels.help,
+            _ => {}
+        }
+        self.follow_light();
+    }
+
+    fn pause_or_continue(&mut self) {
+        if self.state.run.status.is_busy() {
+            self.worker.pause();
+        } else if self.state.run.status.can_continue() {
+            self.worker.resume();
+        }
+    }
+
+    /// Stop what runs; with nothing running, select nothing.
+    fn stop(&mut self) {
+        if self.state.run.status.is_busy() || self.state.run.status == RunStatus::Paused {
+            self.worker.stop();
+        } else {
+            self.clear_selection();
+        }
+    }
+
+    fn clear_selection(&mut self) {
+        self.state.selection = None;
+        self.state.cluster = None;
+    }
+
+    fn frame_selected(&mut self) {
+        let aspect = self.state.aspect();
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let cluster = self.state.cluster.and_then(|index| {
+            let snapshot = self.state.run.snapshot.as_ref()?;
+            let cluster = snapshot.clusters.get(index)?;
+            Some((cluster.min, cluster.max))
+        });
+        let object = || {
+            let selection = self.state.selection.as_ref()?;
+            let object = &loaded.scene.objects[selection.object?];
+            Some(pick::object_bounds(loaded, object.start, object.end))
+        };
+        if let Some((min, max)) = cluster.or_else(object) {
+            self.state.rig.target.frame_box(min, max, aspect);
+        } else {
+            self.state.frame_all();
+        }
+    }
+
+    /// Select what was clicked.
+    pub(super) fn select(&mut self, picked: Picked) {
+        match picked {
+            Picked::Nothing => self.clear_selection(),
+            Picked::Surface(pick) => {
+                self.state.selection = Some(Selection {
+                    pick,
+                    of: None,
+                    probe: None,
+                    object_light: Default::default(),
+                    object: None,
+                });
+                if let Some(snapshot) = &self.state.run.snapshot
+                    && self.state.view.clusters.shown
+                {
+                    let shown = &self.state.view.clusters;
+                    self.state.cluster =
+                        clusters::containing(&snapshot.clusters, pick.point, shown);
+                }
+                self.look_up();
+            }
+        }
+    }
+}

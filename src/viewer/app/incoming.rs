@@ -1,0 +1,124 @@
+//! What arrives between frames: chosen files, notices, a scene that was read, events and light of the worker.
+
+use std::sync::Arc;
+
+use super::{
+    super::{
+        inspection, light_range,
+        loader::{Loader, SceneSource},
+        pick,
+        state::Severity,
+    },
+    App,
+};
+use crate::worker::Event;
+
+impl App {
+    /// Take note of everything that arrived since the last frame.
+    pub(super) fn drain(&mut self) {
+        while let Ok(chosen) = self.chosen.1.try_recv() {
+            self.dialog_is_open = false;
+            match chosen {
+                Some(path) => self.load(SceneSource::File(path)),
+                // A dialog that fails cannot be told from one that was cancelled.
+                None => self.state.messages.push(
+                    Severity::Note,
+                    "no file was chosen; if no dialog appeared, use File, Open by path",
+                ),
+            }
+        }
+        while let Ok((severity, text)) = self.notices.1.try_recv() {
+            self.state.messages.push(severity, text);
+        }
+        for fault in self.faults.take() {
+            self.state.messages.push(Severity::Error, fault);
+        }
+        if let Some(outcome) = self.state.loading.as_ref().and_then(Loader::poll) {
+            self.state.loading = None;
+            match outcome {
+                Ok(loaded) => self.show(loaded),
+                Err(error) => self.state.messages.push(Severity::Error, error),
+            }
+        }
+        self.drain_worker();
+    }
+
+    fn drain_worker(&mut self) {
+        for event in self.worker.events() {
+            match &event {
+                Event::Started => self.state.inspections.close(),
+                Event::Prepared { .. } => self.state.inspections.open(),
+                Event::Inspected(inspection) => {
+                    self.state.inspections.note(inspection.clone());
+                    self.state.correct_cluster();
+                }
+                _ => {}
+            }
+            self.state.run.note(event);
+        }
+        let Some(latest) = self.worker.latest() else {
+            return;
+        };
+        let is_known = self
+            .state
+            .run
+            .snapshot
+            .as_ref()
+            .is_some_and(|held| Arc::ptr_eq(held, &latest));
+        if !is_known {
+            self.state.run.snapshot = Some(latest);
+            self.follow_light();
+        }
+    }
+
+    /// Ask the solver about what is selected, if it was not asked yet.
+    pub(super) fn ask(&mut self) {
+        let wanted = inspection::wanted(&self.state);
+        if let Some(subjects) = self.state.inspections.question(&wanted) {
+            self.worker.inspect(subjects);
+        }
+    }
+
+    /// Let exposure and range follow the newest light.
+    pub(super) fn follow_light(&mut self) {
+        let Some(snapshot) = &self.state.run.snapshot else {
+            return;
+        };
+        if self.state.view.auto_exposure
+            && let Some(exposure) = light_range::auto_exposure(snapshot)
+        {
+            self.state.view.exposure = exposure;
+        }
+        self.state.false_color_range = light_range::false_color_range(snapshot, &self.state.view);
+        self.state
+            .cluster_counts
+            .update(&snapshot.clusters, &self.state.view.clusters);
+        self.look_up();
+    }
+
+    /// Look up the light at the picked point.
+    pub(super) fn look_up(&mut self) {
+        let (Some(selection), Some(loaded), Some(snapshot)) = (
+            &mut self.state.selection,
+            &self.state.loaded,
+            &self.state.run.snapshot,
+        ) else {
+            return;
+        };
+        let is_current = |held: &Arc<_>| Arc::ptr_eq(held, snapshot);
+        if selection.of.as_ref().is_some_and(is_current) {
+            return;
+        }
+        let triangle = selection.pick.triangle;
+        selection.of = Some(snapshot.clone());
+        selection.probe = pick::probe(snapshot, &selection.pick);
+        selection.object = loaded
+            .scene
+            .objects
+            .iter()
+            .position(|object| object.start <= triangle && triangle < object.end);
+        if let Some(object) = selection.object.map(|index| &loaded.scene.objects[index]) {
+            selection.object_light = pick::object_light(snapshot, object.start, object.end);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Scenes: read, shown, read again; the file dialog.
+
+use std::{sync::Arc, thread};
+
+use super::{
+    super::{
+        loader::{LoadedScene, Loader, SceneSource},
+        session,
+        start::{self, CameraRequest},
+        state::Severity,
+    },
+    App,
+};
+
+impl App {
+    /// Begin to read a scene; the present one stays until it is there.
+    pub(super) fn load(&mut self, source: SceneSource) {
+        self.keeps_view = false;
+        self.first = None;
+        self.start_loader(source);
+    }
+
+    fn start_loader(&mut self, source: SceneSource) {
+        match Loader::start(source, self.state.scene_options, self.wake.clone()) {
+            Ok(loader) => self.state.loading = Some(loader),
+            Err(error) => self
+                .state
+                .messages
+                .push(Severity::Error, format!("cannot start a thread: {error}")),
+        }
+    }
+
+    /// Show a scene that was read, and begin to light it.
+    pub(super) fn show(&mut self, loaded: LoadedScene) {
+        for warning in &loaded.scene.warnings {
+            self.state
+                .messages
+                .push(Severity::Warning, warning.to_string());
+        }
+        if let Some(path) = loaded.source.path() {
+            self.state.recent.push(path);
+        }
+        if !self.keeps_view {
+            self.open_view(&loaded);
+        }
+        self.keeps_view = true;
+        self.title = Some(start::title(&loaded.source));
+        self.state.selection = None;
+        self.state.cluster = None;
+        self.state.inspections.close();
+        self.state.run.snapshot = None;
+        self.state.run.last_effect = None;
+        self.worker.start(
+            loaded.scene.clone(),
+            self.state.settings.clone(),
+            self.state.options.clone(),
+        );
+        self.state.loaded = Some(Arc::new(loaded));
+    }
+
+    /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
+    fn open_view(&mut self, loaded: &LoadedScene) {
+        let frame = &loaded.scene.frame;
+        let mut camera = loaded.viewpoint;
+        if loaded.source.path().is_some() {
+            // The axis chosen before holds for the next file, too; built-in scenes know theirs.
+            let chosen = CameraRequest {
+                up: self.state.rig.target.up,
+                ..CameraRequest::default()
+            };
+            camera = chosen.apply(camera, frame);
+        }
+        match session::load(&loaded.source, frame) {
+            Some(Ok(saved)) => {
+                camera = saved.camera.unwrap_or(camera);
+                if self.first.is_none() {
+                    self.state.settings = saved.settings;
+                }
+                self.state.view = saved.view;
+            }
+            Some(Err(error)) => self.state.messages.push(Severity::Warning, error),
+            None => {}
+        }
+        if let Some(first) = self.first.take() {
+            camera = first.camera.apply(camera, frame);
+            if let Some(exposure) = first.exposure {
+                self.state.view.exposure = exposure;
+                self.state.view.auto_exposure = false;
+            }
+        }
+        self.state.rig.jump(camera);
+    }
+
+    pub(super) fn reload(&mut self) {
+        if let Some(source) = self
+            .state
+            .loaded
+            .as_ref()
+            .map(|loaded| loaded.source.clone())
+        {
+            self.keeps_view = true;
+            self.start_loader(source);
+        }
+    }
+
+    pub(super) fn open_dialog(&mut self) {
+        if self.dialog_is_open {
+            return;
+        }
+        let (sender, wake) = (self.chosen.0.clone(), self.wake.clone());
+        // On a thread of its own: the dialog of some desktops hangs.
+        let spawned = thread::Builder::new()
+            .name("dialog".to_owned())
+            .spawn(move || {
+                let file = rfd::FileDialog::new()
+                    .set_title("Open a scene")
+                    .add_filter("Wavefront OBJ", &["obj", "OBJ"])
+                    .pick_file();
+                // Nobody listens once the window is closed.
+                let _ = sender.send(file);
+                wake();
+            });
+        self.dialog_is_open = spawned.is_ok();
+    }
+}

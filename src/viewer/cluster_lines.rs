@@ -1,0 +1,169 @@
+//! Cluster boxes as lines: in which colours; the face powers of one as arrows.
+
+use glam::Vec3;
+
+use super::{
+    clusters,
+    render::{BoxInstance, SegmentInstance},
+    theme,
+    view::{ClusterColor, ClusterOverlay},
+};
+use crate::solver::ClusterBox;
+
+/// Boxes drawn at most. More are a grey fog and slow on a software adapter.
+pub const MAX_BOXES: usize = 200_000;
+
+/// The boxes of an overlay; empty where it is off.
+pub fn boxes(all: &[ClusterBox], overlay: &ClusterOverlay) -> Vec<BoxInstance> {
+    if !overlay.shown {
+        return Vec::new();
+    }
+    let shown: Vec<&ClusterBox> = clusters::shown(all, overlay)
+        .into_iter()
+        .take(MAX_BOXES)
+        .map(|index| &all[index])
+        .collect();
+    let [low, high] = color_range(&shown, overlay.color);
+    shown
+        .iter()
+        .map(|cluster| {
+            let t = (quantity(cluster, overlay.color) - low) / (high - low).max(f32::MIN_POSITIVE);
+            instance(cluster, theme::ramp(0.15 + 0.85 * t.clamp(0.0, 1.0)))
+        })
+        .collect()
+}
+
+/// One box in a colour.
+pub fn instance(cluster: &ClusterBox, color: Vec3) -> BoxInstance {
+    // Flat clusters, such as a wall, keep a visible edge.
+    let thick = Vec3::splat(0.02);
+    let [a, b, c] = (cluster.min - thick).to_array();
+    let [d, e, f] = (cluster.max + thick).to_array();
+    let [red, green, blue] = color.to_array();
+    [a, b, c, d, e, f, red, green, blue]
+}
+
+/// The twelve edges of a box as ribbons.
+pub fn outline(min: Vec3, max: Vec3, color: Vec3) -> Vec<SegmentInstance> {
+    let corner = |bits: u32| {
+        let is_upper = glam::BVec3::new(bits & 1 != 0, bits & 2 != 0, bits & 4 != 0);
+        Vec3::select(is_upper, max, min)
+    };
+    let mut edges = Vec::with_capacity(12);
+    for axis in [1, 2, 4] {
+        for bits in (0..8).filter(|bits| bits & axis == 0) {
+            edges.push(segment(corner(bits), corner(bits | axis), color, false));
+        }
+    }
+    edges
+}
+
+/// The six face powers as arrows from the faces outwards; the strongest is half as long as the box is large.
+pub fn face_power_arrows(cluster: &ClusterBox) -> Vec<SegmentInstance> {
+    let strongest = cluster.face_power.into_iter().fold(0.0, f32::max);
+    if strongest <= 0.0 {
+        return Vec::new();
+    }
+    let extent = (cluster.max - cluster.min).max_element().max(0.5);
+    let centre = 0.5 * (cluster.min + cluster.max);
+    let half = 0.5 * (cluster.max - cluster.min);
+    let mut arrows = Vec::new();
+    for (face, power) in cluster.face_power.into_iter().enumerate() {
+        let axis = face / 2;
+        let sign = if face % 2 == 0 { 1.0 } else { -1.0 };
+        let direction = sign * [Vec3::X, Vec3::Y, Vec3::Z][axis];
+        if power > 0.0 {
+            let start = centre + direction * half;
+            let end = start + direction * (0.5 * extent * power / strongest);
+            arrows.push(segment(start, end, theme::AXIS_LINES[axis], true));
+        }
+    }
+    arrows
+}
+
+/// One ribbon, with or without an arrowhead at its end.
+pub fn segment(start: Vec3, end: Vec3, color: Vec3, is_arrow: bool) -> SegmentInstance {
+    let [a, b, c] = start.to_array();
+    let [d, e, f] = end.to_array();
+    let [red, green, blue] = color.to_array();
+    [
+        a,
+        b,
+        c,
+        d,
+        e,
+        f,
+        red,
+        green,
+        blue,
+        if is_arrow { 1.0 } else { 0.0 },
+    ]
+}
+
+/// What a colour stands for; powers, areas and counts by their logarithm, since they span many magnitudes.
+fn quantity(cluster: &ClusterBox, color: ClusterColor) -> f32 {
+    let log = |x: f32| x.clamp(1e-20, 1e20).log10();
+    match color {
+        ClusterColor::Power => log(cluster.power),
+        ClusterColor::Area => log(cluster.area),
+        ClusterColor::Spread => cluster.direction_spread,
+        ClusterColor::Links => (cluster.link_count as f32 + 1.0).log10(),
+        ClusterColor::Error => log(cluster.error),
+    }
+}
+
+/// Ends of the colours of some boxes; at most six magnitudes for logarithms.
+fn color_range(shown: &[&ClusterBox], color: ClusterColor) -> [f32; 2] {
+    if color == ClusterColor::Spread {
+        return [0.0, 1.0];
+    }
+    let (mut low, mut high) = (f32::MAX, f32::MIN);
+    for cluster in shown {
+        let value = quantity(cluster, color);
+        low = low.min(value);
+        high = high.max(value);
+    }
+    [low.max(high - 6.0), high]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::clusters::tests::tree, *};
+
+    #[test]
+    fn boxes_are_finite_and_only_there_when_shown() {
+        let mut overlay = ClusterOverlay::default();
+        assert!(boxes(&tree(), &overlay).is_empty());
+        overlay.shown = true;
+        for color in ClusterColor::ALL {
+            overlay.color = color;
+            for instance in boxes(&tree(), &overlay) {
+                assert!(
+                    instance.iter().all(|x| x.is_finite()),
+                    "{color:?} {instance:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn arrows_point_where_the_power_goes() {
+        let arrows = face_power_arrows(&tree()[0]);
+        assert_eq!(arrows.len(), 2);
+        let ends = |arrow: &SegmentInstance| {
+            let (start, end) = arrow[..6].split_at(3);
+            (Vec3::from_slice(start), Vec3::from_slice(end))
+        };
+        // +x with power 1 and +y with power 2, from the faces of a box of 8.
+        let (start, end) = ends(&arrows[0]);
+        assert_eq!(
+            (start, end),
+            (Vec3::new(8.0, 4.0, 4.0), Vec3::new(10.0, 4.0, 4.0))
+        );
+        let (start, end) = ends(&arrows[1]);
+        assert_eq!(
+            (start, end),
+            (Vec3::new(4.0, 8.0, 4.0), Vec3::new(4.0, 12.0, 4.0))
+        );
+    }
+}

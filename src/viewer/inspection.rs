@@ -1,0 +1,180 @@
+//! Questions to the solver about what is selected, and its answers.
+
+use std::sync::Arc;
+
+use super::{
+    state::State,
+    view::{LinkEnd, LinkOverlay},
+};
+use crate::{
+    hierarchy::NodeId,
+    solver::{Inspection, Subject},
+};
+
+/// What was asked, and what is known.
+#[derive(Default)]
+pub struct Inspections {
+    /// Whether the nodes that are shown are those of the present run.
+    is_open: bool,
+    asked: Vec<Subject>,
+    element: Option<Arc<Inspection>>,
+    cluster: Option<Arc<Inspection>>,
+}
+
+impl Inspections {
+    /// A new run begins: what was asked is forgotten, and nothing is asked until its nodes are known.
+    pub fn close(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The nodes of the present run are known.
+    pub fn open(&mut self) {
+        self.is_open = true;
+    }
+
+    /// What to ask now: once, until something else is wanted.
+    pub fn question(&mut self, wanted: &[Subject]) -> Option<Vec<Subject>> {
+        let is_same = self.asked.len() == wanted.len()
+            && self.asked.iter().zip(wanted).all(|(a, b)| is_same(a, b));
+        if !self.is_open || is_same {
+            return None;
+        }
+        self.asked = wanted.to_vec();
+        for held in [&mut self.element, &mut self.cluster] {
+            held.take_if(|held| !wanted.iter().any(|subject| is_same_as(held, subject)));
+        }
+        Some(self.asked.clone())
+    }
+
+    /// Take note of an answer, unless something else was asked since.
+    pub fn note(&mut self, inspection: Arc<Inspection>) {
+        let is_wanted = |subject: &Subject| is_same_as(&inspection, subject);
+        if self.asked.iter().any(is_wanted) {
+            match inspection.subject {
+                Subject::Element { .. } => self.element = Some(inspection),
+                Subject::Cluster(_) => self.cluster = Some(inspection),
+            }
+        }
+    }
+
+    /// What is known of the picked element.
+    pub fn element(&self) -> Option<&Arc<Inspection>> {
+        self.element.as_ref()
+    }
+
+    /// What is known of an end of links.
+    pub fn of(&self, end: LinkEnd) -> Option<&Arc<Inspection>> {
+        match end {
+            LinkEnd::Element => self.element.as_ref(),
+            LinkEnd::Cluster => self.cluster.as_ref(),
+        }
+    }
+
+    /// The inspection whose links an overlay draws.
+    pub fn drawn(&self, overlay: &LinkOverlay) -> Option<&Arc<Inspection>> {
+        self.of(overlay.of).filter(|_| overlay.shown)
+    }
+
+    /// Whether an answer about an end of links is still to come.
+    pub fn is_waiting(&self, end: LinkEnd) -> bool {
+        let is_end = |subject: &Subject| end_of(subject) == end;
+        self.of(end).is_none() && self.asked.iter().any(is_end)
+    }
+}
+
+fn end_of(subject: &Subject) -> LinkEnd {
+    match subject {
+        Subject::Element { .. } => LinkEnd::Element,
+        Subject::Cluster(_) => LinkEnd::Cluster,
+    }
+}
+
+fn is_same_as(inspection: &Inspection, subject: &Subject) -> bool {
+    is_same(&inspection.subject, subject)
+}
+
+/// A picked point stays the same subject when its element is divided.
+fn is_same(a: &Subject, b: &Subject) -> bool {
+    match (a, b) {
+        (Subject::Element { point, .. }, Subject::Element { point: other, .. }) => point == other,
+        (Subject::Cluster(node), Subject::Cluster(other)) => node == other,
+        _ => false,
+    }
+}
+
+/// What the window wants to know: the picked element, and the selected cluster.
+pub fn wanted(state: &State) -> Vec<Subject> {
+    let element = state.selection.as_ref().and_then(|selection| {
+        Some(Subject::Element {
+            node: NodeId(selection.probe.as_ref()?.element),
+            point: selection.pick.point,
+        })
+    });
+    let cluster = state
+        .cluster
+        .map(|index| Subject::Cluster(NodeId(index as u32)));
+    element.into_iter().chain(cluster).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    fn element(node: u32, x: f32) -> Subject {
+        Subject::Element {
+            node: NodeId(node),
+            point: Vec3::X * x,
+        }
+    }
+
+    fn answer(subject: Subject, step: u32) -> Arc<Inspection> {
+        Arc::new(Inspection {
+            subject,
+            step,
+            links: Vec::new(),
+            linked: Vec3::ZERO,
+            direct: Vec3::ZERO,
+            row_sum: 0.0,
+            path: Vec::new(),
+        })
+    }
+
+    #[test]
+    fn each_question_is_asked_once() {
+        let mut held = Inspections::default();
+        assert!(
+            held.question(&[element(7, 1.0)]).is_none(),
+            "no run is known"
+        );
+        held.open();
+        assert!(held.question(&[element(7, 1.0)]).is_some());
+        assert!(held.question(&[element(7, 1.0)]).is_none());
+        assert!(
+            held.question(&[element(9, 1.0)]).is_none(),
+            "the same point, divided"
+        );
+        assert!(held.is_waiting(LinkEnd::Element));
+        held.note(answer(element(7, 1.0), 1));
+        assert!(!held.is_waiting(LinkEnd::Element));
+        held.note(answer(element(7, 1.0), 2));
+        assert_eq!(held.element().map(|held| held.step), Some(2));
+    }
+
+    #[test]
+    fn answers_to_older_questions_do_not_show() {
+        let mut held = Inspections::default();
+        held.open();
+        held.question(&[element(7, 1.0), Subject::Cluster(NodeId(3))]);
+        held.note(answer(element(7, 1.0), 1));
+        held.note(answer(Subject::Cluster(NodeId(3)), 1));
+        held.question(&[element(8, 2.0), Subject::Cluster(NodeId(3))]);
+        assert!(held.element().is_none());
+        assert!(held.of(LinkEnd::Cluster).is_some(), "still wanted");
+        held.note(answer(element(7, 1.0), 2));
+        assert!(held.element().is_none());
+        held.close();
+        assert!(held.of(LinkEnd::Cluster).is_none());
+    }
+}

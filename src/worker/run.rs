@@ -1,0 +1,170 @@
+//! One run: where it stands, what it aims at, and when it ends.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use super::{
+    Generation, Job, MakeStepper, RunOptions, Stepper, StopReason,
+    visit::{Errand, Visit},
+};
+use crate::{
+    scene::Scene,
+    solver::{Cancel, SolveSettings, StepReport, Subject},
+};
+
+/// What a run is meant to be doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Aim {
+    /// Step after step.
+    Run,
+    /// Wait to be continued.
+    Rest,
+    /// Nothing more.
+    End(StopReason),
+    /// Nothing: the solve is lost.
+    Failed,
+}
+
+/// A scene under settings.
+pub(super) struct Run {
+    /// Which run.
+    pub generation: Generation,
+    /// What is lit.
+    pub scene: Arc<Scene>,
+    /// What is computed.
+    pub settings: SolveSettings,
+    /// Whether the solve has not heard of the settings yet.
+    pub settings_changed: bool,
+    /// How it is computed.
+    pub options: RunOptions,
+    /// The solve, while it is at home.
+    pub stepper: Option<Box<dyn Stepper>>,
+    /// Nodes that are inspected, now and after each step. Changed by [`Run::ask`].
+    subjects: Vec<Subject>,
+    /// Whether an answer is due.
+    is_asked: bool,
+    /// What it is meant to be doing. Changed by [`Run::turn_to`].
+    pub aim: Aim,
+    /// Whether the aim was said to be reached.
+    pub announced: bool,
+    /// Start, or last continue.
+    pub since: Instant,
+    /// Running time before that.
+    pub before: Duration,
+    /// Time spent preparing and stepping.
+    pub solving: Duration,
+}
+
+impl Run {
+    /// A run that begins.
+    pub(super) fn new(
+        generation: Generation,
+        scene: Arc<Scene>,
+        settings: SolveSettings,
+        options: RunOptions,
+    ) -> Self {
+        Self {
+            generation,
+            scene,
+            settings,
+            settings_changed: false,
+            options,
+            stepper: None,
+            subjects: Vec::new(),
+            is_asked: false,
+            aim: Aim::Run,
+            announced: false,
+            since: Instant::now(),
+            before: Duration::ZERO,
+            solving: Duration::ZERO,
+        }
+    }
+
+    /// Whether there is something to do with the solve at home.
+    pub(super) fn wants_visit(&self) -> bool {
+        self.aim == Aim::Run || (self.is_asked && self.stepper.is_some())
+    }
+
+    /// Inspect these nodes from now on.
+    pub(super) fn ask(&mut self, subjects: Vec<Subject>) {
+        self.subjects = subjects;
+        self.ask_again();
+    }
+
+    /// The solve has changed: what was said of its nodes is old.
+    pub(super) fn ask_again(&mut self) {
+        self.is_asked = !self.subjects.is_empty();
+    }
+
+    /// What is to be done next. Questions come first: they are short.
+    pub(super) fn visit(&mut self, make: &MakeStepper, cancel: Cancel) -> Visit {
+        let errand = match self.stepper.take() {
+            Some(stepper) if self.is_asked => {
+                self.is_asked = false;
+                Errand::Inspect(stepper, self.subjects.clone())
+            }
+            Some(mut stepper) => {
+                if std::mem::take(&mut self.settings_changed) {
+                    stepper.change_settings(self.settings.clone());
+                }
+                Errand::Step(stepper, cancel)
+            }
+            None => {
+                self.settings_changed = false;
+                let job = Job {
+                    scene: self.scene.clone(),
+                    settings: self.settings.clone(),
+                    memory_limit: self.options.memory_limit,
+                };
+                Errand::Prepare(make.clone(), job)
+            }
+        };
+        Visit {
+            generation: self.generation,
+            errand,
+        }
+    }
+
+    /// Aim at something, which is to be announced once it is reached.
+    pub(super) fn turn_to(&mut self, aim: Aim) {
+        self.aim = aim;
+        self.announced = false;
+    }
+
+    /// When the time limit passes.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        let limit = self.options.time_limit?;
+        (self.aim == Aim::Run).then_some(())?;
+        self.since.checked_add(limit)
+    }
+
+    /// Complete the report of a step, and end the run if it was the last.
+    pub(super) fn take_note(&mut self, mut report: StepReport) -> StepReport {
+        report.elapsed_s = (self.before + self.since.elapsed()).as_secs_f64();
+        report.solve_s = self.solving.as_secs_f64();
+        if let Some(reason) = self.end_after(&report) {
+            // Lower settings that came during the step ask for more.
+            let more = self.settings_changed && !reason.can_continue();
+            if !more {
+                self.turn_to(Aim::End(reason));
+            }
+        }
+        report
+    }
+
+    /// Why the run ends after a step with this report, if it does.
+    fn end_after(&self, report: &StepReport) -> Option<StopReason> {
+        if report.is_final {
+            let reached = report.epsilon <= self.settings.epsilon;
+            return Some(if reached {
+                StopReason::Converged
+            } else {
+                StopReason::StepLimit
+            });
+        }
+        let limit = self.options.memory_limit?;
+        (report.memory_bytes >= limit).then_some(StopReason::MemoryLimit)
+    }
+}
