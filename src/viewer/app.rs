@@ -101,7 +101,9 @@ impl App {
             title: None,
             keeps_view: false,
         };
-        app.state.rig.target.up = options.camera.up;
+        if let Some(up) = options.camera.up {
+            app.state.rig.target.up = up;
+        }
         if let Some(source) = options.source.clone() {
             app.load(source);
             app.first = Some(options);

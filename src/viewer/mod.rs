@@ -8,6 +8,7 @@ pub mod app;
 pub mod bindings;
 pub mod camera;
 pub mod clusters;
+pub mod fonts;
 pub mod light_range;
 pub mod loader;
 pub mod navigation;
@@ -20,6 +21,7 @@ pub mod session;
 pub mod start;
 pub mod state;
 pub mod theme;
+pub mod truth;
 pub mod view;
 pub mod viewport;
 

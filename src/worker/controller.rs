@@ -435,7 +435,7 @@ fn step(mut stepper: Box<dyn Stepper>, cancel: &Cancel) -> Trip {
 }
 
 /// The text of a panic.
-fn describe(panic: &(dyn Any + Send)) -> String {
+pub(super) fn describe(panic: &(dyn Any + Send)) -> String {
     panic
         .downcast_ref::<String>()
         .map(String::as_str)

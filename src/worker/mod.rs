@@ -10,6 +10,7 @@ mod effect;
 mod message;
 mod slot;
 mod stepper;
+mod truth;
 
 use std::{
     io,
@@ -25,6 +26,7 @@ pub use effect::{Effect, effect_of_change};
 pub use message::{Event, Generation, RunOptions, StopReason};
 pub use slot::Slot;
 pub use stepper::{Job, MakeStepper, Stepper};
+pub use truth::{MeasuredStep, SAMPLE_GOAL, TruthHandle, TruthProgress, VertexErrors};
 
 use crate::{
     scene::Scene,

@@ -9,7 +9,7 @@ use super::{
         navigation::Picked,
         pick, saver,
         session::Recent,
-        state::{RunStatus, Selection},
+        state::{RunStatus, Selection, Severity},
     },
     App,
 };
@@ -45,6 +45,8 @@ impl App {
                 self.state.scene_options.sides = sides;
                 self.reload();
             }
+            Action::TraceReference => self.trace_reference(),
+            Action::ForgetRuns => self.state.truth.forget_earlier(),
             Action::FrameSelected => self.frame_selected(),
             Action::SelectCluster(index) => self.state.cluster = Some(index),
             Action::ClearSelection => self.clear_selection(),
@@ -80,6 +82,7 @@ impl App {
                 state.view.exposure += *step;
                 state.view.auto_exposure = false;
             }
+            Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
             Action::AutoExposure => state.view.auto_exposure = true,
             Action::ToggleToneMap => {
                 use crate::viewer::view::ToneMap;
@@ -106,8 +109,8 @@ impl App {
                 state.rig.current.orthographic = state.rig.target.orthographic;
             }
             Action::Up(up) => {
-                state.rig.target.up = *up;
-                state.rig.current.up = *up;
+                state.rig.target.up = up.vector();
+                state.rig.current.up = up.vector();
             }
             Action::TogglePanels => state.panels.shown = !state.panels.shown,
             Action::ToggleHelp => state.panels.help = !state.panels.help,
@@ -130,6 +133,19 @@ impl App {
             self.worker.stop();
         } else {
             self.clear_selection();
+        }
+    }
+
+    /// Trace the reference, rest, or go on.
+    pub(super) fn trace_reference(&mut self) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let wake = self.wake.clone();
+        let truth = &mut self.state.truth;
+        if let Err(error) = truth.toggle(loaded, &self.state.settings, wake) {
+            let text = format!("cannot start a thread: {error}");
+            self.state.messages.push(Severity::Error, text);
         }
     }
 

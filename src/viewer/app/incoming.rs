@@ -44,19 +44,23 @@ impl App {
 
     fn drain_worker(&mut self) {
         for event in self.worker.events() {
-            self.state.run.note(event);
+            let state = &mut self.state;
+            state.truth.note(&event, &state.run, &state.settings);
+            state.run.note(event);
         }
-        let Some(latest) = self.worker.latest() else {
-            return;
-        };
-        let is_known = self
+        let held = &self.state.run.snapshot;
+        let is_known =
+            |latest: &Arc<_>| held.as_ref().is_some_and(|held| Arc::ptr_eq(held, latest));
+        let newer = self.worker.latest().filter(|latest| !is_known(latest));
+        let has_light = newer.is_some();
+        if has_light {
+            self.state.run.snapshot = newer;
+        }
+        let has_errors = self
             .state
-            .run
-            .snapshot
-            .as_ref()
-            .is_some_and(|held| Arc::ptr_eq(held, &latest));
-        if !is_known {
-            self.state.run.snapshot = Some(latest);
+            .truth
+            .exchange(&self.state.run, self.state.view.mode);
+        if has_light || has_errors {
             self.follow_light();
         }
     }
@@ -71,7 +75,14 @@ impl App {
         {
             self.state.view.exposure = exposure;
         }
-        self.state.false_color_range = light_range::false_color_range(snapshot, &self.state.view);
+        self.state.false_color_range = light_range::false_color_range(
+            snapshot,
+            &self.state.view,
+            self.state
+                .truth
+                .vertex_errors(snapshot)
+                .map(|errors| errors.as_slice()),
+        );
         self.state
             .cluster_counts
             .update(&snapshot.clusters, self.state.view.clusters.level);

@@ -8,6 +8,8 @@ use super::{
         session,
         start::{self, CameraRequest},
         state::Severity,
+        truth::Truth,
+        view::ViewMode,
     },
     App,
 };
@@ -49,12 +51,17 @@ impl App {
         self.state.cluster = None;
         self.state.run.snapshot = None;
         self.state.run.last_effect = None;
+        self.state.truth = Truth::default();
         self.worker.start(
             loaded.scene.clone(),
             self.state.settings.clone(),
             self.state.options.clone(),
         );
         self.state.loaded = Some(Arc::new(loaded));
+        // The view of errors is nothing without a reference.
+        if self.state.view.mode == ViewMode::Error {
+            self.trace_reference();
+        }
     }
 
     /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
@@ -64,7 +71,7 @@ impl App {
         if loaded.source.path().is_some() {
             // The axis chosen before holds for the next file, too; built-in scenes know theirs.
             let chosen = CameraRequest {
-                up: self.state.rig.target.up,
+                up: Some(self.state.rig.target.up),
                 ..CameraRequest::default()
             };
             camera = chosen.apply(camera, frame);

@@ -40,9 +40,52 @@ impl Channel {
     }
 }
 
+/// What the buffer of light was filled from.
+#[derive(Clone)]
+enum LightSource {
+    Light(Arc<VertexLight>, Channel),
+    Errors(Arc<Vec<f32>>),
+}
+
+impl LightSource {
+    fn of(picture: &Picture<'_>) -> Self {
+        match (picture.view.mode, picture.errors) {
+            (ViewMode::Error, Some(errors)) => Self::Errors(errors.clone()),
+            (mode, _) => Self::Light(picture.light.clone(), Channel::of(mode)),
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Light(a, shown), Self::Light(b, wanted)) => Arc::ptr_eq(a, b) && shown == wanted,
+            (Self::Errors(a), Self::Errors(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
+    fn upload(&self, gpu: &Gpu, buffer: &wgpu::Buffer) {
+        let gray = |values: &[f32]| -> Vec<[f32; 3]> { values.iter().map(|x| [*x; 3]).collect() };
+        let grays;
+        let bytes: &[u8] = match self {
+            Self::Light(light, Channel::Irradiance) => bytemuck::cast_slice(&light.irradiance),
+            Self::Light(light, Channel::Direct) => bytemuck::cast_slice(&light.direct),
+            Self::Light(light, Channel::Uncertainty) => {
+                grays = gray(&light.uncertainty);
+                bytemuck::cast_slice(&grays)
+            }
+            Self::Errors(errors) => {
+                grays = gray(errors);
+                bytemuck::cast_slice(&grays)
+            }
+        };
+        let fitting = bytes.len().min(buffer.size() as usize);
+        gpu.queue.write_buffer(buffer, 0, &bytes[..fitting]);
+    }
+}
+
 struct MeshBuffers {
     source: Arc<DisplayMesh>,
-    light_source: Option<(Arc<VertexLight>, Channel)>,
+    light_source: Option<LightSource>,
     positions: wgpu::Buffer,
     normals: wgpu::Buffer,
     texcoords: Option<wgpu::Buffer>,
@@ -98,7 +141,7 @@ impl MeshPass {
             self.mesh = Some(MeshBuffers::new(gpu, picture, &self.details));
         }
         if let Some(mesh) = &mut self.mesh {
-            mesh.prepare_light(gpu, picture.light, Channel::of(picture.view.mode));
+            mesh.prepare_light(gpu, LightSource::of(picture));
             if shows_edges(picture.view) {
                 mesh.prepare_edges(gpu);
             }
@@ -150,7 +193,7 @@ fn shows_edges(view: &ViewSettings) -> bool {
 fn check_size(gpu: &Gpu, mesh: &DisplayMesh) -> Result<(), RenderError> {
     const MIB: u64 = 1 << 20;
     let needed = 12 * mesh.positions.len().max(mesh.indices.len()) as u64;
-    let limit = gpu.device.limits().max_buffer_size;
+    let limit = gpu.max_buffer_size;
     if needed > limit {
         return Err(RenderError::MeshTooLarge {
             needed_mib: needed.div_ceil(MIB),
@@ -191,25 +234,12 @@ impl MeshBuffers {
         }
     }
 
-    fn prepare_light(&mut self, gpu: &Gpu, light: &Arc<VertexLight>, channel: Channel) {
-        let is_current = |(held, shown): &(Arc<VertexLight>, Channel)| {
-            Arc::ptr_eq(held, light) && *shown == channel
-        };
-        if self.light_source.as_ref().is_some_and(is_current) {
-            return;
+    fn prepare_light(&mut self, gpu: &Gpu, source: LightSource) {
+        let is_current = |held: &LightSource| held.is_same(&source);
+        if !self.light_source.as_ref().is_some_and(is_current) {
+            source.upload(gpu, &self.light);
+            self.light_source = Some(source);
         }
-        let gray: Vec<[f32; 3]>;
-        let bytes: &[u8] = match channel {
-            Channel::Irradiance => bytemuck::cast_slice(&light.irradiance),
-            Channel::Direct => bytemuck::cast_slice(&light.direct),
-            Channel::Uncertainty => {
-                gray = light.uncertainty.iter().map(|error| [*error; 3]).collect();
-                bytemuck::cast_slice(&gray)
-            }
-        };
-        let fitting = bytes.len().min(self.light.size() as usize);
-        gpu.queue.write_buffer(&self.light, 0, &bytes[..fitting]);
-        self.light_source = Some((light.clone(), channel));
     }
 
     fn prepare_edges(&mut self, gpu: &Gpu) {
@@ -218,7 +248,7 @@ impl MeshBuffers {
         }
         // An edge that two triangles share runs forth in one and back in the other: it is drawn twice, which costs
         // less than finding out.
-        let limit = gpu.device.limits().max_buffer_size as usize / (6 * size_of::<u32>());
+        let limit = gpu.max_buffer_size as usize / (6 * size_of::<u32>());
         let edges: Vec<u32> = self
             .source
             .indices

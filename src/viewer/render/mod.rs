@@ -12,7 +12,7 @@ mod target;
 mod tonemap_pass;
 mod uniforms;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
@@ -77,6 +77,10 @@ pub struct Gpu {
     pub most_samples: u32,
     /// Format of the linear picture.
     pub linear_format: wgpu::TextureFormat,
+    /// Largest buffer to make, in bytes; at most what the adapter takes.
+    pub max_buffer_size: u64,
+    /// What a device of our own complained of first; the window listens to its device by itself.
+    pub complaint: Arc<OnceLock<String>>,
 }
 
 impl Gpu {
@@ -95,6 +99,8 @@ impl Gpu {
         // A processor that plays adapter takes twice as long for four samples.
         let is_slow = about.device_type == wgpu::DeviceType::Cpu;
         Self {
+            max_buffer_size: device.limits().max_buffer_size,
+            complaint: Arc::default(),
             device,
             queue,
             adapter_name: format!(
@@ -158,6 +164,8 @@ pub struct Picture<'a> {
     pub mesh: &'a Arc<DisplayMesh>,
     /// Its light.
     pub light: &'a Arc<VertexLight>,
+    /// Measured errors at its vertices, where they are known.
+    pub errors: Option<&'a Arc<Vec<f32>>>,
     /// From where.
     pub camera: &'a Camera,
     /// How.
