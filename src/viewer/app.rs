@@ -11,6 +11,7 @@ use std::{
         Arc,
         mpsc::{self, Receiver, Sender},
     },
+    time::Instant,
 };
 
 use eframe::egui;
@@ -43,7 +44,8 @@ pub struct App {
     faults: Arc<Faults>,
     /// Files chosen in the dialog.
     chosen: (Sender<Option<PathBuf>>, Receiver<Option<PathBuf>>),
-    dialog_is_open: bool,
+    /// Since when the file dialog is open.
+    dialog_since: Option<Instant>,
     notices: (Sender<Notice>, Receiver<Notice>),
     /// Set from the command line for the first scene only.
     first: Option<Options>,
@@ -95,7 +97,7 @@ impl App {
             wake,
             faults,
             chosen: mpsc::channel(),
-            dialog_is_open: false,
+            dialog_since: None,
             notices: mpsc::channel(),
             first: None,
             title: None,

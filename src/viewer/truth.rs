@@ -48,6 +48,8 @@ pub struct Truth {
     pub runs: Vec<RunRecord>,
     /// The newest snapshot handed over.
     measured: Option<Arc<Snapshot>>,
+    /// The light of the run before, shown until there is newer.
+    outdated: Option<Arc<Snapshot>>,
     last_number: u32,
 }
 
@@ -116,8 +118,7 @@ impl Truth {
         match event {
             Event::Started => {
                 self.begin_run(settings);
-                // The light that is still shown is that of the run before.
-                self.measured.clone_from(&run.snapshot);
+                self.outdated.clone_from(&run.snapshot);
             }
             Event::Stepped(report) => {
                 let facts = StepFacts {
@@ -174,7 +175,7 @@ impl Truth {
         let newest = run.snapshot.as_ref().filter(|snapshot| snapshot.step > 0);
         if let (Some(snapshot), Some(record)) = (newest, self.runs.last())
             && !holds(&self.measured, snapshot)
-            && record.steps.contains_key(&snapshot.step)
+            && !holds(&self.outdated, snapshot)
         {
             handle.measure(record.number, snapshot.clone());
             self.measured = Some(snapshot.clone());

@@ -1,6 +1,6 @@
 //! What arrives between frames: chosen files, notices, a scene that was read, events and light of the worker.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use super::{
     super::{
@@ -12,18 +12,17 @@ use super::{
     App,
 };
 
+/// A dialog that is gone sooner than this was never seen. Longer, and a quick cancel is taken for a failure.
+const SOONEST_CANCEL: Duration = Duration::from_millis(400);
+
 impl App {
     /// Take note of everything that arrived since the last frame.
     pub(super) fn drain(&mut self) {
         while let Ok(chosen) = self.chosen.1.try_recv() {
-            self.dialog_is_open = false;
+            let opened = self.dialog_since.take();
             match chosen {
                 Some(path) => self.load(SceneSource::File(path)),
-                // A dialog that fails cannot be told from one that was cancelled.
-                None => self.state.messages.push(
-                    Severity::Note,
-                    "no file was chosen; if no dialog appeared, use File, Open by path",
-                ),
+                None => self.no_file(opened.is_some_and(|since| since.elapsed() < SOONEST_CANCEL)),
             }
         }
         while let Ok((severity, text)) = self.notices.1.try_recv() {
@@ -40,6 +39,17 @@ impl App {
             }
         }
         self.drain_worker();
+    }
+
+    /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by its haste.
+    fn no_file(&mut self, is_hasty: bool) {
+        let text = if is_hasty {
+            self.state.panels.path = true;
+            "this desktop has no file dialog; type the path instead"
+        } else {
+            "no file was chosen"
+        };
+        self.state.messages.push(Severity::Note, text);
     }
 
     fn drain_worker(&mut self) {

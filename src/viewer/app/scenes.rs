@@ -1,6 +1,6 @@
 //! Scenes: read, shown, read again; the file dialog.
 
-use std::{sync::Arc, thread};
+use std::{sync::Arc, thread, time::Instant};
 
 use super::{
     super::{
@@ -110,7 +110,9 @@ impl App {
     }
 
     pub(super) fn open_dialog(&mut self) {
-        if self.dialog_is_open {
+        if self.dialog_since.is_some() {
+            // It may hang without having been seen.
+            self.state.panels.path = true;
             return;
         }
         let (sender, wake) = (self.chosen.0.clone(), self.wake.clone());
@@ -126,6 +128,6 @@ impl App {
                 let _ = sender.send(file);
                 wake();
             });
-        self.dialog_is_open = spawned.is_ok();
+        self.dialog_since = spawned.is_ok().then(Instant::now);
     }
 }

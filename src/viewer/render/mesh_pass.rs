@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use wgpu::util::DeviceExt as _;
-
 use super::{
     DEPTH_FORMAT, Gpu, Picture, RenderError,
     detail::{DetailRange, DetailSet},
@@ -206,7 +204,7 @@ fn check_size(gpu: &Gpu, mesh: &DisplayMesh) -> Result<(), RenderError> {
 impl MeshBuffers {
     fn new(gpu: &Gpu, picture: &Picture<'_>, details: &DetailSet) -> Self {
         let mesh = picture.mesh;
-        let vertices = |label, bytes: &[u8]| buffer(gpu, label, bytes, wgpu::BufferUsages::VERTEX);
+        let vertices = |label, bytes: &[u8]| gpu.buffer(label, bytes, wgpu::BufferUsages::VERTEX);
         let (indices, ranges) = details.sort_by_detail(picture.scene, mesh);
         Self {
             source: mesh.clone(),
@@ -223,8 +221,7 @@ impl MeshBuffers {
                 usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
-            indices: buffer(
-                gpu,
+            indices: gpu.buffer(
                 "indices",
                 bytemuck::cast_slice(&indices),
                 wgpu::BufferUsages::INDEX,
@@ -258,17 +255,8 @@ impl MeshBuffers {
             .collect();
         let bytes = bytemuck::cast_slice(&edges);
         let usage = wgpu::BufferUsages::INDEX;
-        self.edges = Some((buffer(gpu, "edges", bytes, usage), edges.len() as u32));
+        self.edges = Some((gpu.buffer("edges", bytes, usage), edges.len() as u32));
     }
-}
-
-fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    gpu.device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
 }
 
 /// What a pipeline draws.

@@ -136,6 +136,19 @@ impl Gpu {
         }
     }
 
+    /// A buffer with these contents. Written through the queue: a buffer that is mapped to begin with cannot be had
+    /// from a lost device.
+    fn buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: contents.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
+    }
+
     /// Largest picture on a side.
     pub fn max_picture_side(&self) -> u32 {
         self.device.limits().max_texture_dimension_2d
