@@ -13,7 +13,7 @@ use super::{
 };
 
 /// A dialog that is gone sooner than this was never seen. Longer, and a quick cancel is taken for a failure.
-const SOONEST_CANCEL: Duration = Duration::from_millis(400);
+const SOONEST_CANCEL: Duration = Duration::from_millis(1500);
 
 impl App {
     /// Take note of everything that arrived since the last frame.
