@@ -243,10 +243,22 @@ fn the_reference_measures_each_run_and_the_view_of_errors_is_offered() {
     wait_for(&mut harness, |app| {
         app.state.truth.runs.len() == 2
             && matches!(app.state.run.status, RunStatus::Finished(_))
-            && app.state.truth.newest_error().is_some()
+            && app
+                .state
+                .truth
+                .newest_error()
+                .is_some_and(|(step, ..)| step == app.state.settings.max_steps)
     });
     let truth = &harness.state().state.truth;
     assert!(truth.steps_of(&truth.runs[0]).next().is_some());
+    assert_eq!(
+        truth
+            .steps_of(&truth.runs[1])
+            .map(|(step, ..)| step)
+            .collect::<Vec<_>>(),
+        (1..=harness.state().state.settings.max_steps).collect::<Vec<_>>(),
+        "no step goes unmeasured"
+    );
     harness.get_by_label("Forget earlier runs").click();
     harness.run_steps(3);
     assert_eq!(harness.state().state.truth.runs.len(), 1);

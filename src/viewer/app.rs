@@ -21,7 +21,7 @@ use super::{
     bindings::{self, Binding},
     loader::SceneSource,
     panels,
-    saver::Notice,
+    saver::{Notice, Unfinished},
     session::Recent,
     start::{Faults, Options},
     state::State,
@@ -47,6 +47,7 @@ pub struct App {
     /// Since when the file dialog is open.
     dialog_since: Option<Instant>,
     notices: (Sender<Notice>, Receiver<Notice>),
+    pictures: Unfinished,
     /// Set from the command line for the first scene only.
     first: Option<Options>,
     /// A new title for the window.
@@ -99,6 +100,7 @@ impl App {
             chosen: mpsc::channel(),
             dialog_since: None,
             notices: mpsc::channel(),
+            pictures: Unfinished::default(),
             first: None,
             title: None,
             keeps_view: false,
@@ -111,6 +113,13 @@ impl App {
             app.first = Some(options);
         }
         Ok(app)
+    }
+}
+
+impl Drop for App {
+    fn drop(&mut self) {
+        // What was asked for is written, even when the window closes at once.
+        self.pictures.finish();
     }
 }
 

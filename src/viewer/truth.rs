@@ -9,7 +9,7 @@ use super::{loader::LoadedScene, state::Run, view::ViewMode};
 use crate::{
     metrics::ErrorMeasures,
     solver::{Method, Oracle, Snapshot, SolveSettings},
-    worker::{Event, TruthHandle, TruthProgress, VertexErrors, Wake},
+    worker::{Event, TruthHandle, TruthProgress, VertexErrors, Wake, Watch},
 };
 
 /// Runs kept for comparison, the present one included. More lines than colours are a tangle.
@@ -27,9 +27,11 @@ pub struct StepFacts {
 /// One run under the reference.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunRecord {
-    /// Number by which its errors are known.
-    pub number: u32,
-    /// Number and settings, for people.
+    /// Number by which its errors are known: that of the worker's run.
+    pub number: u64,
+    /// Its place among the runs of the scene, from 1.
+    pub ordinal: u32,
+    /// Ordinal and settings, for people.
     pub name: String,
     /// Its steps.
     pub steps: BTreeMap<u32, StepFacts>,
@@ -46,11 +48,8 @@ pub struct Truth {
     pub progress: Arc<TruthProgress>,
     /// Runs in order; the last is the present one.
     pub runs: Vec<RunRecord>,
-    /// The newest snapshot handed over.
-    measured: Option<Arc<Snapshot>>,
-    /// The light of the run before, shown until there is newer.
-    outdated: Option<Arc<Snapshot>>,
-    last_number: u32,
+    /// Runs since the scene was read.
+    run_count: u32,
 }
 
 impl Truth {
@@ -70,19 +69,8 @@ impl Truth {
         self.progress.goal > 0 && self.progress.samples >= self.progress.goal
     }
 
-    /// Begin, rest, go on, or trace more, whichever comes next.
-    ///
-    /// # Errors
-    /// When the system refuses a thread.
-    pub fn toggle(
-        &mut self,
-        loaded: &LoadedScene,
-        settings: &SolveSettings,
-        wake: Wake,
-    ) -> io::Result<()> {
-        if self.handle.is_none() || self.progress.failed.is_some() {
-            return self.start(loaded, settings, wake);
-        }
+    /// Rest, go on, or trace more, whichever comes next.
+    pub fn toggle(&mut self) {
         let is_done = self.is_done();
         if let Some(handle) = &self.handle {
             if is_done {
@@ -92,34 +80,36 @@ impl Truth {
                 handle.rest(!handle.rests());
             }
         }
-        Ok(())
     }
 
-    /// Begin to trace, if that is not done yet.
+    /// Begin to trace; `shown` is measured at once. Returns what the worker is to hand its snapshots to.
     ///
     /// # Errors
     /// When the system refuses a thread.
     pub fn start(
         &mut self,
         loaded: &LoadedScene,
-        settings: &SolveSettings,
+        seed: u64,
+        shown: Option<&Arc<Snapshot>>,
         wake: Wake,
-    ) -> io::Result<()> {
+    ) -> io::Result<Watch> {
         let (scene, rays) = (loaded.scene.clone(), loaded.rays.clone());
         self.handle = None;
-        self.handle = Some(TruthHandle::spawn(scene, rays, settings.seed, wake)?);
         self.progress = Arc::default();
-        self.measured = None;
-        Ok(())
+        let handle = TruthHandle::spawn(scene, rays, seed, wake)?;
+        let lit = shown.filter(|snapshot| snapshot.step > 0);
+        if let (Some(snapshot), Some(run)) = (lit, self.runs.last()) {
+            handle.measure(run.number, snapshot.clone());
+        }
+        let watch = handle.watch();
+        self.handle = Some(handle);
+        Ok(watch)
     }
 
-    /// Take note of an event of the worker, which lights under these settings.
-    pub fn note(&mut self, event: &Event, run: &Run, settings: &SolveSettings) {
+    /// Take note of an event of the run of this number, which lights under these settings.
+    pub fn note(&mut self, event: &Event, run: u64, settings: &SolveSettings) {
         match event {
-            Event::Started => {
-                self.begin_run(settings);
-                self.outdated.clone_from(&run.snapshot);
-            }
+            Event::Started => self.begin_run(run, settings),
             Event::Stepped(report) => {
                 let facts = StepFacts {
                     elapsed_s: report.elapsed_s,
@@ -128,7 +118,7 @@ impl Truth {
                 if let Some(run) = self.runs.last_mut() {
                     run.steps.insert(report.step, facts);
                     // A run may go on under finer settings.
-                    run.name = name(run.number, settings);
+                    run.name = name(run.ordinal, settings);
                 }
             }
             _ => {}
@@ -136,7 +126,7 @@ impl Truth {
     }
 
     /// A new run; the one before is kept if anything of it was measured.
-    fn begin_run(&mut self, settings: &SolveSettings) {
+    fn begin_run(&mut self, number: u64, settings: &SolveSettings) {
         let is_measured = |run: &RunRecord| self.steps_of(run).next().is_some();
         if self.runs.last().is_some_and(|run| !is_measured(run)) {
             self.forget_run(self.runs.len() - 1);
@@ -144,10 +134,11 @@ impl Truth {
         if self.runs.len() >= MOST_RUNS {
             self.forget_run(0);
         }
-        self.last_number += 1;
+        self.run_count += 1;
         self.runs.push(RunRecord {
-            number: self.last_number,
-            name: name(self.last_number, settings),
+            number,
+            ordinal: self.run_count,
+            name: name(self.run_count, settings),
             steps: BTreeMap::new(),
         });
     }
@@ -166,20 +157,13 @@ impl Truth {
         }
     }
 
-    /// Hand over what is new, and take what is known. Returns whether that is more than before.
+    /// Say what is wanted, and take what is known. Returns whether that is more than before.
     pub fn exchange(&mut self, run: &Run, mode: ViewMode) -> bool {
         let Some(handle) = &self.handle else {
             return false;
         };
         handle.yield_to_solver(run.status.is_busy());
         let newest = run.snapshot.as_ref().filter(|snapshot| snapshot.step > 0);
-        if let (Some(snapshot), Some(record)) = (newest, self.runs.last())
-            && !holds(&self.measured, snapshot)
-            && !holds(&self.outdated, snapshot)
-        {
-            handle.measure(record.number, snapshot.clone());
-            self.measured = Some(snapshot.clone());
-        }
         handle.compare_vertices(newest.filter(|_| mode == ViewMode::Error).cloned());
         let progress = handle.progress();
         let is_new = !Arc::ptr_eq(&progress, &self.progress);
@@ -208,13 +192,8 @@ impl Truth {
     }
 }
 
-fn holds(held: &Option<Arc<Snapshot>>, snapshot: &Arc<Snapshot>) -> bool {
-    held.as_ref()
-        .is_some_and(|held| Arc::ptr_eq(held, snapshot))
-}
-
 /// What tells a run from others.
-fn name(number: u32, settings: &SolveSettings) -> String {
+fn name(ordinal: u32, settings: &SolveSettings) -> String {
     let method = match settings.method {
         Method::Bounded => "bounded",
         Method::SixFace => "six-face",
@@ -227,7 +206,7 @@ fn name(number: u32, settings: &SolveSettings) -> String {
         Oracle::Interval => String::new(),
         Oracle::Samples => format!(", p {}", settings.samples),
     };
-    format!("{number}: {method}, ε {epsilon}{oracle}")
+    format!("{ordinal}: {method}, ε {epsilon}{oracle}")
 }
 
 #[cfg(test)]
@@ -245,7 +224,7 @@ mod tests {
     }
 
     /// As if the thread had measured these steps.
-    fn know(truth: &mut Truth, steps: &[(u32, u32)]) {
+    fn know(truth: &mut Truth, steps: &[(u64, u32)]) {
         let progress = Arc::make_mut(&mut truth.progress);
         for &step in steps {
             progress.errors.insert(step, ErrorMeasures::default());
@@ -256,16 +235,16 @@ mod tests {
     fn a_measured_run_is_kept_and_an_unmeasured_one_is_not() {
         let mut truth = Truth::default();
         let mut settings = SolveSettings::draft();
-        truth.note(&Event::Started, &Run::default(), &settings);
-        truth.note(&stepped(1), &Run::default(), &settings);
-        truth.note(&Event::Started, &Run::default(), &settings);
+        truth.note(&Event::Started, 1, &settings);
+        truth.note(&stepped(1), 1, &settings);
+        truth.note(&Event::Started, 2, &settings);
         assert_eq!(truth.runs.len(), 1, "nothing of the first was measured");
-        truth.note(&stepped(1), &Run::default(), &settings);
-        truth.note(&stepped(2), &Run::default(), &settings);
+        truth.note(&stepped(1), 2, &settings);
+        truth.note(&stepped(2), 2, &settings);
         know(&mut truth, &[(2, 1), (2, 2)]);
         assert_eq!(truth.newest_error().map(|(step, ..)| step), Some(2));
         settings.method = Method::SixFace;
-        truth.note(&Event::Started, &Run::default(), &settings);
+        truth.note(&Event::Started, 3, &settings);
         assert_eq!(truth.runs.len(), 2);
         assert_ne!(truth.runs[0].name, truth.runs[1].name);
         assert_eq!(truth.newest_error(), None, "the new run has no error yet");
@@ -278,8 +257,8 @@ mod tests {
     fn old_runs_go_when_there_are_many() {
         let mut truth = Truth::default();
         for run in 1..=20 {
-            truth.note(&Event::Started, &Run::default(), &SolveSettings::draft());
-            truth.note(&stepped(1), &Run::default(), &SolveSettings::draft());
+            truth.note(&Event::Started, run, &SolveSettings::draft());
+            truth.note(&stepped(1), run, &SolveSettings::draft());
             know(&mut truth, &[(run, 1)]);
         }
         assert_eq!(truth.runs.len(), MOST_RUNS);

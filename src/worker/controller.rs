@@ -7,7 +7,7 @@ use std::{
     any::Any,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
-        Arc,
+        Arc, PoisonError,
         mpsc::{Receiver, Sender},
     },
     time::{Duration, Instant},
@@ -17,6 +17,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::{
     Effect, Event, Generation, Job, MakeStepper, RunOptions, Slot, Stepper, StopReason, Wake,
+    WatchCell,
     message::{Command, Message},
 };
 use crate::{
@@ -28,17 +29,33 @@ use crate::{
 pub(super) struct Outbox {
     events: Sender<(Generation, Event)>,
     slot: Arc<Slot<Snapshot>>,
+    watch: WatchCell,
     wake: Wake,
 }
 
 impl Outbox {
-    /// Events into a channel, snapshots into a slot, and a call to `wake` for each event.
+    /// Events into a channel, snapshots into a slot and to who watches, and a call to `wake` for each event.
     pub(super) fn new(
         events: Sender<(Generation, Event)>,
         slot: Arc<Slot<Snapshot>>,
+        watch: WatchCell,
         wake: Wake,
     ) -> Self {
-        Self { events, slot, wake }
+        Self {
+            events,
+            slot,
+            watch,
+            wake,
+        }
+    }
+
+    fn publish(&self, generation: Generation, snapshot: Arc<Snapshot>) {
+        let watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(watch) = watch.as_ref() {
+            watch(generation, &snapshot);
+        }
+        drop(watch);
+        self.slot.publish(generation, snapshot);
     }
 
     fn send(&self, generation: Generation, event: Event) {
@@ -251,9 +268,7 @@ impl Controller {
         };
         run.solving += trip.spent;
         run.stepper = Some(trip.stepper);
-        self.outbox
-            .slot
-            .publish(generation, Arc::new(trip.snapshot));
+        self.outbox.publish(generation, Arc::new(trip.snapshot));
         match trip.errand {
             Errand::Prepared => {
                 let seconds = trip.spent.as_secs_f64();

@@ -18,7 +18,7 @@ use std::{
 use glam::Vec3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{Wake, controller::describe};
+use super::{Generation, Wake, Watch, controller::describe};
 use crate::{
     geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, VertexReference, measure_error},
@@ -34,13 +34,13 @@ const SAMPLES_PER_PASS: u32 = 16;
 pub const SAMPLE_GOAL: u32 = 512;
 
 /// Snapshots that wait to be measured at most; the oldest then go unmeasured. More hold the memory of large meshes.
-const MOST_WAITING: usize = 4;
+const MOST_WAITING: usize = 8;
 
 /// Samples at each point before any at vertices: figures come first.
 const FIRST_SAMPLES: u32 = 64;
 
-/// A step of a run that was measured.
-pub type MeasuredStep = (u32, u32);
+/// A step that was measured: number of the run, number of the step.
+pub type MeasuredStep = (u64, u32);
 
 /// Errors at the vertices of a mesh.
 #[derive(Clone, Debug, Default)]
@@ -73,8 +73,8 @@ pub struct TruthProgress {
 /// What the owner wants.
 #[derive(Default)]
 struct Wishes {
-    waiting: VecDeque<(u32, Arc<Snapshot>)>,
-    forgotten: Vec<u32>,
+    waiting: VecDeque<(u64, Arc<Snapshot>)>,
+    forgotten: Vec<u64>,
     goal: u32,
     rests: bool,
     /// Whose vertices are to be compared.
@@ -100,6 +100,15 @@ impl Desk {
     fn change(&self, change: impl FnOnce(&mut Wishes)) {
         change(&mut self.wishes());
         self.changed.notify_all();
+    }
+
+    fn measure(&self, run: u64, snapshot: Arc<Snapshot>) {
+        self.change(|wishes| {
+            if wishes.waiting.len() >= MOST_WAITING {
+                wishes.waiting.pop_front();
+            }
+            wishes.waiting.push_back((run, snapshot));
+        });
     }
 
     fn is_cancelled(&self) -> bool {
@@ -148,13 +157,18 @@ impl TruthHandle {
     }
 
     /// Measure a snapshot of a run. Never waits.
-    pub fn measure(&self, run: u32, snapshot: Arc<Snapshot>) {
-        self.desk.change(|wishes| {
-            if wishes.waiting.len() >= MOST_WAITING {
-                wishes.waiting.pop_front();
+    pub fn measure(&self, run: u64, snapshot: Arc<Snapshot>) {
+        self.desk.measure(run, snapshot);
+    }
+
+    /// For [`WorkerHandle::watch`](super::WorkerHandle::watch): measures every lit snapshot, however fast they follow.
+    pub fn watch(&self) -> Watch {
+        let desk = self.desk.clone();
+        Arc::new(move |generation: Generation, snapshot: &Arc<Snapshot>| {
+            if snapshot.step > 0 {
+                desk.measure(generation.number(), snapshot.clone());
             }
-            wishes.waiting.push_back((run, snapshot));
-        });
+        })
     }
 
     /// Compare the vertices of a snapshot, too, until told otherwise.
@@ -163,7 +177,7 @@ impl TruthHandle {
     }
 
     /// Forget the errors of a run.
-    pub fn forget(&self, run: u32) {
+    pub fn forget(&self, run: u64) {
         self.desk.change(|wishes| {
             wishes.waiting.retain(|(waiting, _)| *waiting != run);
             wishes.forgotten.push(run);
@@ -214,8 +228,8 @@ impl Drop for TruthHandle {
 
 /// What to do next.
 enum Task {
-    Measure(u32, Arc<Snapshot>),
-    Forget(Vec<u32>),
+    Measure(u64, Arc<Snapshot>),
+    Forget(Vec<u64>),
     TracePoints,
     TraceVertices,
     CompareVertices(Option<Arc<Snapshot>>),
@@ -348,7 +362,7 @@ impl Tracing {
         }
     }
 
-    fn measure(&mut self, run: u32, snapshot: &Snapshot) {
+    fn measure(&mut self, run: u64, snapshot: &Snapshot) {
         let desk = self.desk.clone();
         let pool = pool(&mut self.pools, desk.yields.load(Ordering::Relaxed));
         let (scene, points) = (&self.scene, &self.points);

@@ -141,11 +141,21 @@ impl App {
         let Some(loaded) = &self.state.loaded else {
             return;
         };
-        let wake = self.wake.clone();
+        let (wake, seed) = (self.wake.clone(), self.state.settings.seed);
         let truth = &mut self.state.truth;
-        if let Err(error) = truth.toggle(loaded, &self.state.settings, wake) {
-            let text = format!("cannot start a thread: {error}");
-            self.state.messages.push(Severity::Error, text);
+        if truth.exists() && truth.progress.failed.is_none() {
+            truth.toggle();
+            return;
+        }
+        // Light of a run before the present one would be measured as the present one's.
+        let run = &self.state.run;
+        let shown = run.snapshot.as_ref().filter(|_| !run.reports.is_empty());
+        match truth.start(loaded, seed, shown, wake) {
+            Ok(watch) => self.worker.watch(Some(watch)),
+            Err(error) => {
+                let text = format!("cannot start a thread: {error}");
+                self.state.messages.push(Severity::Error, text);
+            }
         }
     }
 

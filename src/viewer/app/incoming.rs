@@ -53,9 +53,10 @@ impl App {
     }
 
     fn drain_worker(&mut self) {
+        let run = self.worker.generation().number();
         for event in self.worker.events() {
             let state = &mut self.state;
-            state.truth.note(&event, &state.run, &state.settings);
+            state.truth.note(&event, run, &state.settings);
             state.run.note(event);
         }
         let held = &self.state.run.snapshot;

@@ -51,6 +51,7 @@ impl App {
         self.state.cluster = None;
         self.state.run.snapshot = None;
         self.state.run.last_effect = None;
+        self.worker.watch(None);
         self.state.truth = Truth::default();
         self.worker.start(
             loaded.scene.clone(),

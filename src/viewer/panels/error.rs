@@ -182,7 +182,7 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
                     .steps_of(run)
                     .map(|(_, facts, error)| point(facts, error.relative_rms_trimmed))
                     .collect();
-                let color = run_color(run.number);
+                let color = run_color(run.ordinal);
                 plot.points(
                     egui_plot::Points::new(run.name.clone(), points.clone())
                         .radius(if is_present { 3.5 } else { 2.0 })
@@ -212,9 +212,9 @@ fn decade(exponent: f64) -> String {
 }
 
 /// Colours that tell neighbours apart, in turn.
-fn run_color(number: u32) -> Color32 {
+fn run_color(ordinal: u32) -> Color32 {
     const TURN: f32 = 0.618_034;
-    egui::ecolor::Hsva::new((number as f32 * TURN + 0.02).fract(), 0.65, 0.9, 1.0).into()
+    egui::ecolor::Hsva::new((ordinal as f32 * TURN + 0.02).fract(), 0.65, 0.9, 1.0).into()
 }
 
 fn percent(share: f64) -> String {
