@@ -3,7 +3,7 @@
 use eframe::egui::{self, Color32, RichText};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use super::{count, figure, row, seconds};
+use super::{count, figure, plot::run_time, row, seconds};
 use crate::viewer::{
     action::Action,
     state::State,
@@ -169,7 +169,7 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
         .allow_scroll(false)
         .allow_zoom(false)
         .allow_drag(false)
-        .x_axis_label("seconds")
+        .x_axis_formatter(|mark, _| run_time(mark.value))
         .y_axis_formatter(|mark, _| decade(mark.value))
         .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
         .include_y(0.0)
