@@ -11,10 +11,10 @@ use vecrad::{
     scene::{Material, Scene, SceneBuilder, SceneOptions},
     solver::{ClusterBox, DisplayMesh, Snapshot, VertexLight},
     viewer::{
-        camera::{Camera, UpAxis},
+        camera::Camera,
         cluster_lines,
         render::{
-            Overlay, Picture, Renderer, Target,
+            Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
             headless::{self, HeadlessError, HeadlessPicture},
         },
         view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
@@ -91,7 +91,7 @@ fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
 
 fn camera() -> Camera {
     let eye = Vec3::new(0.0, 0.0, 130.0);
-    Camera::looking(eye, Vec3::ZERO, UpAxis::Y)
+    Camera::looking(eye, Vec3::ZERO, Vec3::Y)
 }
 
 /// Exposure 0 and no tone map, so that colours can be computed by hand.
@@ -106,7 +106,7 @@ fn plain(mode: ViewMode) -> ViewSettings {
 
 /// A picture, or `None` on a machine that cannot draw; CI must be able to.
 fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<HeadlessPicture> {
-    match headless::picture(scene, snapshot, &camera(), view, SIZE) {
+    match headless::picture(scene, snapshot, None, &camera(), view, SIZE) {
         Ok(picture) => Some(picture),
         Err(HeadlessError::NoAdapter(reason)) => {
             assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
@@ -298,13 +298,7 @@ fn cluster_boxes_are_drawn_over_the_surfaces() {
 fn the_selected_cluster_is_outlined() {
     let scene = scene();
     let snapshot = snapshot(&scene, Vec3::splat(1.0));
-    let gpu = match headless::open_gpu() {
-        Ok(gpu) => gpu,
-        Err(reason) => {
-            assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
-            return;
-        }
-    };
+    let Some(gpu) = gpu() else { return };
     let mut renderer = Renderer::new(gpu);
     let target = Target::new(renderer.gpu(), SIZE).expect("a small picture");
     let overlay = Overlay {
@@ -320,6 +314,7 @@ fn the_selected_cluster_is_outlined() {
         scene: &scene,
         mesh: &snapshot.mesh,
         light: &snapshot.light,
+        errors: None,
         camera: &camera(),
         view: &view,
         is_unlit: false,
@@ -338,12 +333,134 @@ fn the_selected_cluster_is_outlined() {
     assert!((2..20).contains(&down), "{down}");
 }
 
+/// A device, or `None` on a machine that cannot draw.
+fn gpu() -> Option<Gpu> {
+    match headless::open_gpu() {
+        Ok(gpu) => Some(gpu),
+        Err(reason) => {
+            assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
+            eprintln!("skipped, no graphics adapter: {reason}");
+            None
+        }
+    }
+}
+
+/// Draw a snapshot with a device, lost or not; what the renderer said, and the picture that came back.
+fn draw_with(
+    gpu: Gpu,
+    scene: &Arc<Scene>,
+    snapshot: &Snapshot,
+    errors: Option<&Arc<Vec<f32>>>,
+    mode: ViewMode,
+    is_lost: bool,
+) -> (Result<(), RenderError>, Result<RgbaImage, ReadError>) {
+    let mut renderer = Renderer::new(gpu);
+    let target = Target::new(renderer.gpu(), SIZE).expect("a small picture");
+    if is_lost {
+        renderer.gpu().device.destroy();
+    }
+    let drawn = Picture {
+        scene,
+        mesh: &snapshot.mesh,
+        light: &snapshot.light,
+        errors,
+        camera: &camera(),
+        view: &plain(mode),
+        is_unlit: false,
+        range: [0.0, 100.0],
+        overlay: &Overlay::default(),
+        background: Vec3::ZERO,
+        pixels_per_point: 1.0,
+    };
+    let said = renderer.render(&target, &drawn);
+    (said, target.read_display(renderer.gpu()))
+}
+
+#[test]
+fn measured_errors_are_shown_where_they_are_known() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::ONE);
+    let count = snapshot.mesh.positions.len();
+    let mut pictures = Vec::new();
+    for percent in [None, Some(0.0), Some(99.0), Some(200.0)] {
+        let errors = percent.map(|percent| Arc::new(vec![percent; count]));
+        let (said, picture) = draw_with(
+            gpu.clone(),
+            &scene,
+            &snapshot,
+            errors.as_ref(),
+            ViewMode::Error,
+            false,
+        );
+        said.expect("a small mesh");
+        pictures.push(left(&picture.expect("read back")));
+    }
+    let [unknown, none, much, beyond] = pictures[..] else {
+        panic!("four pictures")
+    };
+    assert!(unknown[0] > 2 * unknown[1], "the red wall: {unknown:?}");
+    assert!(none[2] > none[1], "the low end is blue: {none:?}");
+    assert!(much[0] > 2 * much[2], "the high end is red: {much:?}");
+    assert_eq!(beyond, [255; 3]);
+}
+
+#[test]
+fn emission_scales_light_and_false_colours_alike() {
+    let scene = scene();
+    let bright = snapshot(&scene, Vec3::splat(3.0));
+    let dim = snapshot(&scene, Vec3::ONE);
+    for mode in [ViewMode::LightOnly, ViewMode::FalseIrradiance] {
+        let as_it_is = ViewSettings {
+            fixed_range: Some([0.0, 4.0]),
+            ..plain(mode)
+        };
+        let scaled = ViewSettings {
+            emission_scale: 3.0,
+            ..as_it_is.clone()
+        };
+        let (Some(a), Some(b)) = (
+            draw(&bright, &scene, &as_it_is),
+            draw(&dim, &scene, &scaled),
+        ) else {
+            return;
+        };
+        assert_near(left(&b.display), left(&a.display), "three times the light");
+    }
+}
+
+#[test]
+fn a_mesh_beyond_the_largest_buffer_is_one_sentence() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::ONE);
+    let small = Gpu {
+        max_buffer_size: 100,
+        ..gpu
+    };
+    let (said, picture) = draw_with(small, &scene, &snapshot, None, ViewMode::Radiance, false);
+    let error = said.expect_err("144 bytes of positions").to_string();
+    assert!(error.contains("smallest element area"), "{error}");
+    assert_eq!(left(&picture.expect("the background")), [0; 3]);
+}
+
+#[test]
+fn a_lost_device_is_one_sentence() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::ONE);
+    let (_, picture) = draw_with(gpu, &scene, &snapshot, None, ViewMode::Radiance, true);
+    let error = picture.expect_err("nothing is left").to_string();
+    assert!(error.starts_with("the graphics adapter"), "{error}");
+    assert!(!error.contains('\n'), "{error}");
+}
+
 #[test]
 fn a_picture_that_is_too_large_is_one_sentence() {
     let scene = scene();
     let snapshot = snapshot(&scene, Vec3::ONE);
     let view = plain(ViewMode::Radiance);
-    match headless::picture(&scene, &snapshot, &camera(), &view, [1_000_000, 2]) {
+    match headless::picture(&scene, &snapshot, None, &camera(), &view, [1_000_000, 2]) {
         Err(HeadlessError::NoAdapter(_)) => {}
         Err(error) => assert!(error.to_string().contains("too large"), "{error}"),
         Ok(_) => panic!("no adapter takes a million pixels on a side"),

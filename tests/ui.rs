@@ -327,6 +327,80 @@ fn reload_keeps_camera_and_settings() {
 }
 
 #[test]
+fn the_reference_measures_each_run_and_the_view_of_errors_is_offered() {
+    let mut harness = plates();
+    assert!(!ViewMode::offered(false).any(|mode| mode == ViewMode::Error));
+    harness.get_by_label("Trace reference").click();
+    harness.run_steps(2);
+    wait_for(&mut harness, |app| app.state.truth.newest_error().is_some());
+    harness.get_by_label("Relative RMS");
+    harness.get_by_label("Trimmed RMS against run time");
+    harness.get_by_label("Pause tracing");
+    // Another run of the same scene: the first stays for comparison until it is cleared.
+    let mut other = harness.state().state.settings.clone();
+    other.seed += 1;
+    perform(&mut harness, Action::Settings(other));
+    wait_for(&mut harness, |app| {
+        app.state.truth.runs.len() == 2
+            && matches!(app.state.run.status, RunStatus::Finished(_))
+            && app
+                .state
+                .truth
+                .newest_error()
+                .is_some_and(|(step, ..)| step == app.state.settings.max_steps)
+    });
+    let truth = &harness.state().state.truth;
+    assert!(truth.steps_of(&truth.runs[0]).next().is_some());
+    assert_eq!(
+        truth
+            .steps_of(&truth.runs[1])
+            .map(|(step, ..)| step)
+            .collect::<Vec<_>>(),
+        (1..=harness.state().state.settings.max_steps).collect::<Vec<_>>(),
+        "no step goes unmeasured"
+    );
+    harness.get_by_label("Forget earlier runs").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().state.truth.runs.len(), 1);
+    // Vertices are compared once they are looked at.
+    perform(&mut harness, Action::Mode(ViewMode::Error));
+    wait_for(&mut harness, |app| {
+        let snapshot = app.state.run.snapshot.as_ref().expect("there is light");
+        app.state.truth.vertex_errors(snapshot).is_some()
+    });
+    harness.get_by_label_contains("At each vertex");
+}
+
+#[test]
+fn a_reference_of_another_scene_is_dropped() {
+    let mut harness = plates();
+    perform(&mut harness, Action::TraceReference);
+    wait_for(&mut harness, |app| app.state.truth.newest_error().is_some());
+    perform(&mut harness, Action::Reload);
+    wait_for(&mut harness, |app| {
+        app.state.loading.is_none() && matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    assert!(!harness.state().state.truth.exists());
+    assert!(harness.state().state.truth.newest_error().is_none());
+    harness.get_by_label("Trace reference");
+}
+
+#[test]
+fn emission_is_scaled_at_once_and_reset() {
+    let mut harness = plates();
+    let range = |harness: &Harness<'static, App>| harness.state().state.false_color_range[1];
+    perform(&mut harness, Action::Mode(ViewMode::FalseIrradiance));
+    let before = range(&harness);
+    let exposure = harness.state().state.view.exposure;
+    perform(&mut harness, Action::EmissionScale(3.0));
+    assert!((range(&harness) / before - 3.0).abs() < 1e-4);
+    assert_eq!(harness.state().state.view.exposure, exposure);
+    harness.get_by_label("Reset emission scale").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().state.view.emission_scale, 1.0);
+}
+
+#[test]
 fn an_idle_window_asks_for_no_frames() {
     let mut harness = plates();
     // Ends only when nothing asks for another frame; a restless window exceeds the steps and panics.

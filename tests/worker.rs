@@ -16,7 +16,7 @@ use vecrad::{
     hierarchy::NodeId,
     scene::{Material, Scene, SceneBuilder, SceneOptions},
     solver::{Cancel, Inspection, Snapshot, SolveSettings, StepReport, Subject},
-    worker::{Effect, Event, Job, RunOptions, Stepper, StopReason, WorkerHandle},
+    worker::{Effect, Event, Generation, Job, RunOptions, Stepper, StopReason, WorkerHandle},
 };
 
 /// Longer than any machine needs for what is waited for; only a failing test waits so long.
@@ -171,6 +171,29 @@ fn wait_for_steps(script: &Script, count: usize) {
         assert!(begin.elapsed() < PATIENCE, "no step began");
         thread::sleep(Duration::from_millis(1));
     }
+}
+
+#[test]
+fn who_watches_sees_every_snapshot_of_every_run() {
+    let script = Arc::new(Script {
+        steps: 6,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let noted = seen.clone();
+    let watch = move |run: Generation, snapshot: &Arc<Snapshot>| {
+        noted.lock().unwrap().push((run.number(), snapshot.step));
+    };
+    worker.watch(Some(Arc::new(watch)));
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    let whole: Vec<(u64, u32)> = (0..=6).map(|step| (1, step)).collect();
+    assert_eq!(*seen.lock().unwrap(), whole);
+    worker.watch(None);
+    worker.reset();
+    wait_for(&worker, is_finished);
+    assert_eq!(seen.lock().unwrap().len(), 7, "nobody watched the second");
 }
 
 #[test]

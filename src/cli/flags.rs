@@ -131,6 +131,9 @@ pub struct RunFlags {
     /// Exposure in stops; by default 0 in files, and automatic in pictures and the window
     #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
     pub exposure: Option<f32>,
+    /// Multiply what all emitters emit, in files and pictures
+    #[arg(long, value_name = "FACTOR", value_parser = at_least_zero, default_value = "1", help_heading = "Output")]
+    pub emission_scale: f32,
     /// Tone curve of the byte colours
     #[arg(long, value_enum, default_value = "neutral", help_heading = "Output")]
     pub tonemap: ToneMapFlag,
@@ -160,6 +163,7 @@ impl RunFlags {
                 UpFlag::Y => UpAxis::Y,
                 UpFlag::Z => UpAxis::Z,
             },
+            emission_scale: self.emission_scale,
         }
     }
 }

@@ -4,7 +4,7 @@ use std::{path::PathBuf, str::FromStr, sync::Arc};
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{
     RunFlags, UsageError,
@@ -58,6 +58,14 @@ pub struct ViewFlags {
         help_heading = "Picture"
     )]
     pub camera_focal_point: Option<Point>,
+    /// What is up in the picture, instead of the scene's up axis
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        allow_hyphen_values = true,
+        help_heading = "Picture"
+    )]
+    pub camera_view_up: Option<Direction>,
     /// Vertical angle of view in degrees, 1 to 170
     #[arg(long, value_name = "DEGREES", help_heading = "Picture")]
     pub camera_view_angle: Option<f32>,
@@ -73,6 +81,7 @@ impl ViewFlags {
     pub fn view_settings(&self, run_flags: &RunFlags) -> ViewSettings {
         ViewSettings {
             mode: ViewMode::from_name(&self.view).unwrap_or_default(),
+            emission_scale: run_flags.emission_scale,
             exposure: run_flags.exposure.unwrap_or(0.0),
             auto_exposure: run_flags.exposure.is_none(),
             tone_map: match run_flags.tonemap {
@@ -99,9 +108,10 @@ impl ViewFlags {
             position: self.camera_position.map(|point| point.0),
             focal_point: self.camera_focal_point.map(|point| point.0),
             view_angle_degrees: self.camera_view_angle,
-            up: match up {
-                UpFlag::Y => UpAxis::Y,
-                UpFlag::Z => UpAxis::Z,
+            up: match (self.camera_view_up, up) {
+                (Some(direction), _) => Some(direction.0),
+                (None, UpFlag::Y) => Some(UpAxis::Y.vector()),
+                (None, UpFlag::Z) => Some(UpAxis::Z.vector()),
             },
         }
     }
@@ -144,12 +154,18 @@ impl PictureFlags {
         output::check(path)
     }
 
+    /// Whether a picture of the measured error is asked for.
+    pub fn shows_errors(&self) -> bool {
+        self.screenshot.is_some() && self.view.view == ViewMode::Error.name()
+    }
+
     /// Draw and write the picture, if one is asked for.
     pub fn write(
         &self,
         scene: &Arc<Scene>,
         builtin_name: Option<&str>,
         snapshot: &Snapshot,
+        errors: Option<&Arc<Vec<f32>>>,
         run_flags: &RunFlags,
         up: UpFlag,
     ) -> Result<()> {
@@ -166,7 +182,7 @@ impl PictureFlags {
         };
         let camera = self.view.camera(up).apply(opening, &scene.frame);
         let view = self.view.view_settings(run_flags);
-        let picture = headless::picture(scene, snapshot, &camera, &view, size)?;
+        let picture = headless::picture(scene, snapshot, errors, &camera, &view, size)?;
         picture
             .save(path)
             .with_context(|| format!("cannot write {}", path.display()))
@@ -184,6 +200,21 @@ impl FromStr for Point {
         numbers::<3>(text)
             .map(|numbers| Self(DVec3::from_array(numbers)))
             .ok_or_else(|| "expected three numbers such as 1,2,3".to_owned())
+    }
+}
+
+/// A direction of any length but 0, as a unit vector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction(pub Vec3);
+
+impl FromStr for Direction {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers::<3>(text)
+            .and_then(|numbers| DVec3::from_array(numbers).try_normalize())
+            .map(|direction| Self(direction.as_vec3()))
+            .ok_or_else(|| "expected a direction such as 0,0,1".to_owned())
     }
 }
 
@@ -245,5 +276,7 @@ mod tests {
             assert!(wrong.parse::<Size>().is_err(), "{wrong}");
         }
         assert!("3,1".parse::<Range>().is_err());
+        assert_eq!("0,-2,0".parse(), Ok(Direction(Vec3::NEG_Y)));
+        assert!("0,0,0".parse::<Direction>().is_err());
     }
 }

@@ -113,6 +113,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &scene,
         arguments.scene.as_deref(),
         &run.snapshot,
+        errors_of(arguments, &scene, &run, &errors, &interrupted).as_ref(),
         &arguments.run_flags,
         arguments.scene_flags.up,
     )?;
@@ -120,6 +121,28 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         StopReason::Converged => Outcome::Done,
         _ => Outcome::StoppedEarly,
     })
+}
+
+/// Errors at the vertices, where a picture is to show them.
+#[cfg(feature = "viewer")]
+fn errors_of(
+    arguments: &SolveArguments,
+    scene: &Scene,
+    run: &Run,
+    errors: &Errors,
+    interrupted: &AtomicBool,
+) -> Option<Arc<Vec<f32>>> {
+    let Some(Reference::Paths(samples)) = arguments.reference else {
+        return None;
+    };
+    if !arguments.picture.shows_errors() {
+        return None;
+    }
+    let measured = errors.lock().unwrap_or_else(PoisonError::into_inner);
+    let reference_rms = measured.last_key_value()?.1.reference_rms;
+    let paths = (samples, arguments.setting_flags.settings().seed);
+    let cancel = || interrupted.load(Ordering::Relaxed);
+    truth::vertex_errors(scene, &run.snapshot, paths, reference_rms, &cancel).map(Arc::new)
 }
 
 /// Refuse what cannot be written before the work begins.
@@ -135,7 +158,14 @@ fn check_outputs(arguments: &SolveArguments) -> Result<()> {
         output::check(path)?;
     }
     #[cfg(feature = "viewer")]
-    arguments.picture.check()?;
+    {
+        arguments.picture.check()?;
+        let has_paths = matches!(arguments.reference, Some(Reference::Paths(_)));
+        if arguments.picture.shows_errors() && !has_paths {
+            let message = "--view error compares with a reference: add --reference paths";
+            bail!(UsageError(message.to_owned()));
+        }
+    }
     arguments.report.as_deref().map_or(Ok(()), output::check)
 }
 

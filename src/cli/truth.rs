@@ -7,6 +7,8 @@ use std::{
 
 use glam::{Vec2, Vec3};
 
+#[cfg(feature = "viewer")]
+use crate::metrics::VertexReference;
 use crate::{
     geometry::{RayTree, low_discrepancy_2d, triangle_point},
     metrics::{ErrorMeasures, MeshLookup, measure_error},
@@ -107,6 +109,24 @@ impl Truth {
         let measured: Vec<Option<Vec3>> = found.chunks(count).map(mean).collect();
         measure_error(&measured, &self.points)
     }
+}
+
+/// Measured error at each vertex of a snapshot, in per cent of the reference's root mean square; `None` when cancelled.
+#[cfg(feature = "viewer")]
+pub(super) fn vertex_errors(
+    scene: &Scene,
+    snapshot: &Snapshot,
+    (samples, seed): (u32, u64),
+    reference_rms: f64,
+    cancel: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<f32>> {
+    let rays = RayTree::new(scene);
+    let mut reference = VertexReference::new(&snapshot.mesh, !seed);
+    // Noise cannot be told from fewer than two passes.
+    while reference.samples() < samples.max(2 * VertexReference::SAMPLES_PER_PASS) {
+        reference.advance(scene, &rays, cancel)?;
+    }
+    reference.errors(&snapshot.light, 0.01 * reference_rms)
 }
 
 /// A point that stands for a patch of the matrix.

@@ -34,12 +34,24 @@ impl UpAxis {
 }
 
 /// What an exported file says beside the numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlyOptions {
     /// How the byte colours are made.
     pub color: ColorOptions,
     /// The scene's up axis.
     pub up: UpAxis,
+    /// What all emission, and with it all light, is multiplied by.
+    pub emission_scale: f32,
+}
+
+impl Default for PlyOptions {
+    fn default() -> Self {
+        Self {
+            color: ColorOptions::default(),
+            up: UpAxis::default(),
+            emission_scale: 1.0,
+        }
+    }
 }
 
 /// Write the display mesh of a snapshot in world units.
@@ -57,9 +69,9 @@ pub fn write_ply(
     for (index, &position) in mesh.positions.iter().enumerate() {
         let irradiance = light.irradiance.get(index).copied().unwrap_or_default();
         debug_assert!(irradiance.is_finite() && irradiance.min_element() >= 0.0);
-        let irradiance = presentable(irradiance);
-        let radiance =
-            presentable(mesh.emission[index] + mesh.reflectance[index] * irradiance * FRAC_1_PI);
+        let irradiance = presentable(irradiance * options.emission_scale);
+        let emission = mesh.emission[index] * options.emission_scale;
+        let radiance = presentable(emission + mesh.reflectance[index] * irradiance * FRAC_1_PI);
         write_vector(out, frame.to_world(position).as_vec3())?;
         write_vector(out, mesh.normals[index])?;
         out.write_all(&options.color.encode(radiance))?;

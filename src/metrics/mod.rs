@@ -2,6 +2,8 @@
 
 mod error;
 mod lookup;
+mod vertex;
 
 pub use error::{ErrorMeasures, measure_error};
 pub use lookup::MeshLookup;
+pub use vertex::VertexReference;

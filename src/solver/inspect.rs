@@ -222,7 +222,7 @@ fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Li
         // Light within a cluster comes from everywhere alike.
         return chain_irradiance(kernel, receiver.index(), link, cluster.centroid, Vec3::ZERO);
     }
-    let incident = kernel.vector_irradiance(link.source, cluster.centroid, cluster.radius);
+    let incident = kernel.vector_irradiance(link.source, cluster.centroid);
     let moments = &kernel.tables.clusters[index];
     let area = cluster.area.max(f32::MIN_POSITIVE);
     // The shares that faces take by `Incident::on_face`, in the mean.

@@ -22,6 +22,10 @@ pub enum Action {
     PauseContinue,
     /// End the run.
     Stop,
+    /// Trace the reference, rest, or go on.
+    TraceReference,
+    /// Forget the errors of earlier runs.
+    ForgetRuns,
     /// Light the scene from the beginning.
     Reset,
     /// Put settings in force.
@@ -34,6 +38,8 @@ pub enum Action {
     Mode(ViewMode),
     /// Brighter or darker, in EV.
     ExposureBy(f32),
+    /// Multiply all emission by this.
+    EmissionScale(f32),
     /// Let the exposure follow the light.
     AutoExposure,
     /// The other tone map.

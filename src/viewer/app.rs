@@ -11,6 +11,7 @@ use std::{
         Arc,
         mpsc::{self, Receiver, Sender},
     },
+    time::Instant,
 };
 
 use eframe::egui;
@@ -20,7 +21,7 @@ use super::{
     bindings::{self, Binding},
     loader::SceneSource,
     panels,
-    saver::Notice,
+    saver::{Notice, Unfinished},
     session::Recent,
     start::{Faults, Options},
     state::State,
@@ -43,8 +44,10 @@ pub struct App {
     faults: Arc<Faults>,
     /// Files chosen in the dialog.
     chosen: (Sender<Option<PathBuf>>, Receiver<Option<PathBuf>>),
-    dialog_is_open: bool,
+    /// Since when the file dialog is open.
+    dialog_since: Option<Instant>,
     notices: (Sender<Notice>, Receiver<Notice>),
+    pictures: Unfinished,
     /// Set from the command line for the first scene only.
     first: Option<Options>,
     /// A new title for the window.
@@ -95,18 +98,28 @@ impl App {
             wake,
             faults,
             chosen: mpsc::channel(),
-            dialog_is_open: false,
+            dialog_since: None,
             notices: mpsc::channel(),
+            pictures: Unfinished::default(),
             first: None,
             title: None,
             keeps_view: false,
         };
-        app.state.rig.target.up = options.camera.up;
+        if let Some(up) = options.camera.up {
+            app.state.rig.target.up = up;
+        }
         if let Some(source) = options.source.clone() {
             app.load(source);
             app.first = Some(options);
         }
         Ok(app)
+    }
+}
+
+impl Drop for App {
+    fn drop(&mut self) {
+        // What was asked for is written, even when the window closes at once.
+        self.pictures.finish();
     }
 }
 

@@ -189,6 +189,12 @@ pub fn bindings() -> Vec<Binding> {
             Action::Stop,
         ),
         command(Key::R, Solve, "Begin again", Action::Reset),
+        plain(
+            Key::R,
+            Solve,
+            "Trace the reference, or rest",
+            Action::TraceReference,
+        ),
         command(Key::O, File, "Open…", Action::OpenDialog),
         plain(
             Key::F5,

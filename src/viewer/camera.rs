@@ -4,7 +4,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{Mat4, Vec2, Vec3, camera::rh};
+use glam::{Mat4, Quat, Vec2, Vec3, camera::rh};
 use serde::{Deserialize, Serialize};
 
 /// Which axis of the scene points up.
@@ -17,6 +17,16 @@ pub enum UpAxis {
     /// The habit of Blender and of CAD programs.
     #[serde(rename = "+Z")]
     Z,
+}
+
+impl UpAxis {
+    /// The axis as a unit vector.
+    pub const fn vector(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+        }
+    }
 }
 
 /// A direction to look from.
@@ -59,8 +69,8 @@ pub struct Camera {
     pub fov_y_radians: f32,
     /// Parallel instead of central projection.
     pub orthographic: bool,
-    /// Which axis is up.
-    pub up: UpAxis,
+    /// What is up: a unit vector, which the camera turns around.
+    pub up: Vec3,
 }
 
 impl Default for Camera {
@@ -72,14 +82,14 @@ impl Default for Camera {
             distance: 180.0,
             fov_y_radians: 45_f32.to_radians(),
             orthographic: false,
-            up: UpAxis::Y,
+            up: Vec3::Y,
         }
     }
 }
 
 impl Camera {
     /// A camera at a point that looks at another. Points that coincide look to the back from one unit away.
-    pub fn looking(eye: Vec3, target: Vec3, up: UpAxis) -> Self {
+    pub fn looking(eye: Vec3, target: Vec3, up: Vec3) -> Self {
         let camera = Self {
             up,
             ..Self::default()
@@ -98,18 +108,12 @@ impl Camera {
 
     /// Scene directions to directions with y up.
     fn to_y_up(self, v: Vec3) -> Vec3 {
-        match self.up {
-            UpAxis::Y => v,
-            UpAxis::Z => Vec3::new(v.x, v.z, -v.y),
-        }
+        Quat::from_rotation_arc(self.up, Vec3::Y) * v
     }
 
     /// Directions with y up to scene directions.
     fn to_scene(self, v: Vec3) -> Vec3 {
-        match self.up {
-            UpAxis::Y => v,
-            UpAxis::Z => Vec3::new(v.x, -v.z, v.y),
-        }
+        Quat::from_rotation_arc(self.up, Vec3::Y).inverse() * v
     }
 
     /// Unit vector from the pivot to the eye.
@@ -244,6 +248,7 @@ impl Camera {
     pub fn is_valid(&self) -> bool {
         let distance = MIN_DISTANCE..=MAX_DISTANCE;
         self.pivot.is_finite()
+            && self.up.is_normalized()
             && self.yaw.is_finite()
             && self.pitch.abs() <= FRAC_PI_2
             && distance.contains(&self.distance)
@@ -337,7 +342,7 @@ mod tests {
     #[test]
     fn ray_goes_through_the_point_of_the_picture() {
         let aspect = 1.7;
-        for up in [UpAxis::Y, UpAxis::Z] {
+        for up in [Vec3::Y, Vec3::Z] {
             for orthographic in [false, true] {
                 let camera = Camera {
                     up,
@@ -364,10 +369,13 @@ mod tests {
 
     #[test]
     fn looking_puts_the_eye_where_it_was_asked() {
-        for up in [UpAxis::Y, UpAxis::Z] {
+        let slanted = Vec3::new(1.0, -2.0, 0.5).normalize_or_zero();
+        for up in [Vec3::Y, Vec3::Z, Vec3::NEG_Y, slanted] {
             let (eye, target) = (Vec3::new(10.0, 20.0, 30.0), Vec3::new(-1.0, 2.0, 3.0));
             let camera = Camera::looking(eye, target, up);
             assert!((camera.eye() - eye).length() < 1e-3, "{}", camera.eye());
+            assert!(camera.right().dot(up).abs() < 1e-6, "the horizon is level");
+            assert!(camera.upward().dot(up) > 0.0);
         }
     }
 

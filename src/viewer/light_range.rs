@@ -19,7 +19,7 @@ pub fn luminance(color: Vec3) -> f32 {
     color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Exposure in EV that shows the reflected light well, or `None` while nothing is lit.
+/// Exposure in EV that shows the reflected light, as it was computed, well, or `None` while nothing is lit.
 pub fn auto_exposure(snapshot: &Snapshot) -> Option<f32> {
     let mut lit: Vec<f32> = sampled(snapshot)
         .map(|vertex| reflected(snapshot, vertex))
@@ -40,8 +40,12 @@ pub fn auto_exposure(snapshot: &Snapshot) -> Option<f32> {
     Some((exposure * 10.0).round() / 10.0)
 }
 
-/// Ends of the false colours of a mode: the fixed ones, or those of the light.
-pub fn false_color_range(snapshot: &Snapshot, view: &ViewSettings) -> [f32; 2] {
+/// Ends of the false colours of a mode: the fixed ones, or those of the light. `errors` are those at the vertices.
+pub fn false_color_range(
+    snapshot: &Snapshot,
+    view: &ViewSettings,
+    errors: Option<&[f32]>,
+) -> [f32; 2] {
     if let Some([low, high]) = view.fixed_range {
         return [low, high.max(low + f32::MIN_POSITIVE)];
     }
@@ -49,7 +53,13 @@ pub fn false_color_range(snapshot: &Snapshot, view: &ViewSettings) -> [f32; 2] {
         return [0.0, 1.0];
     }
     let mut values: Vec<f32> = sampled(snapshot)
-        .map(|vertex| value(snapshot, view.mode, vertex))
+        .map(|vertex| match view.mode {
+            ViewMode::Error => errors
+                .and_then(|errors| errors.get(vertex))
+                .copied()
+                .unwrap_or(0.0),
+            mode => value(snapshot, mode, vertex),
+        })
         .filter(|value| *value > DARKNESS)
         .collect();
     values.sort_by(f32::total_cmp);
@@ -60,8 +70,9 @@ pub fn false_color_range(snapshot: &Snapshot, view: &ViewSettings) -> [f32; 2] {
             [0.0, 1.0]
         };
     }
-    let high = quantile(&values, 0.99);
-    let low = quantile(&values, 0.01);
+    let factor = view.light_factor();
+    let high = quantile(&values, 0.99) * factor;
+    let low = quantile(&values, 0.01) * factor;
     if view.logarithmic {
         [low.min(0.5 * high), high]
     } else {

@@ -12,10 +12,7 @@ use std::{
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    camera::{Camera, UpAxis},
-    opening,
-};
+use super::{camera::Camera, opening};
 use crate::{
     geometry::RayTree,
     scene::{self, Scene, SceneOptions, builtin},
@@ -60,8 +57,8 @@ pub struct LoadedScene {
     pub source: SceneSource,
     /// The scene.
     pub scene: Arc<Scene>,
-    /// For picking.
-    pub rays: RayTree,
+    /// For picking, and for the reference.
+    pub rays: Arc<RayTree>,
     /// Lower corner in frame units.
     pub min: Vec3,
     /// Upper corner in frame units.
@@ -138,7 +135,7 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
         emitter_count: scene.surfaces.iter().filter(emits).count(),
-        rays,
+        rays: Arc::new(rays),
         scene: Arc::new(scene),
         source,
         min,
@@ -151,7 +148,7 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
 pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
     let eye = scene.frame.from_world(builtin.viewpoint.position);
     let target = scene.frame.from_world(builtin.viewpoint.target);
-    Camera::looking(eye, target, UpAxis::Y)
+    Camera::looking(eye, target, Vec3::Y)
 }
 
 /// Box around a scene in frame units.

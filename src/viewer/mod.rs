@@ -9,6 +9,7 @@ pub mod bindings;
 pub mod camera;
 pub mod cluster_lines;
 pub mod clusters;
+pub mod fonts;
 pub mod frame_time;
 pub mod inspection;
 pub mod light_range;
@@ -26,6 +27,7 @@ pub mod session;
 pub mod start;
 pub mod state;
 pub mod theme;
+pub mod truth;
 pub mod view;
 pub mod viewport;
 

@@ -31,6 +31,19 @@ pub struct Probe {
     pub uncertainty: f32,
 }
 
+impl Probe {
+    /// The same under emitters this many times as bright.
+    pub fn scaled(self, factor: f32) -> Self {
+        Self {
+            irradiance: self.irradiance * factor,
+            direct: self.direct * factor,
+            radiance: self.radiance * factor,
+            uncertainty: self.uncertainty * factor,
+            ..self
+        }
+    }
+}
+
 /// Luminance of the irradiance over an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjectLight {

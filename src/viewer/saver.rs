@@ -2,8 +2,8 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::mpsc::Sender,
-    thread,
+    sync::{Arc, Mutex, PoisonError, mpsc::Sender},
+    thread::{self, JoinHandle},
 };
 
 use image::{DynamicImage, Rgb32FImage, RgbaImage};
@@ -13,6 +13,27 @@ use crate::worker::Wake;
 
 /// A sentence from another thread.
 pub type Notice = (Severity, String);
+
+/// Threads that write pictures; the program stays until they are done.
+#[derive(Clone, Default)]
+pub struct Unfinished(Arc<Mutex<Vec<JoinHandle<()>>>>);
+
+impl Unfinished {
+    fn add(&self, thread: JoinHandle<()>) {
+        let mut threads = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        threads.retain(|thread| !thread.is_finished());
+        threads.push(thread);
+    }
+
+    /// Wait for all of them.
+    pub fn finish(&self) {
+        let threads = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
+        for thread in threads {
+            // A panic of the thread has been printed.
+            let _ = thread.join();
+        }
+    }
+}
 
 /// A picture on its way to a file.
 pub struct Saving {
@@ -26,7 +47,7 @@ pub struct Saving {
 
 impl Saving {
     /// Write it, and say how that went.
-    pub fn start(self, notices: Sender<Notice>, wake: Wake) {
+    pub fn start(self, notices: Sender<Notice>, unfinished: &Unfinished, wake: Wake) {
         let failed = notices.clone();
         let spawned = thread::Builder::new()
             .name("picture".to_owned())
@@ -35,8 +56,12 @@ impl Saving {
                 let _ = notices.send(self.write());
                 wake();
             });
-        if let Err(error) = spawned {
-            let _ = failed.send((Severity::Error, format!("cannot save the picture: {error}")));
+        match spawned {
+            Ok(thread) => unfinished.add(thread),
+            Err(error) => {
+                let text = format!("cannot save the picture: {error}");
+                let _ = failed.send((Severity::Error, text));
+            }
         }
     }
 

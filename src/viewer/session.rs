@@ -8,11 +8,7 @@ use std::{
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    camera::{Camera, UpAxis},
-    loader::SceneSource,
-    view::ViewSettings,
-};
+use super::{camera::Camera, loader::SceneSource, view::ViewSettings};
 use crate::{scene::Frame, solver::SolveSettings};
 
 /// Scenes that the menu remembers.
@@ -45,8 +41,13 @@ struct SavedCamera {
     view_angle_degrees: f32,
     #[serde(default)]
     parallel: bool,
-    #[serde(default)]
-    up: UpAxis,
+    #[serde(default = "y_up")]
+    view_up: [f32; 3],
+}
+
+/// Of sidecars that say nothing.
+fn y_up() -> [f32; 3] {
+    Vec3::Y.to_array()
 }
 
 /// The sidecar file.
@@ -84,7 +85,7 @@ pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
             focal_point: frame.to_world(camera.pivot).to_array(),
             view_angle_degrees: camera.fov_y_radians.to_degrees(),
             parallel: camera.orthographic,
-            up: camera.up,
+            view_up: camera.up.to_array(),
         }),
         view: session.view.clone(),
         settings: session.settings.clone(),
@@ -102,7 +103,7 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
         ..Camera::looking(
             in_frame(camera.position),
             in_frame(camera.focal_point),
-            camera.up,
+            Vec3::from_array(camera.view_up).normalize_or(Vec3::Y),
         )
     });
     Ok(Session {
@@ -148,7 +149,7 @@ mod tests {
             camera: Some(Camera::looking(
                 Vec3::new(10.0, 20.0, 30.0),
                 Vec3::new(1.0, 0.0, -2.0),
-                UpAxis::Z,
+                Vec3::new(0.0, -0.6, 0.8),
             )),
             view: ViewSettings {
                 exposure: 1.5,
@@ -163,6 +164,7 @@ mod tests {
         assert_eq!(read.settings, session.settings);
         let (was, is) = (session.camera.expect("set"), read.camera.expect("valid"));
         assert!((was.eye() - is.eye()).length() < 1e-3);
+        assert!((was.up - is.up).length() < 1e-6);
         assert!((was.pivot - is.pivot).length() < 1e-3);
     }
 

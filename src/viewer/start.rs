@@ -6,13 +6,10 @@ use std::sync::{
 };
 
 use eframe::{egui, egui_wgpu};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{
-    app::App,
-    camera::{Camera, UpAxis},
-    loader::SceneSource,
-    render::Gpu,
+    app::App, camera::Camera, fonts::SystemFonts, loader::SceneSource, render::Gpu,
     view::ViewSettings,
 };
 use crate::{
@@ -49,19 +46,20 @@ pub struct CameraRequest {
     pub focal_point: Option<DVec3>,
     /// Vertical angle of view in degrees.
     pub view_angle_degrees: Option<f32>,
-    /// Which axis is up.
-    pub up: UpAxis,
+    /// What is up; by default as it was.
+    pub up: Option<Vec3>,
 }
 
 impl CameraRequest {
     /// A camera with what was asked for put in.
     pub fn apply(&self, camera: Camera, frame: &Frame) -> Camera {
         let mut camera = camera;
-        if self.up != camera.up {
+        if let Some(up) = self.up.filter(|up| *up != camera.up) {
             let (eye, pivot) = (camera.eye(), camera.pivot);
             camera = Camera {
                 fov_y_radians: camera.fov_y_radians,
-                ..Camera::looking(eye, pivot, self.up)
+                orthographic: camera.orthographic,
+                ..Camera::looking(eye, pivot, up)
             };
         }
         if self.position.is_some() || self.focal_point.is_some() {
@@ -117,7 +115,11 @@ pub fn run(options: Options) -> Result<(), ViewerError> {
     let ended = eframe::run_native(
         "vecrad",
         native_options(&title),
-        Box::new(move |cc| Ok(Box::new(App::new(cc, options, app_faults)?))),
+        Box::new(move |cc| {
+            cc.egui_ctx
+                .add_font_provider(Arc::new(SystemFonts::default()));
+            Ok(Box::new(App::new(cc, options, app_faults)?))
+        }),
     );
     if let Some(reason) = faults.lost.get() {
         return Err(ViewerError::DeviceLost(reason.clone()));
@@ -137,6 +139,7 @@ fn native_options(title: &str) -> eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title(title)
             .with_app_id("vecrad")
+            .with_icon(icon())
             .with_inner_size([1360.0, 860.0])
             .with_min_inner_size([720.0, 480.0])
             .with_drag_and_drop(true),
@@ -145,8 +148,16 @@ fn native_options(title: &str) -> eframe::NativeOptions {
             ..Default::default()
         },
         persist_window: true,
+        // Our own looks for fonts.
+        system_font_fallback: false,
         ..Default::default()
     }
+}
+
+/// The icon of the window: an empty one where the picture cannot be read.
+fn icon() -> egui::IconData {
+    let picture = include_bytes!("../../assets/vecrad.png");
+    eframe::icon_data::from_png_bytes(picture).unwrap_or_default()
 }
 
 /// One sentence for what eframe says.

@@ -10,6 +10,7 @@ use super::{
     loader::{LoadedScene, Loader},
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
+    truth::Truth,
     view::ViewSettings,
 };
 use crate::{
@@ -238,6 +239,8 @@ pub struct State {
     pub loading: Option<Loader>,
     /// The run.
     pub run: Run,
+    /// The reference that light is measured by.
+    pub truth: Truth,
     /// Settings in force.
     pub settings: SolveSettings,
     /// Limits in force.

@@ -32,11 +32,13 @@ pub enum ViewMode {
     FalseRadiance,
     /// Estimated error of irradiance, in false colour.
     Uncertainty,
+    /// Measured error of radiance against the reference, in false colour.
+    Error,
 }
 
 impl ViewMode {
     /// All modes in the order of their keys.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Radiance,
         Self::LightOnly,
         Self::DirectOnly,
@@ -47,7 +49,15 @@ impl ViewMode {
         Self::FalseIrradiance,
         Self::FalseRadiance,
         Self::Uncertainty,
+        Self::Error,
     ];
+
+    /// The modes that can be shown, with or without a reference.
+    pub fn offered(has_reference: bool) -> impl Iterator<Item = Self> {
+        Self::ALL
+            .into_iter()
+            .filter(move |mode| has_reference || *mode != Self::Error)
+    }
 
     /// Label in menus.
     pub fn label(self) -> &'static str {
@@ -62,6 +72,7 @@ impl ViewMode {
             Self::FalseIrradiance => "False colour: irradiance",
             Self::FalseRadiance => "False colour: radiance",
             Self::Uncertainty => "Uncertainty",
+            Self::Error => "Measured error",
         }
     }
 
@@ -78,6 +89,9 @@ impl ViewMode {
             Self::FalseIrradiance => "Luminance of the irradiance in W/m², as false colour.",
             Self::FalseRadiance => "Luminance of the radiance in W/(sr·m²), as false colour.",
             Self::Uncertainty => "Estimated error of the irradiance in W/m², as false colour.",
+            Self::Error => {
+                "Difference of radiance from the path-traced reference, in per cent of its root mean square."
+            }
         }
     }
 
@@ -93,7 +107,8 @@ impl ViewMode {
             Self::FaceOrientation => "orientation",
             Self::FalseIrradiance => "false-irradiance",
             Self::FalseRadiance => "false-radiance",
-            Self::Uncertainty => "error",
+            Self::Uncertainty => "uncertainty",
+            Self::Error => "error",
         }
     }
 
@@ -112,6 +127,7 @@ impl ViewMode {
         match self {
             Self::FalseIrradiance | Self::Uncertainty => Some("W/m²"),
             Self::FalseRadiance => Some("W/(sr·m²)"),
+            Self::Error => Some("% of RMS"),
             _ => None,
         }
     }
@@ -142,6 +158,9 @@ pub enum ToneMap {
 pub struct ViewSettings {
     /// What the surfaces show.
     pub mode: ViewMode,
+    /// What all emission, and with it all light, is multiplied by. Light is linear in emission, so this is exact and
+    /// nothing is computed anew.
+    pub emission_scale: f32,
     /// Exposure in EV: radiance is multiplied by 2^EV. Kept within [`ViewSettings::EXPOSURE_RANGE`].
     pub exposure: f32,
     /// Whether the exposure follows the light.
@@ -168,7 +187,18 @@ impl ViewSettings {
     /// Exposures beyond this leave the range of the picture's half floats.
     pub const EXPOSURE_RANGE: std::ops::RangeInclusive<f32> = -20.0..=20.0;
 
-    /// What radiance is multiplied by.
+    /// What a mode's quantity is multiplied by, before exposure.
+    pub fn light_factor(&self) -> f32 {
+        match self.mode {
+            ViewMode::FalseIrradiance | ViewMode::FalseRadiance | ViewMode::Uncertainty => {
+                self.emission_scale
+            }
+            mode if mode.is_light() => self.emission_scale,
+            _ => 1.0,
+        }
+    }
+
+    /// What radiance is multiplied by to be exposed.
     pub fn exposure_factor(&self) -> f32 {
         self.exposure
             .clamp(*Self::EXPOSURE_RANGE.start(), *Self::EXPOSURE_RANGE.end())
@@ -180,6 +210,7 @@ impl Default for ViewSettings {
     fn default() -> Self {
         Self {
             mode: ViewMode::Radiance,
+            emission_scale: 1.0,
             exposure: 0.0,
             auto_exposure: true,
             tone_map: ToneMap::Neutral,

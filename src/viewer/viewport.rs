@@ -16,7 +16,7 @@ use super::{
     render::{Gpu, Overlay, Picture, RenderError, Renderer, Target},
     state::{Severity, State},
     theme,
-    view::ViewSettings,
+    view::{ViewMode, ViewSettings},
 };
 use crate::{
     scene::Scene,
@@ -39,6 +39,7 @@ struct PictureKey {
     scene: Arc<Scene>,
     mesh: Arc<DisplayMesh>,
     light: Arc<VertexLight>,
+    errors: Option<Arc<Vec<f32>>>,
     overlay: Overlay,
     camera: Camera,
     view: ViewSettings,
@@ -53,6 +54,7 @@ impl PartialEq for PictureKey {
         Arc::ptr_eq(&self.scene, &other.scene)
             && Arc::ptr_eq(&self.mesh, &other.mesh)
             && Arc::ptr_eq(&self.light, &other.light)
+            && self.errors.as_ref().map(Arc::as_ptr) == other.errors.as_ref().map(Arc::as_ptr)
             && Arc::ptr_eq(&self.overlay.boxes, &other.overlay.boxes)
             && Arc::ptr_eq(&self.overlay.segments, &other.overlay.segments)
             && self.camera == other.camera
@@ -150,6 +152,9 @@ impl Viewport {
             scene: loaded.scene.clone(),
             mesh: snapshot.mesh.clone(),
             light: snapshot.light.clone(),
+            errors: (state.view.mode == ViewMode::Error)
+                .then(|| state.truth.vertex_errors(snapshot).cloned())
+                .flatten(),
             overlay,
             camera: state.rig.current,
             view: state.view.clone(),
@@ -194,6 +199,7 @@ fn picture(key: &PictureKey, pixels_per_point: f32) -> Picture<'_> {
         scene: &key.scene,
         mesh: &key.mesh,
         light: &key.light,
+        errors: key.errors.as_ref(),
         camera: &key.camera,
         view: &key.view,
         is_unlit: key.is_unlit,

@@ -15,6 +15,11 @@ use crate::{
 pub struct Generation(u64);
 
 impl Generation {
+    /// Counts from 1 with the first run.
+    pub fn number(self) -> u64 {
+        self.0
+    }
+
     /// The run after this one.
     pub(super) fn next(self) -> Self {
         Self(self.0 + 1)

@@ -12,12 +12,13 @@ mod outbox;
 mod run;
 mod slot;
 mod stepper;
+mod truth;
 mod visit;
 
 use std::{
     io,
     sync::{
-        Arc,
+        Arc, Mutex, PoisonError,
         mpsc::{self, Receiver, Sender},
     },
     thread::{self, JoinHandle},
@@ -28,6 +29,7 @@ pub use effect::{Effect, effect_of_change};
 pub use message::{Event, Generation, RunOptions, StopReason};
 pub use slot::Slot;
 pub use stepper::{Job, MakeStepper, Stepper};
+pub use truth::{MeasuredStep, SAMPLE_GOAL, TruthHandle, TruthProgress, VertexErrors};
 
 use crate::{
     scene::Scene,
@@ -40,11 +42,18 @@ use outbox::Outbox;
 /// Called from the worker whenever there is something new to see, such as a request to repaint.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
+/// Called with every snapshot, before a newer one can replace it. Must not take long: the solve waits.
+pub type Watch = Arc<dyn Fn(Generation, &Arc<Snapshot>) + Send + Sync>;
+
+/// Where owner and worker keep the one who watches.
+type WatchCell = Arc<Mutex<Option<Watch>>>;
+
 /// The owner's end of the worker. Dropping it cancels the step under way and joins the thread.
 pub struct WorkerHandle {
     inbox: Sender<Message>,
     events: Receiver<(Generation, Event)>,
     slot: Arc<Slot<Snapshot>>,
+    watch: WatchCell,
     generation: Generation,
     settings: SolveSettings,
     thread: Option<JoinHandle<()>>,
@@ -72,7 +81,8 @@ impl WorkerHandle {
         let (inbox, messages) = mpsc::channel();
         let (events_in, events) = mpsc::channel();
         let slot = Arc::new(Slot::default());
-        let outbox = Outbox::new(events_in, slot.clone(), wake);
+        let watch = WatchCell::default();
+        let outbox = Outbox::new(events_in, slot.clone(), watch.clone(), wake);
         let controller = Controller::new(messages, inbox.clone(), outbox, make);
         let thread = thread::Builder::new()
             .name("worker".to_owned())
@@ -81,6 +91,7 @@ impl WorkerHandle {
             inbox,
             events,
             slot,
+            watch,
             generation: Generation::default(),
             settings: SolveSettings::default(),
             thread: Some(thread),
@@ -160,6 +171,11 @@ impl WorkerHandle {
             generation: self.generation,
             subjects,
         });
+    }
+
+    /// Hand every snapshot from here on to `watch`, too; the slot keeps only the newest.
+    pub fn watch(&self, watch: Option<Watch>) {
+        *self.watch.lock().unwrap_or_else(PoisonError::into_inner) = watch;
     }
 
     /// The settings in force.

@@ -1,30 +1,43 @@
 //! The way out of the worker.
 
-use std::sync::{Arc, mpsc::Sender};
+use std::sync::{Arc, PoisonError, mpsc::Sender};
 
-use super::{Event, Generation, Slot, Wake};
+use super::{Event, Generation, Slot, Wake, WatchCell};
 use crate::solver::Snapshot;
 
 /// Where events and snapshots leave.
 pub(super) struct Outbox {
     events: Sender<(Generation, Event)>,
     slot: Arc<Slot<Snapshot>>,
+    watch: WatchCell,
     wake: Wake,
 }
 
 impl Outbox {
-    /// Events into a channel, snapshots into a slot, and a call to `wake` for each event.
+    /// Events into a channel, snapshots into a slot and to who watches, and a call to `wake` for each event.
     pub(super) fn new(
         events: Sender<(Generation, Event)>,
         slot: Arc<Slot<Snapshot>>,
+        watch: WatchCell,
         wake: Wake,
     ) -> Self {
-        Self { events, slot, wake }
+        Self {
+            events,
+            slot,
+            watch,
+            wake,
+        }
     }
 
-    /// Put a snapshot into the slot.
+    /// Put a snapshot into the slot, and show it to who watches.
     pub(super) fn publish(&self, generation: Generation, snapshot: Snapshot) {
-        self.slot.publish(generation, Arc::new(snapshot));
+        let snapshot = Arc::new(snapshot);
+        let watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(watch) = watch.as_ref() {
+            watch(generation, &snapshot);
+        }
+        drop(watch);
+        self.slot.publish(generation, snapshot);
     }
 
     /// Send an event, and wake the owner.

@@ -104,7 +104,7 @@ impl Errand {
 }
 
 /// The text of a panic.
-fn describe(panic: &(dyn Any + Send)) -> String {
+pub(super) fn describe(panic: &(dyn Any + Send)) -> String {
     panic
         .downcast_ref::<String>()
         .map(String::as_str)

@@ -9,7 +9,7 @@ use super::{
         navigation::Picked,
         pick, saver,
         session::Recent,
-        state::{RunStatus, Selection},
+        state::{RunStatus, Selection, Severity},
     },
     App,
 };
@@ -47,6 +47,8 @@ impl App {
                 self.state.scene_options.sides = sides;
                 self.reload();
             }
+            Action::TraceReference => self.trace_reference(),
+            Action::ForgetRuns => self.state.truth.forget_earlier(),
             Action::FrameSelected => self.frame_selected(),
             Action::SelectCluster(index) => self.state.cluster = Some(index),
             Action::ClearSelection => self.clear_selection(),
@@ -82,6 +84,7 @@ impl App {
                 state.view.exposure += *step;
                 state.view.auto_exposure = false;
             }
+            Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
             Action::AutoExposure => state.view.auto_exposure = true,
             Action::ToggleToneMap => {
                 use crate::viewer::view::ToneMap;
@@ -108,8 +111,8 @@ impl App {
                 state.rig.current.orthographic = state.rig.target.orthographic;
             }
             Action::Up(up) => {
-                state.rig.target.up = *up;
-                state.rig.current.up = *up;
+                state.rig.target.up = up.vector();
+                state.rig.current.up = up.vector();
             }
             Action::TogglePanels => state.panels.shown = !state.panels.shown,
             Action::ToggleHelp => state.panels.help = !state.panels.help,
@@ -132,6 +135,29 @@ impl App {
             self.worker.stop();
         } else {
             self.clear_selection();
+        }
+    }
+
+    /// Trace the reference, rest, or go on.
+    pub(super) fn trace_reference(&mut self) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let (wake, seed) = (self.wake.clone(), self.state.settings.seed);
+        let truth = &mut self.state.truth;
+        if truth.exists() && truth.progress.failed.is_none() {
+            truth.toggle();
+            return;
+        }
+        // Light of a run before the present one would be measured as the present one's.
+        let run = &self.state.run;
+        let shown = run.snapshot.as_ref().filter(|_| !run.reports.is_empty());
+        match truth.start(loaded, seed, shown, wake) {
+            Ok(watch) => self.worker.watch(Some(watch)),
+            Err(error) => {
+                let text = format!("cannot start a thread: {error}");
+                self.state.messages.push(Severity::Error, text);
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! What arrives between frames: chosen files, notices, a scene that was read, events and light of the worker.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use super::{
     super::{
@@ -13,18 +13,17 @@ use super::{
 };
 use crate::worker::Event;
 
+/// A dialog that is gone sooner than this was never seen. Longer, and a quick cancel is taken for a failure.
+const SOONEST_CANCEL: Duration = Duration::from_millis(1500);
+
 impl App {
     /// Take note of everything that arrived since the last frame.
     pub(super) fn drain(&mut self) {
         while let Ok(chosen) = self.chosen.1.try_recv() {
-            self.dialog_is_open = false;
+            let opened = self.dialog_since.take();
             match chosen {
                 Some(path) => self.load(SceneSource::File(path)),
-                // A dialog that fails cannot be told from one that was cancelled.
-                None => self.state.messages.push(
-                    Severity::Note,
-                    "no file was chosen; if no dialog appeared, use File, Open by path",
-                ),
+                None => self.no_file(opened.is_some_and(|since| since.elapsed() < SOONEST_CANCEL)),
             }
         }
         while let Ok((severity, text)) = self.notices.1.try_recv() {
@@ -43,30 +42,46 @@ impl App {
         self.drain_worker();
     }
 
+    /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by its haste.
+    fn no_file(&mut self, is_hasty: bool) {
+        let text = if is_hasty {
+            self.state.panels.path = true;
+            "this desktop has no file dialog; type the path instead"
+        } else {
+            "no file was chosen"
+        };
+        self.state.messages.push(Severity::Note, text);
+    }
+
     fn drain_worker(&mut self) {
+        let run = self.worker.generation().number();
         for event in self.worker.events() {
+            let state = &mut self.state;
             match &event {
-                Event::Started => self.state.inspections.close(),
-                Event::Prepared { .. } => self.state.inspections.open(),
+                Event::Started => state.inspections.close(),
+                Event::Prepared { .. } => state.inspections.open(),
                 Event::Inspected(inspection) => {
-                    self.state.inspections.note(inspection.clone());
-                    self.state.correct_cluster();
+                    state.inspections.note(inspection.clone());
+                    state.correct_cluster();
                 }
                 _ => {}
             }
-            self.state.run.note(event);
+            state.truth.note(&event, run, &state.settings);
+            state.run.note(event);
         }
-        let Some(latest) = self.worker.latest() else {
-            return;
-        };
-        let is_known = self
+        let held = &self.state.run.snapshot;
+        let is_known =
+            |latest: &Arc<_>| held.as_ref().is_some_and(|held| Arc::ptr_eq(held, latest));
+        let newer = self.worker.latest().filter(|latest| !is_known(latest));
+        let has_light = newer.is_some();
+        if has_light {
+            self.state.run.snapshot = newer;
+        }
+        let has_errors = self
             .state
-            .run
-            .snapshot
-            .as_ref()
-            .is_some_and(|held| Arc::ptr_eq(held, &latest));
-        if !is_known {
-            self.state.run.snapshot = Some(latest);
+            .truth
+            .exchange(&self.state.run, self.state.view.mode);
+        if has_light || has_errors {
             self.follow_light();
         }
     }
@@ -89,7 +104,14 @@ impl App {
         {
             self.state.view.exposure = exposure;
         }
-        self.state.false_color_range = light_range::false_color_range(snapshot, &self.state.view);
+        self.state.false_color_range = light_range::false_color_range(
+            snapshot,
+            &self.state.view,
+            self.state
+                .truth
+                .vertex_errors(snapshot)
+                .map(|errors| errors.as_slice()),
+        );
         self.state
             .cluster_counts
             .update(&snapshot.clusters, &self.state.view.clusters);

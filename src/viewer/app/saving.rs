@@ -24,6 +24,7 @@ impl App {
     pub(super) fn save_window(&mut self, ctx: &egui::Context) {
         let path = saver::free_path(&self.scene_name());
         let (sender, wake) = (self.notices.0.clone(), self.wake.clone());
+        let pictures = self.pictures.clone();
         ctx.request_screenshot(move |seen| {
             let [width, height] = seen.size.map(|side| side as u32);
             let bytes: Vec<u8> = seen
@@ -37,7 +38,7 @@ impl App {
                     display,
                     radiance: None,
                 };
-                saving.start(sender, wake);
+                saving.start(sender, &pictures, wake);
             }
         });
     }
@@ -55,7 +56,7 @@ impl App {
                     display,
                     radiance,
                 };
-                saving.start(self.notices.0.clone(), self.wake.clone());
+                saving.start(self.notices.0.clone(), &self.pictures, self.wake.clone());
             }
             Err(error) => self.state.messages.push(Severity::Error, error),
         }

@@ -1,6 +1,6 @@
 //! Scenes: read, shown, read again; the file dialog.
 
-use std::{sync::Arc, thread};
+use std::{sync::Arc, thread, time::Instant};
 
 use super::{
     super::{
@@ -8,6 +8,8 @@ use super::{
         session,
         start::{self, CameraRequest},
         state::Severity,
+        truth::Truth,
+        view::ViewMode,
     },
     App,
 };
@@ -50,12 +52,18 @@ impl App {
         self.state.inspections.close();
         self.state.run.snapshot = None;
         self.state.run.last_effect = None;
+        self.worker.watch(None);
+        self.state.truth = Truth::default();
         self.worker.start(
             loaded.scene.clone(),
             self.state.settings.clone(),
             self.state.options.clone(),
         );
         self.state.loaded = Some(Arc::new(loaded));
+        // The view of errors is nothing without a reference.
+        if self.state.view.mode == ViewMode::Error {
+            self.trace_reference();
+        }
     }
 
     /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
@@ -65,7 +73,7 @@ impl App {
         if loaded.source.path().is_some() {
             // The axis chosen before holds for the next file, too; built-in scenes know theirs.
             let chosen = CameraRequest {
-                up: self.state.rig.target.up,
+                up: Some(self.state.rig.target.up),
                 ..CameraRequest::default()
             };
             camera = chosen.apply(camera, frame);
@@ -104,7 +112,9 @@ impl App {
     }
 
     pub(super) fn open_dialog(&mut self) {
-        if self.dialog_is_open {
+        if self.dialog_since.is_some() {
+            // It may hang without having been seen.
+            self.state.panels.path = true;
             return;
         }
         let (sender, wake) = (self.chosen.0.clone(), self.wake.clone());
@@ -120,6 +130,6 @@ impl App {
                 let _ = sender.send(file);
                 wake();
             });
-        self.dialog_is_open = spawned.is_ok();
+        self.dialog_since = spawned.is_ok().then(Instant::now);
     }
 }

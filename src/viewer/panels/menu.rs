@@ -29,6 +29,14 @@ pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions:
             );
             item(ui, table, actions, "Stop", Action::Stop);
             item(ui, table, actions, "Begin again", Action::Reset);
+            ui.separator();
+            item(
+                ui,
+                table,
+                actions,
+                "Trace reference",
+                Action::TraceReference,
+            );
         });
         ui.menu_button("Help", |ui| {
             item(ui, table, actions, "Keys and mouse", Action::ToggleHelp);
@@ -93,7 +101,7 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
 }
 
 fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
-    for mode in ViewMode::ALL {
+    for mode in ViewMode::offered(state.truth.exists()) {
         let action = Action::Mode(mode);
         let keys = hint(table, &action);
         let button =
@@ -167,7 +175,7 @@ fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mu
     );
     ui.separator();
     for (label, up) in [("Y is up", UpAxis::Y), ("Z is up", UpAxis::Z)] {
-        let button = egui::Button::selectable(state.rig.target.up == up, label)
+        let button = egui::Button::selectable(state.rig.target.up == up.vector(), label)
             .shortcut_text(hint(table, &Action::Up(up)));
         if ui.add(button).clicked() {
             actions.push(Action::Up(up));

@@ -30,7 +30,7 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         .allow_zoom(false)
         .allow_drag(false)
         .show_axes([true, true])
-        .x_axis_label("seconds")
+        .x_axis_formatter(|mark, _| run_time(mark.value))
         .y_axis_formatter(|mark, _| {
             let whole = (mark.value - mark.value.round()).abs() < 1e-6;
             if whole {
@@ -44,4 +44,9 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
             plot.line(line("Residual", |report| report.residual).color(theme::axis_color(2)));
             plot.line(line("Error bound", |report| report.estimated_error).color(theme::SELECTED));
         });
+}
+
+/// A mark on an axis of run time. Marks are round numbers but for their rounding.
+pub(super) fn run_time(seconds: f64) -> String {
+    format!("{} s", (1000.0 * seconds).round() / 1000.0)
 }

@@ -44,11 +44,15 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             row::figure(
                 ui,
                 "Emission",
-                format!("{} W/(sr·m²)", rgb(surface.emission)),
+                format!(
+                    "{} W/(sr·m²)",
+                    rgb(surface.emission * state.view.emission_scale)
+                ),
                 "Emitted radiance",
             );
         }
-        if let Some(probe) = &selection.probe {
+        let scale = state.view.emission_scale;
+        if let Some(probe) = selection.probe.map(|probe| probe.scaled(scale)) {
             row::figure(
                 ui,
                 "Element",
@@ -170,6 +174,7 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
         return;
     };
     let light = selection.object_light;
+    let scale = state.view.emission_scale;
     let area = loaded.scene.frame.area_to_world(f64::from(light.area));
     let name = if object.name.is_empty() {
         "whole scene"
@@ -185,9 +190,9 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
             "Irradiance",
             format!(
                 "{} … {} … {}",
-                figure(f64::from(light.min)),
-                figure(f64::from(light.mean)),
-                figure(f64::from(light.max))
+                figure(f64::from(light.min * scale)),
+                figure(f64::from(light.mean * scale)),
+                figure(f64::from(light.max * scale))
             ),
             "Smallest, mean and largest luminance over the object, in W/m²",
         );

@@ -11,6 +11,7 @@ use crate::{
         loader::SceneSource,
         state::{Severity, State},
         theme,
+        view::ViewMode,
     },
 };
 
@@ -61,6 +62,7 @@ pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
         (_, Some(loaded)) if state.run.snapshot.is_none() && state.run.status.is_busy() => {
             format!("Building the clusters of {}…", loaded.source.label())
         }
+        (_, Some(_)) if lacks_errors(state) => "Tracing the reference at the vertices…".to_owned(),
         _ => return,
     };
     ui.painter().text(
@@ -70,6 +72,13 @@ pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
         egui::FontId::proportional(15.0),
         theme::secondary_text(ui.visuals()),
     );
+}
+
+/// Whether errors are to be shown that are not known yet.
+fn lacks_errors(state: &State) -> bool {
+    let snapshot = state.run.snapshot.as_ref();
+    state.view.mode == ViewMode::Error
+        && snapshot.is_some_and(|snapshot| state.truth.vertex_errors(snapshot).is_none())
 }
 
 /// A field for a path, for when there is no file dialog.

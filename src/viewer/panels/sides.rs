@@ -2,7 +2,9 @@
 
 use eframe::egui;
 
-use super::{clusters, links, messages, plot, probe, progress, row, settings, statistics};
+use super::{
+    clusters, emission, error, links, messages, plot, probe, progress, row, settings, statistics,
+};
 use crate::viewer::{action::Action, state::State};
 
 /// Show the light's panel on the left and the look's on the right; wishes go into `actions`.
@@ -21,6 +23,7 @@ pub fn side_panels(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
                     });
                     row::section(ui, "Settings", true, |ui| {
                         settings::settings_ui(ui, state, actions);
+                        emission::emission_ui(ui, state, actions);
                     });
                 });
         });
@@ -44,6 +47,9 @@ pub fn side_panels(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
                     });
                     row::section(ui, "Convergence", true, |ui| {
                         plot::plot_ui(ui, state);
+                    });
+                    row::section(ui, "Measured error", true, |ui| {
+                        error::error_ui(ui, state, actions);
                     });
                     row::section(ui, "Statistics", false, |ui| {
                         statistics::statistics_ui(ui, state);

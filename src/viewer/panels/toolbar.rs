@@ -11,7 +11,7 @@ use crate::viewer::{
 /// Show the row; what is quick to change is changed in place, the rest goes into `actions`.
 pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     ui.horizontal_wrapped(|ui| {
-        mode_ui(ui, state.view.mode, actions);
+        mode_ui(ui, state, actions);
         if state.view.mode.is_light() {
             exposure_ui(ui, &mut state.view, actions);
         }
@@ -37,14 +37,15 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
     });
 }
 
-fn mode_ui(ui: &mut egui::Ui, mode: ViewMode, actions: &mut Vec<Action>) {
+fn mode_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let mode = state.view.mode;
     let mut chosen = mode;
     let response = egui::ComboBox::from_id_salt("view mode")
         .selected_text(mode.label())
         .width(176.0)
         .height(320.0)
         .show_ui(ui, |ui| {
-            for mode in ViewMode::ALL {
+            for mode in ViewMode::offered(state.truth.exists()) {
                 ui.selectable_value(&mut chosen, mode, mode.label())
                     .on_hover_text(mode.explanation());
             }

@@ -174,13 +174,11 @@ fn bind_group(
     view: &wgpu::TextureView,
     factor: [f32; 4],
 ) -> wgpu::BindGroup {
-    let uniform = gpu
-        .device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("detail"),
-            contents: bytemuck::cast_slice(&factor),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+    let uniform = gpu.buffer(
+        "detail",
+        bytemuck::cast_slice(&factor),
+        wgpu::BufferUsages::UNIFORM,
+    );
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("detail"),
         layout,

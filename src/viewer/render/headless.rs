@@ -69,6 +69,12 @@ pub fn open_gpu() -> Result<Gpu, HeadlessError> {
         pollster::block_on(adapter.request_device(&Gpu::device_descriptor(&adapter)))
             .map_err(|error| none(&error))?;
     let gpu = Gpu::new(&adapter, device, queue);
+    // Unheard, a complaint would end the program.
+    let complaint = gpu.complaint.clone();
+    gpu.device
+        .on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            let _ = complaint.set(error.to_string().replace('\n', " "));
+        }));
     // Nobody waits for the next frame.
     let sample_count = gpu.most_samples;
     Ok(Gpu {
@@ -78,12 +84,14 @@ pub fn open_gpu() -> Result<Gpu, HeadlessError> {
 }
 
 /// Draw a snapshot at a size in pixels. Automatic exposure and ranges are taken from its light, as in the window.
+/// `errors` are those measured at its vertices, for the mode that shows them.
 ///
 /// # Errors
 /// See [`HeadlessError`].
 pub fn picture(
     scene: &Arc<Scene>,
     snapshot: &Snapshot,
+    errors: Option<&Arc<Vec<f32>>>,
     camera: &Camera,
     view: &ViewSettings,
     size: [u32; 2],
@@ -102,9 +110,14 @@ pub fn picture(
         scene,
         mesh: &snapshot.mesh,
         light: &snapshot.light,
+        errors,
         camera,
         is_unlit: snapshot.step == 0,
-        range: light_range::false_color_range(snapshot, &view),
+        range: light_range::false_color_range(
+            snapshot,
+            &view,
+            errors.map(|errors| errors.as_slice()),
+        ),
         view: &view,
         overlay: &overlay,
         background: Vec3::splat(theme::PICTURE_BACKGROUND),

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use wgpu::util::DeviceExt as _;
-
 use super::{BoxInstance, DEPTH_FORMAT, Gpu, Overlay, SegmentInstance};
 
 /// Vertices of a box: two ends for each of twelve edges.
@@ -113,17 +111,15 @@ impl<T: bytemuck::NoUninit> Instances<T> {
         }
         self.uploaded = instances.clone();
         // More than the adapter takes at once are left out, the last first.
-        let fitting =
-            (gpu.device.limits().max_buffer_size as usize / size_of::<T>()).min(instances.len());
+        let fitting = (gpu.max_buffer_size as usize / size_of::<T>()).min(instances.len());
         let shown = &instances[..fitting];
         self.count = shown.len() as u32;
         self.buffer = (!shown.is_empty()).then(|| {
-            gpu.device
-                .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some(label),
-                    contents: bytemuck::cast_slice(shown),
-                    usage: wgpu::BufferUsages::VERTEX,
-                })
+            gpu.buffer(
+                label,
+                bytemuck::cast_slice(shown),
+                wgpu::BufferUsages::VERTEX,
+            )
         });
     }
 

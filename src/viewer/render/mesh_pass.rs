@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use wgpu::util::DeviceExt as _;
-
 use super::{
     DEPTH_FORMAT, Gpu, Picture, RenderError,
     detail::{DetailRange, DetailSet},
@@ -40,9 +38,52 @@ impl Channel {
     }
 }
 
+/// What the buffer of light was filled from.
+#[derive(Clone)]
+enum LightSource {
+    Light(Arc<VertexLight>, Channel),
+    Errors(Arc<Vec<f32>>),
+}
+
+impl LightSource {
+    fn of(picture: &Picture<'_>) -> Self {
+        match (picture.view.mode, picture.errors) {
+            (ViewMode::Error, Some(errors)) => Self::Errors(errors.clone()),
+            (mode, _) => Self::Light(picture.light.clone(), Channel::of(mode)),
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Light(a, shown), Self::Light(b, wanted)) => Arc::ptr_eq(a, b) && shown == wanted,
+            (Self::Errors(a), Self::Errors(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
+    fn upload(&self, gpu: &Gpu, buffer: &wgpu::Buffer) {
+        let gray = |values: &[f32]| -> Vec<[f32; 3]> { values.iter().map(|x| [*x; 3]).collect() };
+        let grays;
+        let bytes: &[u8] = match self {
+            Self::Light(light, Channel::Irradiance) => bytemuck::cast_slice(&light.irradiance),
+            Self::Light(light, Channel::Direct) => bytemuck::cast_slice(&light.direct),
+            Self::Light(light, Channel::Uncertainty) => {
+                grays = gray(&light.uncertainty);
+                bytemuck::cast_slice(&grays)
+            }
+            Self::Errors(errors) => {
+                grays = gray(errors);
+                bytemuck::cast_slice(&grays)
+            }
+        };
+        let fitting = bytes.len().min(buffer.size() as usize);
+        gpu.queue.write_buffer(buffer, 0, &bytes[..fitting]);
+    }
+}
+
 struct MeshBuffers {
     source: Arc<DisplayMesh>,
-    light_source: Option<(Arc<VertexLight>, Channel)>,
+    light_source: Option<LightSource>,
     positions: wgpu::Buffer,
     normals: wgpu::Buffer,
     texcoords: Option<wgpu::Buffer>,
@@ -98,7 +139,7 @@ impl MeshPass {
             self.mesh = Some(MeshBuffers::new(gpu, picture, &self.details));
         }
         if let Some(mesh) = &mut self.mesh {
-            mesh.prepare_light(gpu, picture.light, Channel::of(picture.view.mode));
+            mesh.prepare_light(gpu, LightSource::of(picture));
             if shows_edges(picture.view) {
                 mesh.prepare_edges(gpu);
             }
@@ -150,7 +191,7 @@ fn shows_edges(view: &ViewSettings) -> bool {
 fn check_size(gpu: &Gpu, mesh: &DisplayMesh) -> Result<(), RenderError> {
     const MIB: u64 = 1 << 20;
     let needed = 12 * mesh.positions.len().max(mesh.indices.len()) as u64;
-    let limit = gpu.device.limits().max_buffer_size;
+    let limit = gpu.max_buffer_size;
     if needed > limit {
         return Err(RenderError::MeshTooLarge {
             needed_mib: needed.div_ceil(MIB),
@@ -163,7 +204,7 @@ fn check_size(gpu: &Gpu, mesh: &DisplayMesh) -> Result<(), RenderError> {
 impl MeshBuffers {
     fn new(gpu: &Gpu, picture: &Picture<'_>, details: &DetailSet) -> Self {
         let mesh = picture.mesh;
-        let vertices = |label, bytes: &[u8]| buffer(gpu, label, bytes, wgpu::BufferUsages::VERTEX);
+        let vertices = |label, bytes: &[u8]| gpu.buffer(label, bytes, wgpu::BufferUsages::VERTEX);
         let (indices, ranges) = details.sort_by_detail(picture.scene, mesh);
         Self {
             source: mesh.clone(),
@@ -180,8 +221,7 @@ impl MeshBuffers {
                 usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
-            indices: buffer(
-                gpu,
+            indices: gpu.buffer(
                 "indices",
                 bytemuck::cast_slice(&indices),
                 wgpu::BufferUsages::INDEX,
@@ -191,25 +231,12 @@ impl MeshBuffers {
         }
     }
 
-    fn prepare_light(&mut self, gpu: &Gpu, light: &Arc<VertexLight>, channel: Channel) {
-        let is_current = |(held, shown): &(Arc<VertexLight>, Channel)| {
-            Arc::ptr_eq(held, light) && *shown == channel
-        };
-        if self.light_source.as_ref().is_some_and(is_current) {
-            return;
+    fn prepare_light(&mut self, gpu: &Gpu, source: LightSource) {
+        let is_current = |held: &LightSource| held.is_same(&source);
+        if !self.light_source.as_ref().is_some_and(is_current) {
+            source.upload(gpu, &self.light);
+            self.light_source = Some(source);
         }
-        let gray: Vec<[f32; 3]>;
-        let bytes: &[u8] = match channel {
-            Channel::Irradiance => bytemuck::cast_slice(&light.irradiance),
-            Channel::Direct => bytemuck::cast_slice(&light.direct),
-            Channel::Uncertainty => {
-                gray = light.uncertainty.iter().map(|error| [*error; 3]).collect();
-                bytemuck::cast_slice(&gray)
-            }
-        };
-        let fitting = bytes.len().min(self.light.size() as usize);
-        gpu.queue.write_buffer(&self.light, 0, &bytes[..fitting]);
-        self.light_source = Some((light.clone(), channel));
     }
 
     fn prepare_edges(&mut self, gpu: &Gpu) {
@@ -218,7 +245,7 @@ impl MeshBuffers {
         }
         // An edge that two triangles share runs forth in one and back in the other: it is drawn twice, which costs
         // less than finding out.
-        let limit = gpu.device.limits().max_buffer_size as usize / (6 * size_of::<u32>());
+        let limit = gpu.max_buffer_size as usize / (6 * size_of::<u32>());
         let edges: Vec<u32> = self
             .source
             .indices
@@ -228,17 +255,8 @@ impl MeshBuffers {
             .collect();
         let bytes = bytemuck::cast_slice(&edges);
         let usage = wgpu::BufferUsages::INDEX;
-        self.edges = Some((buffer(gpu, "edges", bytes, usage), edges.len() as u32));
+        self.edges = Some((gpu.buffer("edges", bytes, usage), edges.len() as u32));
     }
-}
-
-fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    gpu.device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
 }
 
 /// What a pipeline draws.

@@ -12,7 +12,7 @@ mod target;
 mod tonemap_pass;
 mod uniforms;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
@@ -77,6 +77,10 @@ pub struct Gpu {
     pub most_samples: u32,
     /// Format of the linear picture.
     pub linear_format: wgpu::TextureFormat,
+    /// Largest buffer to make, in bytes; at most what the adapter takes.
+    pub max_buffer_size: u64,
+    /// What a device of our own complained of first; the window listens to its device by itself.
+    pub complaint: Arc<OnceLock<String>>,
 }
 
 impl Gpu {
@@ -95,6 +99,8 @@ impl Gpu {
         // A processor that plays adapter takes twice as long for four samples.
         let is_slow = about.device_type == wgpu::DeviceType::Cpu;
         Self {
+            max_buffer_size: device.limits().max_buffer_size,
+            complaint: Arc::default(),
             device,
             queue,
             adapter_name: format!(
@@ -130,6 +136,19 @@ impl Gpu {
         }
     }
 
+    /// A buffer with these contents. Written through the queue: a buffer that is mapped to begin with cannot be had
+    /// from a lost device.
+    fn buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: contents.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
+    }
+
     /// Largest picture on a side.
     pub fn max_picture_side(&self) -> u32 {
         self.device.limits().max_texture_dimension_2d
@@ -158,6 +177,8 @@ pub struct Picture<'a> {
     pub mesh: &'a Arc<DisplayMesh>,
     /// Its light.
     pub light: &'a Arc<VertexLight>,
+    /// Measured errors at its vertices, where they are known.
+    pub errors: Option<&'a Arc<Vec<f32>>>,
     /// From where.
     pub camera: &'a Camera,
     /// How.

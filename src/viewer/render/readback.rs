@@ -54,7 +54,10 @@ fn read_texture(
     texture: &wgpu::Texture,
     pixel_bytes: u32,
 ) -> Result<Vec<u8>, ReadError> {
-    let failed = |error: &dyn std::fmt::Display| ReadError(error.to_string());
+    let failed = |error: &dyn std::fmt::Display| {
+        let said = gpu.complaint.get().cloned();
+        ReadError(said.unwrap_or_else(|| error.to_string()))
+    };
     let (width, height) = (texture.width(), texture.height());
     let row = width * pixel_bytes;
     let stride = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);

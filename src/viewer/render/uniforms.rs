@@ -11,7 +11,7 @@ const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
 /// Width of segments in points.
 const LINE_POINTS: f32 = 2.5;
 /// Number by which the shader knows surfaces without light.
-const PREVIEW_MODE: f32 = 10.0;
+const PREVIEW_MODE: f32 = 11.0;
 /// Opacity of element edges over light, and over the grey solid.
 const EDGE_OPACITY: [f32; 2] = [0.45, 0.8];
 
@@ -81,21 +81,24 @@ impl ViewUniforms {
         let flag = |on: bool| if on { 1.0 } else { 0.0 };
         let eye = camera.eye();
         let backward = camera.backward();
-        let [low, high] = picture.range;
+        // Light is scaled with its emission; false colours by their range, which is the same.
+        let factor = view.light_factor().max(f32::MIN_POSITIVE);
+        let [low, high] = picture.range.map(|end| end / factor);
         let is_solid = view.mode == ViewMode::Elements;
         let mut floats = Vec::with_capacity(FLOAT_COUNT);
         floats.extend(camera.clip_from_frame(aspect).to_cols_array());
         floats.extend([eye.x, eye.y, eye.z, flag(camera.orthographic)]);
         floats.extend([backward.x, backward.y, backward.z, flag(view.backs)]);
         floats.extend([low, high, flag(view.logarithmic), theme::BACK_LIGHTNESS]);
-        let is_preview = picture.is_unlit && view.mode.is_light();
+        let lacks_errors = view.mode == ViewMode::Error && picture.errors.is_none();
+        let is_preview = (picture.is_unlit && view.mode.is_light()) || lacks_errors;
         floats.extend([
             if is_preview {
                 PREVIEW_MODE
             } else {
                 f32::from(view.mode.shader_number())
             },
-            view.exposure_factor(),
+            view.exposure_factor() * factor,
             flag(view.tone_map == ToneMap::None),
             flag(view.texture_detail),
         ]);

@@ -1,0 +1,33 @@
+//! How bright all emitters are together.
+
+use eframe::egui;
+
+use super::{figure, row};
+use crate::viewer::{action::Action, state::State};
+
+/// Show the scale of all emission; a wish goes into `actions`.
+pub fn emission_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let mut scale = state.view.emission_scale;
+    let has_changed = row::setting(
+        ui,
+        "Emission scale",
+        "Multiplies what all emitters emit. Exact and at once: light grows in proportion, nothing is computed anew. The \
+         automatic exposure does not make up for it.",
+        &mut scale,
+        &1.0,
+        |ui, value| {
+            ui.add(
+                egui::Slider::new(value, 0.01..=100.0)
+                    .logarithmic(true)
+                    .clamping(egui::SliderClamping::Never)
+                    .custom_formatter(|value, _| figure(value))
+                    .custom_parser(|text| {
+                        text.trim().parse().ok().filter(|value: &f64| *value >= 0.0)
+                    }),
+            )
+        },
+    );
+    if has_changed {
+        actions.push(Action::EmissionScale(scale));
+    }
+}

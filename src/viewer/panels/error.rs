@@ -1,0 +1,222 @@
+//! The measured error: the reference being traced, each step beside its bound, and error against run time.
+
+use eframe::egui::{self, Color32, RichText};
+use egui_plot::{Legend, Line, Plot, PlotPoints};
+
+use super::{count, figure, plot::run_time, row, seconds};
+use crate::viewer::{
+    action::Action,
+    state::State,
+    theme,
+    truth::{RunRecord, StepFacts, Truth},
+    view::ViewMode,
+};
+
+/// Smallest error on the logarithmic axis, in per cent. Noise of the reference hides less.
+const FLOOR_PERCENT: f64 = 0.01;
+
+/// Show the reference and what was measured by it; wishes go into `actions`.
+pub fn error_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let truth = &state.truth;
+    reference_ui(ui, state, actions);
+    if let Some(message) = &truth.progress.failed {
+        ui.colored_label(theme::BAD, format!("The reference failed: {message}"));
+    }
+    if !truth.exists() {
+        ui.weak("Path tracing at random surface points, to measure the light by.");
+        return;
+    }
+    figures_ui(ui, truth);
+    if truth.newest_error().is_some() {
+        steps_ui(ui, truth);
+    }
+    plot_ui(ui, truth, actions);
+}
+
+/// The button, and how far tracing is.
+fn reference_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let truth = &state.truth;
+    let progress = &truth.progress;
+    let text = match (truth.exists(), truth.is_tracing(), truth.is_done()) {
+        (false, ..) => "Trace reference",
+        (true, true, _) => "Pause tracing",
+        (true, false, false) => "Continue tracing",
+        (true, false, true) => "Trace more",
+    };
+    ui.horizontal(|ui| {
+        let button = egui::Button::new(text).min_size(egui::vec2(120.0, 24.0));
+        let explanation = "Path-trace the truth in the background (R). While light is computed it takes one thread, \
+                           which slows the run; begin again when it is done for times without it.";
+        if ui
+            .add_enabled(state.loaded.is_some(), button)
+            .on_hover_text(explanation)
+            .clicked()
+        {
+            actions.push(Action::TraceReference);
+        }
+        if truth.exists() {
+            let share = progress.samples as f32 / progress.goal.max(1) as f32;
+            let text = format!("{} of {} samples", progress.samples, progress.goal);
+            ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
+        }
+    });
+    if state.view.mode == ViewMode::Error && truth.exists() {
+        let (samples, share) = progress.vertex_samples;
+        let percent = (100.0 * share).round();
+        ui.weak(format!(
+            "At each vertex: {samples} samples, {percent} % of the next 8"
+        ));
+    }
+}
+
+fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
+    let Some((step, facts, error)) = truth.newest_error() else {
+        ui.weak("The first error shows when both the light and the reference are there.");
+        return;
+    };
+    row::figures(ui, "error", |ui| {
+        row::figure(
+            ui,
+            "Relative RMS",
+            percent(error.relative_rms),
+            &format!(
+                "Root mean square difference of radiance after step {step}, relative to the reference's, at {} random \
+                 surface points, without the reference's noise",
+                count(error.points as u64)
+            ),
+        );
+        row::figure(
+            ui,
+            "Trimmed",
+            percent(error.relative_rms_trimmed),
+            "The same without the worst 1 % of the points",
+        );
+        row::figure(
+            ui,
+            "Energy ratio",
+            error
+                .energy_ratio
+                .map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.4}")),
+            "Mean radiance over the reference's; 1 is right",
+        );
+        row::figure(
+            ui,
+            "Reference noise",
+            percent(error.noise_floor),
+            "Standard error of the reference; errors far below it cannot be told",
+        );
+        row::figure(
+            ui,
+            "Bound",
+            percent(f64::from(facts.bound)),
+            "What the solver guarantees by itself, of the irradiance",
+        );
+    });
+}
+
+/// The steps of the present run, the newest last.
+fn steps_ui(ui: &mut egui::Ui, truth: &Truth) {
+    let Some(run) = truth.runs.last() else { return };
+    ui.add_space(4.0);
+    egui::Grid::new("measured steps")
+        .num_columns(5)
+        .spacing([10.0, 2.0])
+        .show(ui, |ui| {
+            let heading = |ui: &mut egui::Ui, text: &str, explanation: &str| {
+                let text = RichText::new(text).color(theme::secondary_text(ui.visuals()));
+                ui.label(text).on_hover_text(explanation);
+            };
+            heading(ui, "Step", "Steps shown while the reference was there");
+            heading(ui, "Time", "Since the run began");
+            heading(ui, "Bound", "What the solver guarantees by itself");
+            heading(ui, "RMS", "Measured, relative");
+            heading(ui, "Trimmed", "Without the worst 1 % of the points");
+            ui.end_row();
+            for (step, facts, error) in truth.steps_of(run) {
+                ui.label(step.to_string());
+                ui.label(seconds(facts.elapsed_s));
+                ui.label(percent(f64::from(facts.bound)));
+                ui.label(percent(error.relative_rms));
+                ui.label(percent(error.relative_rms_trimmed));
+                ui.end_row();
+            }
+        });
+}
+
+/// Error against run time, one line a run.
+fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
+    let has_points = |run: &RunRecord| truth.steps_of(run).next().is_some();
+    let shown: Vec<&RunRecord> = truth.runs.iter().filter(|run| has_points(run)).collect();
+    if shown.is_empty() {
+        return;
+    }
+    ui.add_space(4.0);
+    ui.horizontal(|ui| {
+        ui.label("Trimmed RMS against run time");
+        let clear = egui::Button::new("Forget earlier runs").small();
+        if ui
+            .add_enabled(truth.runs.len() > 1, clear)
+            .on_hover_text("Clear the plot but for the present run")
+            .clicked()
+        {
+            actions.push(Action::ForgetRuns);
+        }
+    });
+    let present = truth.runs.last().map(|run| run.number);
+    Plot::new("error against time")
+        .height(180.0)
+        .legend(Legend::default().position(egui_plot::Corner::RightTop))
+        .allow_scroll(false)
+        .allow_zoom(false)
+        .allow_drag(false)
+        .x_axis_formatter(|mark, _| run_time(mark.value))
+        .y_axis_formatter(|mark, _| decade(mark.value))
+        .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
+        .include_y(0.0)
+        .include_y(2.0)
+        .include_x(0.0)
+        .show(ui, |plot| {
+            for run in shown {
+                let is_present = Some(run.number) == present;
+                let points: Vec<[f64; 2]> = truth
+                    .steps_of(run)
+                    .map(|(_, facts, error)| point(facts, error.relative_rms_trimmed))
+                    .collect();
+                let color = run_color(run.ordinal);
+                plot.points(
+                    egui_plot::Points::new(run.name.clone(), points.clone())
+                        .radius(if is_present { 3.5 } else { 2.0 })
+                        .color(color),
+                );
+                plot.line(
+                    Line::new(run.name.clone(), PlotPoints::from(points))
+                        .width(if is_present { 2.5 } else { 1.2 })
+                        .color(color),
+                );
+            }
+        });
+}
+
+fn point(facts: StepFacts, error: f64) -> [f64; 2] {
+    [facts.elapsed_s, (100.0 * error).max(FLOOR_PERCENT).log10()]
+}
+
+/// A whole power of ten as per cent, and nothing between.
+fn decade(exponent: f64) -> String {
+    let is_whole = (exponent - exponent.round()).abs() < 1e-6;
+    if is_whole {
+        format!("{} %", 10_f64.powf(exponent.round()))
+    } else {
+        String::new()
+    }
+}
+
+/// Colours that tell neighbours apart, in turn.
+fn run_color(ordinal: u32) -> Color32 {
+    const TURN: f32 = 0.618_034;
+    egui::ecolor::Hsva::new((ordinal as f32 * TURN + 0.02).fract(), 0.65, 0.9, 1.0).into()
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", figure(100.0 * share))
+}

@@ -1,0 +1,220 @@
+//! The reference thread: traces random surface points pass by pass, and measures every snapshot that is handed in.
+//!
+//! [`TruthHandle`] owns the thread; dropping it cancels the pass under way and joins. What was looked up of a snapshot
+//! is kept and compared anew after each pass, so that the first error shows after a second and all of them, those of
+//! earlier runs too, get better as samples grow. Snapshots themselves are not kept.
+
+mod tracing;
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    io,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
+};
+
+use super::{Generation, Wake, Watch, visit::describe};
+use crate::{
+    geometry::RayTree,
+    metrics::ErrorMeasures,
+    scene::Scene,
+    solver::{DisplayMesh, Snapshot},
+};
+use tracing::Tracing;
+
+/// Samples at each point after which tracing rests. Fewer cannot tell errors of one per cent, more take minutes.
+pub const SAMPLE_GOAL: u32 = 512;
+
+/// Snapshots that wait to be measured at most; the oldest then go unmeasured. More hold the memory of large meshes.
+const MOST_WAITING: usize = 8;
+
+/// A step that was measured: number of the run, number of the step.
+pub type MeasuredStep = (u64, u32);
+
+/// Errors at the vertices of a mesh.
+#[derive(Clone, Debug, Default)]
+pub struct VertexErrors {
+    /// The mesh.
+    pub mesh: Arc<DisplayMesh>,
+    /// Error of the radiance at each vertex, in per cent of the reference's root mean square.
+    pub percent: Arc<Vec<f32>>,
+}
+
+/// What is known so far.
+#[derive(Clone, Debug, Default)]
+pub struct TruthProgress {
+    /// Surface points.
+    pub points: usize,
+    /// Samples at each of them.
+    pub samples: u32,
+    /// Samples after which tracing rests.
+    pub goal: u32,
+    /// Errors by run and step.
+    pub errors: BTreeMap<MeasuredStep, ErrorMeasures>,
+    /// Errors at vertices, where they were asked for.
+    pub vertices: Option<VertexErrors>,
+    /// Samples at each vertex, and the share of the next pass that is done.
+    pub vertex_samples: (u32, f32),
+    /// Why there will be no more.
+    pub failed: Option<String>,
+}
+
+/// What the owner wants.
+#[derive(Default)]
+struct Wishes {
+    waiting: VecDeque<(u64, Arc<Snapshot>)>,
+    forgotten: Vec<u64>,
+    goal: u32,
+    rests: bool,
+    /// Whose vertices are to be compared.
+    compared: Option<Arc<Snapshot>>,
+}
+
+/// The place where owner and thread meet.
+struct Desk {
+    wishes: Mutex<Wishes>,
+    changed: Condvar,
+    cancelled: AtomicBool,
+    /// Whether the solver is at work: tracing then takes one thread only.
+    yields: AtomicBool,
+    newest: Mutex<Arc<TruthProgress>>,
+}
+
+impl Desk {
+    fn wishes(&self) -> MutexGuard<'_, Wishes> {
+        // Each wish is put down whole, so a poisoned lock guards nothing broken.
+        self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Wishes)) {
+        change(&mut self.wishes());
+        self.changed.notify_all();
+    }
+
+    fn measure(&self, run: u64, snapshot: Arc<Snapshot>) {
+        self.change(|wishes| {
+            if wishes.waiting.len() >= MOST_WAITING {
+                wishes.waiting.pop_front();
+            }
+            wishes.waiting.push_back((run, snapshot));
+        });
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+/// The owner's end of the reference thread. Dropping it cancels what is under way and joins.
+pub struct TruthHandle {
+    desk: Arc<Desk>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl TruthHandle {
+    /// Begin to trace a scene; `rays` is its ray tree. `wake` is called whenever there is something new.
+    ///
+    /// # Errors
+    /// When the system refuses a thread.
+    pub fn spawn(scene: Arc<Scene>, rays: Arc<RayTree>, seed: u64, wake: Wake) -> io::Result<Self> {
+        let desk = Arc::new(Desk {
+            wishes: Mutex::new(Wishes {
+                goal: SAMPLE_GOAL,
+                ..Wishes::default()
+            }),
+            changed: Condvar::new(),
+            cancelled: AtomicBool::new(false),
+            yields: AtomicBool::new(false),
+            newest: Mutex::default(),
+        });
+        let shared = desk.clone();
+        let thread = thread::Builder::new()
+            .name("reference".to_owned())
+            .spawn(move || {
+                let work = || Tracing::new(scene, rays, seed, shared.clone(), wake.clone()).run();
+                if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
+                    let mut newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
+                    Arc::make_mut(&mut newest).failed = Some(describe(panic.as_ref()));
+                    drop(newest);
+                    wake();
+                }
+            })?;
+        Ok(Self {
+            desk,
+            thread: Some(thread),
+        })
+    }
+
+    /// Measure a snapshot of a run. Never waits.
+    pub fn measure(&self, run: u64, snapshot: Arc<Snapshot>) {
+        self.desk.measure(run, snapshot);
+    }
+
+    /// For [`WorkerHandle::watch`](super::WorkerHandle::watch): measures every lit snapshot, however fast they follow.
+    pub fn watch(&self) -> Watch {
+        let desk = self.desk.clone();
+        Arc::new(move |generation: Generation, snapshot: &Arc<Snapshot>| {
+            if snapshot.step > 0 {
+                desk.measure(generation.number(), snapshot.clone());
+            }
+        })
+    }
+
+    /// Compare the vertices of a snapshot, too, until told otherwise.
+    pub fn compare_vertices(&self, snapshot: Option<Arc<Snapshot>>) {
+        self.desk.change(|wishes| wishes.compared = snapshot);
+    }
+
+    /// Forget the errors of a run.
+    pub fn forget(&self, run: u64) {
+        self.desk.change(|wishes| {
+            wishes.waiting.retain(|(waiting, _)| *waiting != run);
+            wishes.forgotten.push(run);
+        });
+    }
+
+    /// Rest, or go on from where it stands. A resting reference still measures.
+    pub fn rest(&self, rests: bool) {
+        self.desk.change(|wishes| wishes.rests = rests);
+    }
+
+    /// Whether it was told to rest.
+    pub fn rests(&self) -> bool {
+        self.desk.wishes().rests
+    }
+
+    /// Trace as many samples again.
+    pub fn trace_more(&self) {
+        self.desk.change(|wishes| wishes.goal *= 2);
+    }
+
+    /// Leave all processors but one to the solver, or take them.
+    pub fn yield_to_solver(&self, yields: bool) {
+        self.desk.yields.store(yields, Ordering::Relaxed);
+    }
+
+    /// What is known so far. The same `Arc` as before where there is nothing newer.
+    pub fn progress(&self) -> Arc<TruthProgress> {
+        self.desk
+            .newest
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+}
+
+impl Drop for TruthHandle {
+    fn drop(&mut self) {
+        self.desk.cancelled.store(true, Ordering::Relaxed);
+        // With the lock taken and let go, the thread either sees the flag or waits for this call.
+        self.desk.change(|_| {});
+        if let Some(thread) = self.thread.take() {
+            // A panic was caught and told.
+            let _ = thread.join();
+        }
+    }
+}
