@@ -398,3 +398,29 @@ fn a_report_says_what_is_wrong_with_its_usage() {
         );
     }
 }
+
+#[test]
+fn the_scaling_suite_fits_an_exponent_to_the_sizes_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--suite", "scaling", "--sizes", "1000,2000"];
+    let output = report(folder.path(), &more);
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/scaling.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let sizes = json["sizes"].as_array().unwrap();
+    let triangles: Vec<u64> = sizes
+        .iter()
+        .map(|size| size["cost"]["triangles"].as_u64().unwrap())
+        .collect();
+    assert_eq!(triangles, [1000, 2000]);
+    for size in sizes {
+        assert!(
+            size["cost"]["first_light_s"].as_f64().unwrap() > 0.0,
+            "{size}"
+        );
+    }
+    assert!(json["exponents"][0][1].is_number());
+    for name in ["scaling.md", "scaling.csv", "scaling.svg", "scaling.png"] {
+        assert!(folder.path().join("out").join(name).exists(), "{name}");
+    }
+}

@@ -10,6 +10,11 @@ pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 /// Errors at which runs are compared with the bake.
 const RATIO_TARGETS: [f64; 2] = [0.1, 0.05];
 
+/// Trimmed errors below this share of the reference's noise are not told. Trimming drops points whose noise is large,
+/// so what is subtracted from the others is a little too much: by 0.3 of the noise where that is Gaussian and even.
+/// A smaller share calls noise an error of 0; a larger one hides what longer references would confirm.
+const RELIABLE_SHARE: f64 = 0.3;
+
 /// What errors are measured against.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReferenceFacts {
@@ -77,6 +82,11 @@ impl SceneComparison {
             .min_by(f64::total_cmp)
     }
 
+    /// The smallest error that can be told from none.
+    pub fn smallest_error(&self) -> f64 {
+        RELIABLE_SHARE * self.reference.noise_floor
+    }
+
     /// A Markdown table with a line for each run.
     pub fn markdown(&self) -> String {
         let mut text = String::from("| run |");
@@ -98,14 +108,16 @@ impl SceneComparison {
     fn markdown_line(&self, run: &Trajectory) -> String {
         let mut line = format!("\n| {} |", run.label.replace('|', "/"));
         for target in TARGETS {
-            line += &format!(" {} |", time_cell(run, target));
+            line += &format!(" {} |", self.time_cell(run, target));
         }
         let Some(best) = run.best() else {
             return line + &" – |".repeat(5 + RATIO_TARGETS.len());
         };
+        let (error, smallest) = (best.error.relative_rms_trimmed, self.smallest_error());
+        let sign = if error < smallest { "< " } else { "" };
         line += &format!(
-            " {:.2} % | {} | {} | {} | {:.0} MiB |",
-            100.0 * best.error.relative_rms_trimmed,
+            " {sign}{:.2} % | {} | {} | {} | {} MiB |",
+            100.0 * error.max(smallest),
             seconds(best.time_s),
             grouped(best.rays),
             if run.runner == Runner::Solver {
@@ -113,12 +125,23 @@ impl SceneComparison {
             } else {
                 "–".to_owned()
             },
-            best.memory_bytes as f64 / f64::from(1 << 20),
+            digits(best.memory_bytes as f64 / f64::from(1 << 20)),
         );
         for target in RATIO_TARGETS {
             line += &format!(" {} |", self.ratio_cell(run, target));
         }
         line
+    }
+
+    fn time_cell(&self, run: &Trajectory, target: f64) -> String {
+        let Some(crossing) = run.time_to(target) else {
+            return "–".to_owned();
+        };
+        if target < self.smallest_error() {
+            return "?".to_owned();
+        }
+        let sign = if crossing.is_bound { "≤ " } else { "" };
+        format!("{sign}{}", seconds(crossing.time_s))
     }
 
     /// How many times as long as this run the bake takes; a bound where the bake or this run is known by a bound only.
@@ -162,13 +185,6 @@ fn row<'a>(scene: &'a SceneComparison, run: &'a Trajectory, point: &Measurement)
         reference_noise: scene.reference.noise_floor,
         repeats: run.repeats,
     }
-}
-
-fn time_cell(run: &Trajectory, target: f64) -> String {
-    run.time_to(target).map_or("–".to_owned(), |crossing| {
-        let sign = if crossing.is_bound { "≤ " } else { "" };
-        format!("{sign}{}", seconds(crossing.time_s))
-    })
 }
 
 /// Seconds with three significant digits or less.
@@ -271,6 +287,18 @@ mod tests {
         );
         assert_eq!(comparison.ratio_cell(&comparison.runs[2], 0.1), "–");
         assert_eq!(comparison.rows().count(), 4);
+    }
+
+    #[test]
+    fn errors_within_the_noise_are_not_told() {
+        let mut comparison = comparison();
+        comparison.runs = vec![run("good", Runner::Solver, &[(1.0, 0.2), (2.0, 0.0)])];
+        comparison.reference.noise_floor = 0.05;
+        let table = comparison.markdown();
+        // 0.3 of 5 %: 2 % is told, 1 % is not.
+        assert!(table.contains("| ? | < 1.50 % |"), "{table}");
+        comparison.reference.noise_floor = 0.001;
+        assert!(comparison.markdown().contains("< 0.03 %"));
     }
 
     #[test]

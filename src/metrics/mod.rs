@@ -3,9 +3,11 @@
 mod comparison;
 mod error;
 mod lookup;
+mod scaling;
 mod trajectory;
 
 pub use comparison::{ReferenceFacts, Row, SceneComparison, TARGETS, digits, grouped};
 pub use error::{ErrorMeasures, measure_error};
 pub use lookup::MeshLookup;
+pub use scaling::{COST_KINDS, CostKind, SizeCost, exponent_of, fitted_exponent, scaling_markdown};
 pub use trajectory::{Crossing, Measurement, Runner, Trajectory};

@@ -172,6 +172,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
          1 % of the points and without the noise of the reference.\n\
          Times are seconds of computing, preparation included, reading the scene and measuring left out; \"≤\" where \
          the first measurement was already better, \"–\" where a run never came so far.\n\
+         Trimming makes errors far below the noise of the reference too small; they are told as bounds, times to them as \"?\".\n\
          Links, rays and memory are those at the best error. The ratio divides the time of the faster bake, whose mesh \
          is given to it, by the time of the run.\n{interrupted}",
         report.version,

@@ -7,6 +7,7 @@ mod baselines;
 mod error_time;
 mod plan;
 mod runs;
+mod scaling;
 mod session;
 mod suite;
 
@@ -38,7 +39,7 @@ pub struct ReportArguments {
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
     /// Trace the reference with this: paths or paths=SAMPLES
-    #[arg(long, value_name = "HOW", default_value = "paths", value_parser = reference_samples, help_heading = "Output")]
+    #[arg(long, value_name = "HOW", default_value = "paths=4096", value_parser = reference_samples, help_heading = "Output")]
     pub reference: u32,
     /// No progress line
     #[arg(long, short, help_heading = "Output")]

@@ -44,6 +44,9 @@ pub struct PlanFlags {
     /// Paths per vertex of the longest bake
     #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(1..=1 << 24), help_heading = "Plan")]
     pub max_spp: u32,
+    /// Triangles of the rooms in the scaling suite [default: 1022 to 1000000, about fourfold each]
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1_000..=16_000_000), help_heading = "Plan")]
+    pub sizes: Vec<u32>,
     /// Runs of each kind, of whose times the median is taken; best odd
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=99), help_heading = "Plan")]
     pub repeats: u32,
@@ -338,7 +341,7 @@ mod tests {
             "--epsilons",
             "0.02",
         ];
-        assert_eq!(labels(&few), ["single, 4 samples"]);
+        assert_eq!(labels(&few), ["single, 4 samples", "single, 16 samples"]);
         let two = [&few[..], &["--sample-counts", "2,8"]].concat();
         assert_eq!(labels(&two), ["single, 2 samples", "single, 8 samples"]);
         assert!(Line::try_parse_from(["test", "--epsilons", "0"]).is_err());

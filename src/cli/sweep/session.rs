@@ -18,7 +18,7 @@ use crate::{
     geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, ReferenceFacts, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
-    scene::Scene,
+    scene::{Scene, builtin::room_of},
     solver::{DisplayMesh, VertexLight},
     worker::RunOptions,
 };
@@ -32,6 +32,8 @@ pub(super) enum Source {
     File(PathBuf),
     /// A built-in scene.
     Builtin(String),
+    /// The built-in room in so many triangles.
+    Room(u32),
 }
 
 /// A report in the making.
@@ -134,6 +136,7 @@ impl<'a> Session<'a> {
         let scene = match source {
             Source::File(path) => load(Some(path), None, &options)?,
             Source::Builtin(name) => load(None, Some(name), &options)?,
+            Source::Room(triangles) => room_of(*triangles as usize).finish(&options)?,
         };
         for warning in &scene.warnings {
             eprintln!("warning: {warning}");

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::{
-    error_time,
+    error_time, scaling,
     session::{Session, Source},
 };
 
@@ -16,7 +16,7 @@ struct Suite {
 /// The three sizes of Sun, Gong and Pan.
 const PAPER: [&str; 3] = ["room-1022", "room-8621", "room-42879"];
 
-static SUITES: [Suite; 5] = [
+static SUITES: [Suite; 6] = [
     Suite {
         name: "paper",
         run: |session| on_builtins(session, &PAPER),
@@ -42,6 +42,10 @@ static SUITES: [Suite; 5] = [
                 &["cornell", small, middle, large, "soup", "gallery"],
             )
         },
+    },
+    Suite {
+        name: "scaling",
+        run: scaling::scale,
     },
 ];
 

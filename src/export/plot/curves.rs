@@ -19,7 +19,7 @@ pub struct Curve {
     pub points: Vec<[f64; 2]>,
     /// Dashed curves are what the others are compared with.
     pub is_dashed: bool,
-    /// Whether each point gets a mark.
+    /// Whether each point gets a mark. A curve without is a grey rule to hold the others against.
     pub has_marks: bool,
 }
 
@@ -53,6 +53,7 @@ const TITLE_SIZE: f32 = 17.0;
 
 const INK: Color = [34, 34, 34];
 const GRID: Color = [214, 214, 214];
+const RULE: Color = [130, 130, 130];
 const FINE_GRID: Color = [238, 238, 238];
 
 /// Colours that stay apart for colour-blind eyes and on white (Okabe & Ito 2008, the yellow darkened).
@@ -232,7 +233,11 @@ fn line_mark(curve: &Curve, index: usize, points: Vec<Vec2>) -> Mark {
     Mark::Line {
         points,
         width: 1.8,
-        color: color_of(index),
+        color: if curve.has_marks {
+            color_of(index)
+        } else {
+            RULE
+        },
         is_dashed: curve.is_dashed,
     }
 }
