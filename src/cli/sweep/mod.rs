@@ -1,6 +1,6 @@
 //! `vecrad report`: run methods and baselines on scenes, measure their error against run time, write what came out.
 //!
-//! A [`suite::Suite`] says which scenes and what to run; a [`session::Session`] loads, traces references and runs, and
+//! A suite says which scenes and what to run; a [`session::Session`] loads, traces references and runs, and
 //! knows when to stop. What is measured is described in the room `metrics`, plots are drawn in `export`.
 
 mod baselines;
