@@ -5,6 +5,9 @@ use crate::metrics::grouped;
 /// Space between labelled ticks at least, in units of the drawing; less, and labels run into each other.
 const BETWEEN_LABELS: f32 = 34.0;
 
+/// Room for a digit of a label and its share of the gap; long labels need more than [`BETWEEN_LABELS`].
+const DIGIT_ROOM: f32 = 7.2;
+
 /// Decades that an axis shows at most: a curve that falls further says nothing there.
 const MOST_DECADES: f64 = 8.0;
 
@@ -63,7 +66,9 @@ impl LogAxis {
             decade
         };
         // The narrowest step between 1, 2, 5 and 10 is log₁₀ 2 of a decade.
-        let labels_fives = per_decade * 2_f32.log10() > BETWEEN_LABELS;
+        let digits = self.range.map(|value| value.log10().abs().ceil() as u8 + 1);
+        let room = BETWEEN_LABELS.max(f32::from(digits[0].max(digits[1])) * DIGIT_ROOM);
+        let labels_fives = per_decade * 2_f32.log10() > room;
         let [low, high] = self.range.map(|value| value.log10().floor() as i32);
         let mut ticks = Vec::new();
         for power in low..=high {
