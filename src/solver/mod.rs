@@ -14,6 +14,7 @@ mod inspection;
 mod reconstruct;
 mod report;
 mod settings;
+mod smooth;
 mod snapshot;
 
 use std::sync::{
@@ -112,9 +113,24 @@ impl Solver {
             rays,
             hierarchy,
         };
+        solver.first_light();
         solver.pull();
         solver.show();
         solver
+    }
+
+    /// Sample direct light on the first mesh, so that there is something to see before the first link.
+    fn first_light(&mut self) {
+        let min_area = self.min_area();
+        adapt::divide_coarse(&mut self.hierarchy, min_area);
+        if let Some(field) = &mut self.direct {
+            let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
+            let never = Cancel::default();
+            self.ray_count += field
+                .cover(&self.rays, &self.hierarchy, count, seed, &never)
+                .unwrap_or(0);
+        }
+        self.extend_to_new_elements();
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.
