@@ -21,6 +21,8 @@ pub enum WarningKind {
     Unsupported,
     /// Nothing in the scene emits light.
     NoEmitter,
+    /// The file changed while it was read.
+    FileChanged,
     /// Something about orientation or sidedness that deserves a look.
     Orientation,
 }
