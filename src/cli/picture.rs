@@ -1,6 +1,6 @@
 //! `--screenshot` and what it shows: the window's own picture, drawn without a window.
 
-use std::{io::Write as _, path::PathBuf, str::FromStr, sync::Arc};
+use std::{path::PathBuf, str::FromStr, sync::Arc};
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;

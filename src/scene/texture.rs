@@ -146,7 +146,12 @@ fn averaged<P: Pixel>(
     name: &str,
     linear: impl Fn(&P) -> Vec3,
 ) -> Texture {
-    let sides = |block: u32| (picture.width().div_ceil(block), picture.height().div_ceil(block));
+    let sides = |block: u32| {
+        (
+            picture.width().div_ceil(block),
+            picture.height().div_ceil(block),
+        )
+    };
     let mut block = 1;
     while let (width, height) = sides(block)
         && width as usize * height as usize > MAX_PIXELS
