@@ -319,7 +319,7 @@ mod sidecar {
             let mut chance = Chance::new(case);
             let mut bytes = text.clone().into_bytes();
             // One number of the many replaced is likelier to be read than several.
-            match chance.below(2) {
+            match chance.below(4) {
                 0 => spoil(&mut bytes, &mut chance),
                 _ => bytes = with_other_number(&text, &mut chance).into_bytes(),
             }
@@ -347,28 +347,30 @@ mod sidecar {
         println!("{count} cases, {used} used");
     }
 
-    /// The text with the value of one line replaced.
+    /// The text with the value of one line replaced, mostly by one of its own type.
     fn with_other_number(text: &str, chance: &mut Chance) -> String {
         let keys: Vec<usize> = text.match_indices(" = ").map(|(at, _)| at + 3).collect();
         let start = chance.pick(&keys);
         let end = text[start..]
             .find('\n')
             .map_or(text.len(), |length| start + length);
-        let value = chance.pick(&[
-            "nan",
-            "-inf",
-            "inf",
+        let floats = [
+            "nan", "-inf", "inf", "-1.0", "0.0", "1e39", "-1e-320", "1e308", "0.7", "12.5", "1e-9",
+        ];
+        let integers = [
             "-1",
             "0",
-            "0.0",
-            "1e39",
-            "-1e-320",
-            "1e308",
+            "1",
+            "77",
+            "4096",
             "4294967295",
             "4294967296",
             "9223372036854775807",
             "-9223372036854775808",
+        ];
+        let others = [
             "true",
+            "false",
             "\"\"",
             "[]",
             "[nan, 1.0, 2.0]",
@@ -377,7 +379,15 @@ mod sidecar {
             "{}",
             "1979-05-27",
             "0x7f",
-        ]);
+        ];
+        let held = &text[start..end];
+        let value = if held.parse::<i64>().is_ok() && chance.below(8) > 0 {
+            chance.pick(&integers)
+        } else if held.parse::<f64>().is_ok() && chance.below(8) > 0 {
+            chance.pick(&floats)
+        } else {
+            chance.pick(&others)
+        };
         format!("{}{value}{}", &text[..start], &text[end..])
     }
 }

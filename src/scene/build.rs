@@ -252,7 +252,8 @@ impl SceneBuilder {
         let skipped = self.drop_faces(|face| {
             let [a, b, c] = face.corners.map(|corner| corner_of[corner as usize]);
             let area = area_vector(face.corners.map(|corner| positions[corner as usize]), frame);
-            let vanished = a == b || b == c || c == a || area == Vec3::ZERO;
+            // Of areas whose square underflows there is no direction either.
+            let vanished = a == b || b == c || c == a || area.length() == 0.0;
             vanished.then_some("too small next to the size of the scene")
         });
         self.positions = positions;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use vecrad::scene::Scene;
 
 /// How many cases a randomised test runs: `VECRAD_FUZZ_CASES`, else as many as take seconds.
-pub fn case_count(usual: u64) -> u64 {
+pub(crate) fn case_count(usual: u64) -> u64 {
     std::env::var("VECRAD_FUZZ_CASES")
         .ok()
         .and_then(|count| count.parse().ok())
@@ -13,16 +13,16 @@ pub fn case_count(usual: u64) -> u64 {
 }
 
 /// Repeatable numbers: SplitMix64 (Steele, Lea and Flood 2014).
-pub struct Chance(u64);
+pub(crate) struct Chance(u64);
 
 impl Chance {
     /// The sequence of a seed.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0xd134_2543_de82_ef95))
     }
 
     /// Any number.
-    pub fn number(&mut self) -> u64 {
+    pub(crate) fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -30,12 +30,12 @@ impl Chance {
     }
 
     /// A number below a bound of at least 1.
-    pub fn below(&mut self, bound: usize) -> usize {
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
         (self.number() % bound as u64) as usize
     }
 
     /// One of several.
-    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+    pub(crate) fn pick<T: Copy>(&mut self, from: &[T]) -> T {
         from[self.below(from.len())]
     }
 }
@@ -81,7 +81,7 @@ const WORDS: [&[u8]; 36] = [
 ];
 
 /// Spoil a text in one to a handful of places: bytes, words, lines, or its end.
-pub fn spoil(text: &mut Vec<u8>, chance: &mut Chance) {
+pub(crate) fn spoil(text: &mut Vec<u8>, chance: &mut Chance) {
     for _ in 0..=chance.below(5) {
         spoil_once(text, chance);
     }
@@ -130,7 +130,7 @@ fn spoil_once(text: &mut Vec<u8>, chance: &mut Chance) {
 }
 
 /// What every scene keeps, whatever its file of so many bytes was.
-pub fn assert_promises(scene: &Scene, bytes: usize) {
+pub(crate) fn assert_promises(scene: &Scene, bytes: usize) {
     assert!(scene.positions.iter().all(|position| position.is_finite()));
     assert_eq!(scene.surfaces.len(), scene.triangles.len());
     assert!(!scene.triangles.is_empty());
@@ -167,7 +167,7 @@ pub fn assert_promises(scene: &Scene, bytes: usize) {
 }
 
 /// A folder for one test's files, on a disk in memory where there is one.
-pub fn folder() -> (tempfile::TempDir, PathBuf) {
+pub(crate) fn folder() -> (tempfile::TempDir, PathBuf) {
     let memory = std::path::Path::new("/dev/shm");
     let made = tempfile::tempdir_in(memory).or_else(|_| tempfile::tempdir());
     let folder = made.expect("a folder can be made");
