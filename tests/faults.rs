@@ -166,8 +166,7 @@ fn a_folder_that_vanishes_does_not_take_the_light_with_it() {
 fn a_scene_that_changes_while_it_is_read_is_read_or_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.obj");
-    let square =
-        |x: usize| format!("v {x} 0 0\nv {x} 0 1\nv {x} 1 1\nv {x} 1 0\nf -4 -3 -2 -1\n");
+    let square = |x: usize| format!("v {x} 0 0\nv {x} 0 1\nv {x} 1 1\nv {x} 1 0\nf -4 -3 -2 -1\n");
     let text: String = (0..30_000).map(square).collect();
     let solve = [
         "solve",

@@ -99,7 +99,10 @@ pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
 /// # Errors
 /// One sentence where the text is no sidecar or a number in it is out of its range.
 pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
-    let saved: Sidecar = toml::from_str(text).map_err(|error| error.message().to_owned())?;
+    let saved: Sidecar = toml::from_str(text).map_err(|error| {
+        // It may quote the text.
+        error.message().replace(char::is_control, "\u{fffd}")
+    })?;
     saved.settings.check()?;
     saved.view.check()?;
     let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };

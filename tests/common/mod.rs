@@ -154,8 +154,13 @@ pub(crate) fn assert_promises(scene: &Scene, bytes: usize) {
     assert_eq!(end, scene.triangles.len());
     // A corner takes two bytes at least, and a polygon has more corners than triangles.
     assert!(scene.triangles.len() <= bytes / 2);
-    assert!(scene.positions.len() <= 3 * scene.triangles.len());
-    assert!(scene.materials.len() <= bytes && scene.objects.len() <= bytes);
+    for count in [
+        scene.positions.len(),
+        scene.materials.len(),
+        scene.objects.len(),
+    ] {
+        assert!(count <= bytes, "{count} of {bytes} bytes");
+    }
     for texture in &scene.textures {
         let count = texture.width as usize * texture.height as usize;
         assert_eq!(texture.pixels.len(), count);
