@@ -697,6 +697,20 @@ mod tests {
     }
 
     #[test]
+    fn faces_whose_area_has_no_square_in_single_precision_are_dropped() {
+        let mut points = TRIANGLE.to_vec();
+        // About the origin, so that the small triangle keeps its corners apart.
+        points.extend([[1e14, 0.0, 0.0], [-1e14, 0.0, 0.0], [0.0, 1e14, 0.0]]);
+        points.push([0.0, -1e14, 0.0]);
+        let mut builder = builder_of(&points);
+        builder.push_triangle([0, 1, 2], MaterialId(0));
+        builder.push_triangle([3, 4, 5], MaterialId(0));
+        builder.push_triangle([3, 4, 6], MaterialId(0));
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        assert_eq!(scene.triangles.len(), 2);
+    }
+
+    #[test]
     fn outward_room_with_a_light_inside_is_named() {
         let mut builder = builder_of(&[
             [0.0, 0.0, 0.0],
