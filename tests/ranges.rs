@@ -1,7 +1,5 @@
 //! Numbers out of their range on the command line: exit code 2 and a sentence that names the flag, before any work.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::process::Command;
 
 #[test]
