@@ -16,6 +16,8 @@
 //! * `viewer`: the window and its pictures;
 //! * [`cli`]: flags to settings, headless commands.
 
+#![forbid(unsafe_code)]
+
 pub mod cli;
 pub mod export;
 pub mod geometry;

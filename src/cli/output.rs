@@ -1,18 +1,24 @@
-//! Files that are written whole or not at all; `-` is standard output.
+//! Where a command's output goes: files, standard output (`-`), and sentences on standard error.
 
 use std::{
-    fs,
-    io::{self, BufWriter, Write},
-    path::Path,
+    fmt::Display,
+    io::{self, Write},
+    path::{Path, PathBuf},
 };
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::UsageError;
+use crate::export::{self, folder_of};
 
 /// Whether a name means standard output.
 pub(super) fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
+}
+
+/// Put a sentence on standard error. One that nobody reads is no reason to stop.
+pub(super) fn say(sentence: impl Display) {
+    let _ = writeln!(io::stderr(), "{sentence}");
 }
 
 /// Say early that a file cannot be written, rather than after a long solve.
@@ -33,61 +39,49 @@ pub(super) fn check(path: &Path) -> Result<()> {
             folder.display()
         )));
     }
-    tempfile::tempfile_in(folder)
-        .map(drop)
+    export::try_writing(path)
         .with_context(|| format!("cannot write to the folder {}", folder.display()))
 }
 
-/// Write a file aside, then put it in its place; or write to standard output.
+/// Write a file whole or not at all; or write to standard output, as much of it as its reader wants.
+///
+/// Where the file cannot be written, it is saved in the folder for temporary files, so that a long solve is not lost;
+/// the error says so.
 pub(super) fn write_whole(
     path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    write: impl Fn(&mut dyn Write) -> io::Result<()>,
 ) -> Result<()> {
-    let written = if is_stdout(path) {
+    if is_stdout(path) {
         let mut out = io::stdout().lock();
-        write(&mut out).and_then(|()| out.flush())
-    } else {
-        write_file(path, write)
+        let written = write(&mut out).and_then(|()| out.flush());
+        return match written {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            written => written.context("cannot write to standard output"),
+        };
+    }
+    let Err(error) = export::write_whole(path, &write) else {
+        return Ok(());
     };
-    written.with_context(|| format!("cannot write {}", path.display()))
+    Err(match rescue(path, write) {
+        Ok(saved) => anyhow!(
+            "cannot write {}: {error}; saved as {} instead",
+            path.display(),
+            saved.display()
+        ),
+        Err(_) => anyhow!("cannot write {}: {error}", path.display()),
+    })
 }
 
-fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let aside = tempfile::Builder::new()
-        .prefix(".vecrad-")
-        .make_in(folder_of(path), |name| {
-            // Opened as any other file is, so that the permissions are those the user expects.
-            fs::File::create_new(name)
-        })?;
-    let mut out = BufWriter::new(aside);
+/// Write to a new file in the folder for temporary files, and return which.
+fn rescue(path: &Path, write: impl Fn(&mut dyn Write) -> io::Result<()>) -> io::Result<PathBuf> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut file = tempfile::Builder::new()
+        .prefix("vecrad-")
+        .suffix(&format!("-{name}"))
+        .tempfile()?;
+    let mut out = io::BufWriter::new(file.as_file_mut());
     write(&mut out)?;
-    let aside = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-    aside.persist(path).map_err(|error| error.error)?;
-    Ok(())
-}
-
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.txt");
-        write_whole(&path, |out| out.write_all(b"old")).unwrap();
-        let failed = write_whole(&path, |out| {
-            out.write_all(b"half")?;
-            Err(io::Error::other("disk on fire"))
-        });
-        assert!(failed.is_err());
-        assert_eq!(fs::read(&path).unwrap(), b"old");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
+    out.flush()?;
+    drop(out);
+    Ok(file.keep().map_err(|error| error.error)?.1)
 }

@@ -67,7 +67,7 @@ pub struct ViewFlags {
     )]
     pub camera_view_up: Option<Direction>,
     /// Vertical angle of view in degrees, 1 to 170
-    #[arg(long, value_name = "DEGREES", help_heading = "Picture")]
+    #[arg(long, value_name = "DEGREES", value_parser = view_angle, help_heading = "Picture")]
     pub camera_view_angle: Option<f32>,
 }
 
@@ -182,10 +182,17 @@ impl PictureFlags {
         };
         let camera = self.view.camera(up).apply(opening, &scene.frame);
         let view = self.view.view_settings(run_flags);
+        if !camera.is_valid() {
+            bail!(UsageError(
+                "the camera is too far from the scene or in what it looks at; move --camera-position or --camera-focal-point"
+                    .to_owned()
+            ));
+        }
         let picture = headless::picture(scene, snapshot, errors, &camera, &view, size)?;
-        picture
-            .save(path)
-            .with_context(|| format!("cannot write {}", path.display()))
+        let bytes = picture
+            .encode(path)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        output::write_whole(path, |out| out.write_all(&bytes))
     }
 }
 
@@ -227,8 +234,9 @@ impl FromStr for Range {
 
     fn from_str(text: &str) -> Result<Self, String> {
         numbers::<2>(text)
-            .filter(|[low, high]| *low >= 0.0 && high > low)
-            .map(|ends| Self(ends.map(|end| end as f32)))
+            .map(|ends| ends.map(|end| end as f32))
+            .filter(|[low, high]| *low >= 0.0 && high > low && high.is_finite())
+            .map(Self)
             .ok_or_else(|| "expected two rising numbers such as 0,10".to_owned())
     }
 }
@@ -246,6 +254,13 @@ impl FromStr for Size {
             .filter(|Self(size)| size.iter().all(|side| (1..=32768).contains(side)))
             .ok_or_else(|| "expected a size such as 1280x720".to_owned())
     }
+}
+
+fn view_angle(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|degrees| (1.0..=170.0).contains(degrees))
+        .ok_or_else(|| "must be within 1 and 170".to_owned())
 }
 
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {

@@ -5,6 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::output::say;
 use crate::solver::StepReport;
 
 /// Time between lines where standard error is not a terminal.
@@ -53,14 +54,13 @@ impl Progress {
         }
         let line = format!("{}, {:.1} s", self.step, self.begin.elapsed().as_secs_f64());
         if self.is_terminal {
-            eprint!("\r\x1b[K{line}");
             // Progress that cannot be shown is no reason to stop.
-            let _ = io::stderr().flush();
+            let _ = write!(io::stderr(), "\r\x1b[K{line}").and_then(|()| io::stderr().flush());
         } else if self
             .last_line
             .is_none_or(|last| last.elapsed() >= BETWEEN_LINES)
         {
-            eprintln!("{line}");
+            say(line);
             self.last_line = Some(Instant::now());
         }
     }
@@ -70,7 +70,7 @@ impl Progress {
         self.last_line = None;
         self.show();
         if self.is_terminal && !self.quiet {
-            eprintln!();
+            say("");
         }
     }
 }

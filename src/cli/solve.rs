@@ -78,18 +78,21 @@ struct Run {
 
 /// Light the scene, write the files, say how it ended.
 pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
+    let interruption = Interruption::listen()?;
     check_outputs(arguments)?;
-    let interrupted = interruption()?;
     let begin = Instant::now();
     let options = arguments.scene_flags.options();
+    interruption.ends_at_once(true);
     let scene = Arc::new(load(
         arguments.path.as_deref(),
         arguments.scene.as_deref(),
         &options,
     )?);
+    interruption.ends_at_once(false);
+    let interrupted = interruption.flag;
     let read_s = begin.elapsed().as_secs_f64();
     for warning in &scene.warnings {
-        eprintln!("warning: {warning}");
+        output::say(format_args!("warning: {warning}"));
     }
     let errors = Errors::default();
     let traced = Instant::now();
@@ -107,16 +110,26 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         reference_s,
         ..Totals::default()
     };
-    write_outputs(arguments, &scene, &run, &errors, totals)?;
+    // What cannot be written does not keep the rest from being written.
+    let report = write_report(arguments, &scene, &run, &errors, totals);
+    if run.snapshot.mesh.positions.is_empty() && writes_light(arguments) {
+        report?;
+        bail!("stopped before there was any light, so no mesh and no picture was written");
+    }
+    let export = write_export(arguments, &scene, &run);
     #[cfg(feature = "viewer")]
-    arguments.picture.write(
+    let picture = arguments.picture.write(
         &scene,
         arguments.scene.as_deref(),
         &run.snapshot,
         errors_of(arguments, &scene, &run, &errors, &interrupted).as_ref(),
         &arguments.run_flags,
         arguments.scene_flags.up,
-    )?;
+    );
+    export?;
+    report?;
+    #[cfg(feature = "viewer")]
+    picture?;
     Ok(match run.stop_reason {
         StopReason::Converged => Outcome::Done,
         _ => Outcome::StoppedEarly,
@@ -169,13 +182,44 @@ fn check_outputs(arguments: &SolveArguments) -> Result<()> {
     arguments.report.as_deref().map_or(Ok(()), output::check)
 }
 
-/// A flag that Ctrl+C sets; a second Ctrl+C is the same.
-pub(super) fn interruption() -> Result<Arc<AtomicBool>> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = interrupted.clone();
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
+/// Whether files with light are asked for.
+fn writes_light(arguments: &SolveArguments) -> bool {
+    #[cfg(feature = "viewer")]
+    let draws = arguments.picture.screenshot.is_some();
+    #[cfg(not(feature = "viewer"))]
+    let draws = false;
+    arguments.export.is_some() || draws
+}
+
+/// What Ctrl+C and the system's wish to end the program do; a second one is the same.
+pub(super) struct Interruption {
+    /// Set once it came.
+    pub(super) flag: Arc<AtomicBool>,
+    at_once: Arc<AtomicBool>,
+}
+
+impl Interruption {
+    pub(super) fn listen() -> Result<Self> {
+        let new = Self {
+            flag: Arc::new(AtomicBool::new(false)),
+            at_once: Arc::new(AtomicBool::new(false)),
+        };
+        let (flag, at_once) = (new.flag.clone(), new.at_once.clone());
+        ctrlc::set_handler(move || {
+            flag.store(true, Ordering::Relaxed);
+            if at_once.load(Ordering::Relaxed) {
+                output::say("error: interrupted while the scene was read; nothing was written");
+                std::process::exit(1);
+            }
+        })
         .context("cannot listen for Ctrl+C")?;
-    Ok(interrupted)
+        Ok(new)
+    }
+
+    /// Whether an interruption ends the program, as is right while there is nothing to be written and no file open.
+    fn ends_at_once(&self, whether: bool) {
+        self.at_once.store(whether, Ordering::Relaxed);
+    }
 }
 
 /// A worker that measures errors if a reference is asked for.
@@ -235,27 +279,31 @@ fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result
     })
 }
 
-fn write_outputs(
+fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<()> {
+    let Some(path) = &arguments.export else {
+        return Ok(());
+    };
+    let export = arguments.run_flags.export(arguments.scene_flags.up);
+    output::write_whole(path, |mut out| {
+        write_ply(&mut out, &run.snapshot, &scene.frame, &export)
+    })
+}
+
+fn write_report(
     arguments: &SolveArguments,
     scene: &Scene,
     run: &Run,
     errors: &Errors,
     totals: Totals,
 ) -> Result<()> {
-    let export = arguments.run_flags.export(arguments.scene_flags.up);
-    if let Some(path) = &arguments.export {
-        output::write_whole(path, |mut out| {
-            write_ply(&mut out, &run.snapshot, &scene.frame, &export)
-        })?;
-    }
-    if let Some(path) = &arguments.report {
-        let report = report(arguments, scene, run, errors, totals);
-        output::write_whole(path, |out| {
-            serde_json::to_writer_pretty(&mut *out, &report)?;
-            out.write_all(b"\n")
-        })?;
-    }
-    Ok(())
+    let Some(path) = &arguments.report else {
+        return Ok(());
+    };
+    let report = report(arguments, scene, run, errors, totals);
+    output::write_whole(path, |out| {
+        serde_json::to_writer_pretty(&mut *out, &report)?;
+        out.write_all(b"\n")
+    })
 }
 
 fn report(

@@ -252,7 +252,8 @@ impl SceneBuilder {
         let skipped = self.drop_faces(|face| {
             let [a, b, c] = face.corners.map(|corner| corner_of[corner as usize]);
             let area = area_vector(face.corners.map(|corner| positions[corner as usize]), frame);
-            let vanished = a == b || b == c || c == a || area == Vec3::ZERO;
+            // Of areas whose square underflows there is no direction either.
+            let vanished = a == b || b == c || c == a || area.length() == 0.0;
             vanished.then_some("too small next to the size of the scene")
         });
         self.positions = positions;
@@ -693,6 +694,20 @@ mod tests {
                 .message
                 .contains("too small next to the size")
         );
+    }
+
+    #[test]
+    fn faces_whose_area_has_no_square_in_single_precision_are_dropped() {
+        let mut points = TRIANGLE.to_vec();
+        // About the origin, so that the small triangle keeps its corners apart.
+        points.extend([[1e14, 0.0, 0.0], [-1e14, 0.0, 0.0], [0.0, 1e14, 0.0]]);
+        points.push([0.0, -1e14, 0.0]);
+        let mut builder = builder_of(&points);
+        builder.push_triangle([0, 1, 2], MaterialId(0));
+        builder.push_triangle([3, 4, 5], MaterialId(0));
+        builder.push_triangle([3, 4, 6], MaterialId(0));
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        assert_eq!(scene.triangles.len(), 2);
     }
 
     #[test]

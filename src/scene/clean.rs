@@ -393,7 +393,7 @@ impl<R: BufRead> ObjCleaner<R> {
 }
 
 /// Material files that are looked at: searching a list of names must not take longer than reading the file.
-const MAX_LIBRARIES: usize = 1000;
+pub(super) const MAX_LIBRARIES: usize = 1000;
 
 /// `v`, `v/vt`, `v//vn` or `v/vt/vn` as they stand.
 fn parse_corner(word: &[u8]) -> Result<[Option<i64>; 3], Reason> {

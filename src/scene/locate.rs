@@ -1,4 +1,5 @@
-//! Where the files are that an OBJ or MTL file names: never outside the folder of the OBJ file.
+//! Where the files are that an OBJ or MTL file names: never outside the folder of the OBJ file, not even by a symbolic
+//! link, and never a pipe or a device.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -14,7 +15,7 @@ pub(super) enum Missing {
 /// Find a file by the name that a file in `folder` (relative to `root`) gives it; returns a path relative to `root`.
 ///
 /// Tried in turn: as it stands beside the naming file and beside the OBJ file, the same with `\` as `/`, then the bare
-/// file name in both folders.
+/// file name in both folders. Symbolic links are followed where they stay inside.
 pub(super) fn locate(root: &Path, folder: &Path, name: &str) -> Result<PathBuf, Missing> {
     let name = name.trim().trim_matches('"');
     let slashed = name.replace('\\', "/");
@@ -23,7 +24,10 @@ pub(super) fn locate(root: &Path, folder: &Path, name: &str) -> Result<PathBuf, 
     for spelling in [name, &slashed, base_name] {
         for start in [folder, Path::new("")] {
             match inside(start, Path::new(spelling)) {
-                Some(path) if root.join(&path).is_file() => return Ok(path),
+                Some(path) if root.join(&path).is_file() => match stays_inside(root, &path) {
+                    true => return Ok(path),
+                    false => missing = Missing::Outside,
+                },
                 Some(_) => {}
                 None => missing = Missing::Outside,
             }
@@ -34,6 +38,15 @@ pub(super) fn locate(root: &Path, folder: &Path, name: &str) -> Result<PathBuf, 
         missing = Missing::Outside;
     }
     Err(missing)
+}
+
+/// Whether a file is still below the root when all symbolic links are followed.
+fn stays_inside(root: &Path, path: &Path) -> bool {
+    let followed = root.canonicalize().and_then(|inside| {
+        let file = root.join(path).canonicalize()?;
+        Ok(file.starts_with(inside))
+    });
+    followed.unwrap_or(false)
 }
 
 /// `start/name` without `.` and `..`, unless it leaves the root.

@@ -14,6 +14,7 @@ mod locate;
 mod mtl;
 mod obj;
 mod sidedness;
+mod source;
 mod texture;
 mod triangulate;
 mod warning;

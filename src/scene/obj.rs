@@ -12,9 +12,10 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::build::{BuildError, Face, SceneBuilder, SceneOptions, Source};
-use super::clean::{Mention, Notes, ObjCleaner};
+use super::clean::{MAX_LIBRARIES, Mention, Notes, ObjCleaner};
 use super::locate::{Missing, locate};
 use super::mtl::{MtlMaterial, TextureReference, read_mtl};
+use super::source;
 use super::texture::linear_from_srgb;
 use super::triangulate::{MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
@@ -32,6 +33,12 @@ pub enum ReadError {
     /// A folder instead of a file.
     #[error("this is a folder; name the OBJ file in it: {}", path.display())]
     Folder {
+        /// What was asked for.
+        path: PathBuf,
+    },
+    /// A pipe or a device: it may have no end.
+    #[error("this is a pipe or a device; save the scene to a file first: {}", path.display())]
+    NotFile {
         /// What was asked for.
         path: PathBuf,
     },
@@ -88,13 +95,17 @@ pub enum ReadError {
 /// # Errors
 /// [`ReadError`] when no scene is left; everything else is a warning in [`Scene::warnings`].
 pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError> {
-    let reader = open(path)?;
+    let (reader, watch) = source::open(path)?;
     let file = path
         .file_name()
         .unwrap_or(path.as_os_str())
         .to_string_lossy()
         .into_owned();
-    let (models, notes) = parse(path, ObjCleaner::new(reader, &file))?;
+    let (models, mut notes) = parse(path, ObjCleaner::new(reader, &file))?;
+    if watch.has_changed() {
+        let message = "the file changed while it was read; open it again once it is whole";
+        notes.log.note(WarningKind::FileChanged, message, "", 0);
+    }
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     let mut import = Import {
         options,
@@ -109,6 +120,7 @@ pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError>
         notes,
         textures: HashMap::new(),
         pixel_budget: PIXEL_BUDGET,
+        library_budget: MAX_LIBRARIES,
         slots: Vec::new(),
         default_slot: None,
     };
@@ -123,49 +135,6 @@ fn folder_of(path: &Path) -> PathBuf {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
         _ => PathBuf::from("."),
     }
-}
-
-/// Open the file and refuse early what is no OBJ text.
-fn open(path: &Path) -> Result<BufReader<File>, ReadError> {
-    let path_buf = || path.to_owned();
-    let unreadable = |error: std::io::Error| match error.kind() {
-        std::io::ErrorKind::NotFound => ReadError::NotFound { path: path_buf() },
-        std::io::ErrorKind::IsADirectory => ReadError::Folder { path: path_buf() },
-        _ => ReadError::Unreadable {
-            reason: error.to_string(),
-            path: path_buf(),
-        },
-    };
-    if path.is_dir() {
-        return Err(ReadError::Folder { path: path_buf() });
-    }
-    let file = File::open(path).map_err(unreadable)?;
-    let mut reader = BufReader::with_capacity(256 << 10, file);
-    let head = reader.fill_buf().map_err(unreadable)?;
-    if head.is_empty() {
-        return Err(ReadError::Empty { path: path_buf() });
-    }
-    if looks_binary(head) {
-        return Err(ReadError::NotObj { path: path_buf() });
-    }
-    Ok(reader)
-}
-
-/// Whether the beginning of a file holds no OBJ statement but bytes that text does not have, or is UTF-16.
-fn looks_binary(head: &[u8]) -> bool {
-    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return true;
-    }
-    let control = |byte: &u8| *byte < 32 && !byte.is_ascii_whitespace();
-    let statement = |line: &[u8]| {
-        let (keyword, rest) = super::lines::split_keyword(line);
-        let known: [&[u8]; 7] = [b"v", b"f", b"o", b"g", b"vn", b"vt", b"mtllib"];
-        known.contains(&keyword) && !rest.is_empty()
-    };
-    head.iter().any(control)
-        && !head
-            .split(|&byte| byte == b'\n' || byte == b'\r')
-            .any(statement)
 }
 
 /// Run the parser over the clean text.
@@ -223,6 +192,8 @@ struct Import<'a> {
     /// Pictures by path; nothing where reading failed.
     textures: HashMap<PathBuf, Option<TextureId>>,
     pixel_budget: usize,
+    /// Names of MTL files that are still looked for.
+    library_budget: usize,
     /// By index in [`Notes::materials`].
     slots: Vec<Slot>,
     default_slot: Option<Slot>,
@@ -266,7 +237,7 @@ impl Import<'_> {
         let names = unknown
             .iter()
             .take(LISTED)
-            .map(|mention| format!("'{}'", mention.name));
+            .map(|mention| format!("'{}'", shortened(&mention.name)));
         let mut listed = names.collect::<Vec<_>>().join(", ");
         if unknown.len() > LISTED {
             listed += &format!(" and {} more", unknown.len() - LISTED);
@@ -301,7 +272,12 @@ impl Import<'_> {
         if let Ok(path) = locate(&self.root, here, &mention.name) {
             return vec![path];
         }
-        let mut words: Vec<&str> = mention.name.split_whitespace().collect();
+        let mut words: Vec<&str> = mention
+            .name
+            .split_whitespace()
+            .take(self.library_budget)
+            .collect();
+        self.library_budget -= words.len();
         let all = words
             .iter()
             .map(|word| locate(&self.root, here, word))

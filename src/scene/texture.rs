@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel};
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +55,7 @@ impl Texture {
         let decoded = std::panic::catch_unwind(|| decode(path));
         match decoded {
             Ok(Ok(picture)) if picture.width() > 0 && picture.height() > 0 => {
-                Ok(Self::from_picture(picture, name).reduced_to(MAX_PIXELS))
+                Ok(Self::from_picture(picture, name))
             }
             Ok(Ok(_)) => Err("it has no pixels".to_owned()),
             Ok(Err(error)) => Err(error.to_string()),
@@ -63,40 +63,36 @@ impl Texture {
         }
     }
 
+    /// Linear pixels of a picture, averaged down on the way where it is large: a picture of a few hundred kilobytes
+    /// may hold pixels for gigabytes.
     fn from_picture(picture: DynamicImage, name: &str) -> Self {
-        let (width, height) = (picture.width(), picture.height());
-        let pixels = match picture {
-            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => picture
-                .into_rgb32f()
-                .pixels()
-                .map(|pixel| Vec3::from_array(pixel.0).map(cured))
-                .collect(),
+        let table: Vec<f32> = (0..=255_u8)
+            .map(|x| linear_from_srgb(f32::from(x) / 255.0))
+            .collect();
+        let byte = |x: u8| table[usize::from(x)];
+        let word = |x: u16| linear_from_srgb(f32::from(x) / 65_535.0);
+        match picture {
+            DynamicImage::ImageLuma8(pixels) => {
+                averaged(&pixels, name, |pixel| Vec3::splat(byte(pixel.0[0])))
+            }
+            DynamicImage::ImageRgba8(pixels) => {
+                averaged(&pixels, name, |pixel| color_of(pixel.0, byte))
+            }
+            DynamicImage::ImageRgb16(pixels) => {
+                averaged(&pixels, name, |pixel| color_of(pixel.0, word))
+            }
             DynamicImage::ImageLuma16(_)
             | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgb16(_)
-            | DynamicImage::ImageRgba16(_) => picture
-                .into_rgb16()
-                .pixels()
-                .map(|pixel| {
-                    Vec3::from_array(pixel.0.map(|x| linear_from_srgb(f32::from(x) / 65_535.0)))
-                })
-                .collect(),
-            _ => {
-                let table: Vec<f32> = (0..=255_u8)
-                    .map(|x| linear_from_srgb(f32::from(x) / 255.0))
-                    .collect();
-                picture
-                    .into_rgb8()
-                    .pixels()
-                    .map(|pixel| Vec3::from_array(pixel.0.map(|x| table[usize::from(x)])))
-                    .collect()
+            | DynamicImage::ImageRgba16(_) => {
+                averaged(&picture.into_rgb16(), name, |pixel| color_of(pixel.0, word))
             }
-        };
-        Self {
-            name: name.to_owned(),
-            width,
-            height,
-            pixels,
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+                averaged(&picture.into_rgb32f(), name, |pixel| {
+                    color_of(pixel.0, cured)
+                })
+            }
+            // Takes no copy where it is of this kind already.
+            _ => averaged(&picture.into_rgb8(), name, |pixel| color_of(pixel.0, byte)),
         }
     }
 
@@ -135,6 +131,51 @@ impl Texture {
     pub(super) fn is_consistent(&self) -> bool {
         let count = self.width as usize * self.height as usize;
         count > 0 && count == self.pixels.len()
+    }
+}
+
+/// Red, green and blue of a pixel, each turned into a linear value.
+fn color_of<T: Copy, const N: usize>(channels: [T; N], linear: impl Fn(T) -> f32) -> Vec3 {
+    let [red, green, blue] = [0, 1, 2].map(|channel| linear(channels[channel]));
+    Vec3::new(red, green, blue)
+}
+
+/// Means of blocks of pixels, of the smallest power of two that leaves at most [`MAX_PIXELS`].
+fn averaged<P: Pixel>(
+    picture: &ImageBuffer<P, Vec<P::Subpixel>>,
+    name: &str,
+    linear: impl Fn(&P) -> Vec3,
+) -> Texture {
+    let sides = |block: u32| {
+        (
+            picture.width().div_ceil(block),
+            picture.height().div_ceil(block),
+        )
+    };
+    let mut block = 1;
+    while let (width, height) = sides(block)
+        && width as usize * height as usize > MAX_PIXELS
+    {
+        block *= 2;
+    }
+    let (width, height) = sides(block);
+    let mut pixels = vec![Vec3::ZERO; width as usize * height as usize];
+    for (y, row) in (0..).zip(picture.rows()) {
+        let start = (y / block) as usize * width as usize;
+        let above = y / block * block;
+        let block_height = (picture.height() - above).min(block);
+        for (x, pixel) in (0..).zip(row) {
+            let left = x / block * block;
+            let block_width = (picture.width() - left).min(block);
+            let share = 1.0 / (block_width * block_height) as f32;
+            pixels[start + (x / block) as usize] += linear(pixel) * share;
+        }
+    }
+    Texture {
+        name: name.to_owned(),
+        width,
+        height,
+        pixels,
     }
 }
 
@@ -254,6 +295,21 @@ mod tests {
         let small = texture.reduced_to(1);
         assert_eq!((small.width, small.height), (1, 1));
         assert_eq!(small.pixels[0], Vec3::splat(7.5));
+    }
+
+    #[test]
+    fn large_pictures_are_averaged_in_blocks_that_may_be_cut_at_the_edge() {
+        // 4097 × 4097 needs blocks of two; the last row and column have blocks of one.
+        let picture = image::GrayImage::from_fn(4097, 4097, |x, y| {
+            image::Luma([if x == 4096 || y == 0 { 255 } else { 0 }])
+        });
+        let texture = Texture::from_picture(picture.into(), "");
+        assert_eq!((texture.width, texture.height), (2049, 2049));
+        assert!(texture.is_consistent());
+        assert_eq!(texture.pixels[0], Vec3::splat(0.5));
+        assert_eq!(texture.pixels[2048], Vec3::ONE);
+        assert_eq!(texture.pixels[2049], Vec3::ZERO);
+        assert_eq!(texture.pixels[2049 * 2049 - 1], Vec3::ONE);
     }
 
     #[test]

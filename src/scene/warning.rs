@@ -21,6 +21,8 @@ pub enum WarningKind {
     Unsupported,
     /// Nothing in the scene emits light.
     NoEmitter,
+    /// The file changed while it was read.
+    FileChanged,
     /// Something about orientation or sidedness that deserves a look.
     Orientation,
 }
@@ -76,6 +78,9 @@ impl WarningLog {
         line: usize,
     ) {
         const OVERFLOW: &str = "more of this kind, not listed one by one";
+        // A name in a file must neither break the line nor command the terminal.
+        let printable = message.replace(char::is_control, "\u{fffd}");
+        let message = printable.as_str();
         let message = if self.find(kind, message).is_none() && self.warnings.len() >= MAX_DISTINCT {
             OVERFLOW
         } else {
@@ -128,6 +133,16 @@ mod tests {
         assert_eq!(
             warnings[0].to_string(),
             "a.obj:3: skipped a face: no area (2 times)"
+        );
+    }
+
+    #[test]
+    fn control_characters_do_not_reach_the_reader() {
+        let mut log = WarningLog::default();
+        log.note(WarningKind::LineSkipped, "bad \x1b[2J\nname", "", 0);
+        assert_eq!(
+            log.into_warnings()[0].message,
+            "bad \u{fffd}[2J\u{fffd}name"
         );
     }
 

@@ -135,8 +135,90 @@ impl SolveSettings {
     }
 }
 
+impl SolveSettings {
+    /// The first setting out of its range, as one sentence.
+    ///
+    /// # Errors
+    /// Where there is one.
+    pub fn check(&self) -> Result<(), String> {
+        let sentence = |name: &str, value: &dyn std::fmt::Display, range: &str| {
+            Err(format!("{name} is {value}, but must be {range}"))
+        };
+        // Written so that a NaN is out of every range.
+        for (name, value) in [("epsilon", self.epsilon), ("min_area", self.min_area)] {
+            if !(0.0..=f32::MAX).contains(&value) {
+                return sentence(name, &value, "a number of at least 0");
+            }
+        }
+        for (name, value) in [
+            ("mesh_tolerance", self.mesh_tolerance),
+            ("tolerance", self.tolerance),
+        ] {
+            if !(f32::MIN_POSITIVE..=f32::MAX).contains(&value) {
+                return sentence(name, &value, "a number above 0");
+            }
+        }
+        if !(0.0..=180.0).contains(&self.crease_degrees) {
+            let range = "within 0 and 180";
+            return sentence("crease_degrees", &self.crease_degrees, range);
+        }
+        for (name, value, most) in [
+            ("samples", self.samples, 4096),
+            ("shadow_samples", self.shadow_samples, 1024),
+            ("max_steps", self.max_steps, u32::MAX),
+        ] {
+            if !(1..=most).contains(&value) {
+                return sentence(name, &value, &format!("within 1 and {most}"));
+            }
+        }
+        Ok(())
+    }
+}
+
 impl Default for SolveSettings {
     fn default() -> Self {
         Self::normal()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_in_range_and_numbers_out_of_it_are_named() {
+        for preset in [
+            SolveSettings::draft(),
+            SolveSettings::normal(),
+            SolveSettings::finest(),
+        ] {
+            assert_eq!(preset.check(), Ok(()));
+        }
+        for (settings, name) in [
+            (
+                SolveSettings {
+                    epsilon: f32::NAN,
+                    ..SolveSettings::normal()
+                },
+                "epsilon is NaN",
+            ),
+            (
+                SolveSettings {
+                    tolerance: 0.0,
+                    ..SolveSettings::normal()
+                },
+                "tolerance is 0",
+            ),
+            (
+                SolveSettings {
+                    samples: 5000,
+                    ..SolveSettings::normal()
+                },
+                "samples is 5000, but must be within 1 and 4096",
+            ),
+        ] {
+            let sentence = settings.check().unwrap_err();
+            assert!(sentence.starts_with(name), "{sentence}");
+        }
     }
 }

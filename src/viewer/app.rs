@@ -128,7 +128,7 @@ impl eframe::App for App {
         if let Some(secs) = frame.info().cpu_usage {
             self.state.frame_times.push(secs);
         }
-        if self.faults.is_lost() {
+        if self.faults.must_close() {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         self.drain();

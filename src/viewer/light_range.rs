@@ -47,7 +47,7 @@ pub fn false_color_range(
     errors: Option<&[f32]>,
 ) -> [f32; 2] {
     if let Some([low, high]) = view.fixed_range {
-        return [low, high.max(low + f32::MIN_POSITIVE)];
+        return [low, high.max(low.next_up())];
     }
     if view.mode.false_color_unit().is_none() {
         return [0.0, 1.0];

@@ -157,6 +157,11 @@ pub struct LinkOverlay {
     pub most: u32,
 }
 
+impl LinkOverlay {
+    /// Links that can be drawn. More hide each other and the scene.
+    pub const MOST_RANGE: std::ops::RangeInclusive<u32> = 1..=4096;
+}
+
 impl Default for LinkOverlay {
     fn default() -> Self {
         Self {

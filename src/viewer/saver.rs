@@ -1,15 +1,16 @@
 //! Pictures to files, on a thread of their own.
 
 use std::{
+    io::Cursor,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError, mpsc::Sender},
     thread::{self, JoinHandle},
 };
 
-use image::{DynamicImage, Rgb32FImage, RgbaImage};
+use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
 
 use super::state::Severity;
-use crate::worker::Wake;
+use crate::{export::write_whole, worker::Wake};
 
 /// A sentence from another thread.
 pub type Notice = (Severity, String);
@@ -66,19 +67,10 @@ impl Saving {
     }
 
     fn write(self) -> Notice {
-        let is_exr = self
-            .path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
-        let picture = match (self.radiance, is_exr) {
-            (Some(radiance), true) => DynamicImage::from(radiance),
-            (None, true) => {
-                let text = "this graphics adapter draws no linear pictures; save a PNG instead";
-                return (Severity::Error, text.to_owned());
-            }
-            (_, false) => DynamicImage::from(DynamicImage::from(self.display).into_rgb8()),
-        };
-        match picture.save(&self.path) {
+        let saved = encode(self.display, self.radiance, &self.path).and_then(|bytes| {
+            write_whole(&self.path, |out| out.write_all(&bytes)).map_err(EncodeError::Write)
+        });
+        match saved {
             Ok(()) => {
                 let place = std::path::absolute(&self.path).unwrap_or(self.path);
                 (Severity::Note, format!("saved {}", place.display()))
@@ -89,6 +81,40 @@ impl Saving {
             }
         }
     }
+}
+
+/// Why a picture does not become a file.
+#[derive(Debug, thiserror::Error)]
+pub enum EncodeError {
+    /// Radiance is asked for, and there is none.
+    #[error("this graphics adapter draws no linear pictures; save a PNG instead")]
+    NoRadiance,
+    /// The format is unknown or does not take it.
+    #[error(transparent)]
+    Format(#[from] image::ImageError),
+    /// The system refuses.
+    #[error(transparent)]
+    Write(std::io::Error),
+}
+
+/// The bytes of a picture file of this name; `.exr` takes the radiance, anything else the display colours.
+///
+/// # Errors
+/// See [`EncodeError`].
+pub fn encode(
+    display: RgbaImage,
+    radiance: Option<Rgb32FImage>,
+    path: &Path,
+) -> Result<Vec<u8>, EncodeError> {
+    let format = ImageFormat::from_path(path)?;
+    let picture = match (format, radiance) {
+        (ImageFormat::OpenExr, Some(radiance)) => DynamicImage::from(radiance),
+        (ImageFormat::OpenExr, None) => return Err(EncodeError::NoRadiance),
+        _ => DynamicImage::from(DynamicImage::from(display).into_rgb8()),
+    };
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format)?;
+    Ok(bytes.into_inner())
 }
 
 /// A name in the pictures folder that is free: `scene_1.png` and on.

@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    io::{self, Read as _},
     path::{Path, PathBuf},
 };
 
@@ -9,7 +10,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{camera::Camera, loader::SceneSource, view::ViewSettings};
-use crate::{scene::Frame, solver::SolveSettings};
+use crate::{export::write_whole, scene::Frame, solver::SolveSettings};
 
 /// Scenes that the menu remembers.
 const MOST_RECENT: usize = 12;
@@ -94,8 +95,16 @@ pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
 }
 
 /// A sidecar's text in the scene's frame.
+///
+/// # Errors
+/// One sentence where the text is no sidecar or a number in it is out of its range.
 pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
-    let saved: Sidecar = toml::from_str(text).map_err(|error| error.message().to_owned())?;
+    let saved: Sidecar = toml::from_str(text).map_err(|error| {
+        // It may quote the text.
+        error.message().replace(char::is_control, "\u{fffd}")
+    })?;
+    saved.settings.check()?;
+    saved.view.check()?;
     let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };
     let camera = saved.camera.map(|camera| Camera {
         fov_y_radians: camera.view_angle_degrees.to_radians(),
@@ -121,18 +130,40 @@ pub fn save(source: &SceneSource, session: &Session, frame: &Frame) -> Result<Pa
     let path = sidecar_path(source)
         .ok_or("a built-in scene has no file to save settings beside; write it with 'vecrad scenes --write' first")?;
     let text = to_toml(session, frame)?;
-    fs::write(&path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+    write_whole(&path, |out| out.write_all(text.as_bytes()))
+        .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
     Ok(path)
 }
 
 /// The session beside a scene: `None` without a sidecar.
 pub fn load(source: &SceneSource, frame: &Frame) -> Option<Result<Session, String>> {
     let path = sidecar_path(source)?;
-    let text = fs::read_to_string(&path).ok()?;
+    let text = match read(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+        text => text.map_err(|error| error.to_string()),
+    };
     Some(
-        from_toml(&text, frame)
+        text.and_then(|text| from_toml(&text, frame))
             .map_err(|error| format!("{} was not used: {error}", path.display())),
     )
+}
+
+/// Bytes of the largest sidecar that is read; ours have about a thousand.
+const MOST_BYTES: u64 = 1 << 20;
+
+fn read(path: &Path) -> io::Result<String> {
+    let refused = |reason: &str| Err(io::Error::other(reason));
+    // Asked before it is opened: opening a pipe waits for somebody to write.
+    if !fs::metadata(path)?.is_file() {
+        return refused("it is not a file");
+    }
+    let mut text = String::new();
+    let mut file = fs::File::open(path)?.take(MOST_BYTES + 1);
+    file.read_to_string(&mut text)?;
+    if text.len() as u64 > MOST_BYTES {
+        return refused("it is larger than 1 MiB");
+    }
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -176,6 +207,38 @@ mod tests {
         };
         let error = from_toml("settings = 3", &frame).expect_err("not a table");
         assert!(!error.contains('\n'), "{error}");
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_one_sentence() {
+        let frame = Frame {
+            centre: DVec3::ZERO,
+            scale: 1.0,
+        };
+        for (text, sentence) in [
+            (
+                "settings.samples = 0",
+                "samples is 0, but must be within 1 and 4096",
+            ),
+            (
+                "settings.epsilon = nan",
+                "epsilon is NaN, but must be a number of at least 0",
+            ),
+            (
+                "settings.tolerance = -1.0",
+                "tolerance is -1, but must be a number above 0",
+            ),
+            (
+                "view.emission_scale = inf",
+                "emission_scale is inf, but must be a number of at least 0",
+            ),
+            (
+                "view.links.most = 4000000000",
+                "links.most is 4000000000, but must be within 1 and 4096",
+            ),
+        ] {
+            assert_eq!(from_toml(text, &frame).expect_err(text), sentence);
+        }
     }
 
     #[test]

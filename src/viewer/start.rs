@@ -118,6 +118,7 @@ pub fn run(options: Options) -> Result<(), ViewerError> {
         Box::new(move |cc| {
             cc.egui_ctx
                 .add_font_provider(Arc::new(SystemFonts::default()));
+            app_faults.listen_to_signals(cc.egui_ctx.clone());
             Ok(Box::new(App::new(cc, options, app_faults)?))
         }),
     );
@@ -183,12 +184,12 @@ fn essence(text: &str) -> String {
         .to_owned()
 }
 
-/// What the graphics device complained of, from whatever thread.
+/// What comes from outside the window, from whatever thread: complaints of the graphics device, signals of the system.
 #[derive(Default)]
 pub struct Faults {
     sentences: Mutex<Vec<String>>,
     lost: OnceLock<String>,
-    is_lost: AtomicBool,
+    must_close: AtomicBool,
 }
 
 impl Faults {
@@ -199,7 +200,7 @@ impl Faults {
             // Closing the window drops the device, too.
             if reason != wgpu::DeviceLostReason::Destroyed {
                 let _ = faults.lost.set(text.replace('\n', " "));
-                faults.is_lost.store(true, Ordering::Relaxed);
+                faults.must_close.store(true, Ordering::Relaxed);
                 waker();
             }
         });
@@ -215,9 +216,23 @@ impl Faults {
         }));
     }
 
-    /// Whether the device is gone.
-    pub fn is_lost(&self) -> bool {
-        self.is_lost.load(Ordering::Relaxed)
+    /// Close the window on Ctrl+C and when the system ends the program, so that what is being written is written; a
+    /// second signal ends the program at once.
+    fn listen_to_signals(self: &Arc<Self>, ctx: egui::Context) {
+        let faults = self.clone();
+        let listening = ctrlc::set_handler(move || {
+            if faults.must_close.swap(true, Ordering::Relaxed) {
+                std::process::exit(1);
+            }
+            ctx.request_repaint();
+        });
+        // Without, a signal ends the program as it would any other.
+        drop(listening);
+    }
+
+    /// Whether the window is to close: the device is gone, or a signal came.
+    pub fn must_close(&self) -> bool {
+        self.must_close.load(Ordering::Relaxed)
     }
 
     /// Sentences since the last call.

@@ -187,6 +187,44 @@ impl ViewSettings {
     /// Exposures beyond this leave the range of the picture's half floats.
     pub const EXPOSURE_RANGE: std::ops::RangeInclusive<f32> = -20.0..=20.0;
 
+    /// The first value out of its range, as one sentence.
+    ///
+    /// # Errors
+    /// Where there is one.
+    pub fn check(&self) -> Result<(), String> {
+        let sentence = |name: &str, value: f32, range: &str| {
+            Err(format!("{name} is {value}, but must be {range}"))
+        };
+        // Written so that a NaN is out of every range.
+        if !(0.0..=f32::MAX).contains(&self.emission_scale) {
+            return sentence(
+                "emission_scale",
+                self.emission_scale,
+                "a number of at least 0",
+            );
+        }
+        // Those beyond the range that can be shown are brought into it where they are used.
+        if !self.exposure.is_finite() {
+            return sentence("exposure", self.exposure, "a number");
+        }
+        if let Some(end) = self
+            .fixed_range
+            .and_then(|ends| ends.into_iter().find(|end| !end.is_finite()))
+        {
+            return sentence("fixed_range", end, "two numbers");
+        }
+        if !ClusterOverlay::SIZE_RANGE.contains(&self.clusters.size) {
+            return sentence("clusters.size", self.clusters.size, "within 0.001 and 1");
+        }
+        if !LinkOverlay::MOST_RANGE.contains(&self.links.most) {
+            let most = self.links.most;
+            return Err(format!(
+                "links.most is {most}, but must be within 1 and 4096"
+            ));
+        }
+        Ok(())
+    }
+
     /// What a mode's quantity is multiplied by, before exposure.
     pub fn light_factor(&self) -> f32 {
         match self.mode {

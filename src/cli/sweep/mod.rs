@@ -17,7 +17,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::{Args, builder::PossibleValuesParser};
 
 use super::{
-    Outcome, Reference, SceneFlags, SettingFlags, UsageError, flags::seconds, solve::interruption,
+    Outcome, Reference, SceneFlags, SettingFlags, UsageError, flags::seconds, solve::Interruption,
 };
 use plan::PlanFlags;
 use session::{Session, Source};
@@ -75,7 +75,7 @@ pub struct LimitFlags {
 /// Measure, and write after every scene.
 pub(super) fn report(arguments: &ReportArguments) -> Result<Outcome> {
     make_folder(arguments)?;
-    let mut session = Session::new(arguments, interruption()?)?;
+    let mut session = Session::new(arguments, Interruption::listen()?.flag)?;
     if let Some(name) = &arguments.suite {
         suite::run(name, &mut session)?;
     } else {

@@ -90,7 +90,14 @@ impl App {
             None => {}
         }
         if let Some(first) = self.first.take() {
-            camera = first.camera.apply(camera, frame);
+            let wanted = first.camera.apply(camera, frame);
+            if wanted.is_valid() {
+                camera = wanted;
+            } else {
+                let text =
+                    "the camera of the command line is too far from the scene and was not used";
+                self.state.messages.push(Severity::Warning, text);
+            }
             if let Some(exposure) = first.exposure {
                 self.state.view.exposure = exposure;
                 self.state.view.auto_exposure = false;

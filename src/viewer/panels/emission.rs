@@ -22,7 +22,10 @@ pub fn emission_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
                     .clamping(egui::SliderClamping::Never)
                     .custom_formatter(|value, _| figure(value))
                     .custom_parser(|text| {
-                        text.trim().parse().ok().filter(|value: &f64| *value >= 0.0)
+                        let value = text.trim().parse::<f64>().ok()?;
+                        (0.0..=f64::from(f32::MAX))
+                            .contains(&value)
+                            .then_some(value)
                     }),
             )
         },

@@ -6,11 +6,8 @@ use super::{count, figure, legend::scale_ui, row};
 use crate::viewer::{
     links,
     state::State,
-    view::{LinkColor, LinkEnd},
+    view::{LinkColor, LinkEnd, LinkOverlay},
 };
-
-/// Links drawn at most. More hide each other and the scene.
-const MOST_LINKS: u32 = 4096;
 
 const ENDS: [(LinkEnd, &str, &str); 2] = [
     (
@@ -50,7 +47,7 @@ pub fn links_ui(ui: &mut egui::Ui, state: &mut State) {
     let label = ui
         .label("Strongest")
         .on_hover_text("How many links are drawn at most");
-    let slider = Slider::new(&mut overlay.most, 1..=MOST_LINKS).logarithmic(true);
+    let slider = Slider::new(&mut overlay.most, LinkOverlay::MOST_RANGE).logarithmic(true);
     ui.add(slider).labelled_by(label.id);
     summary_ui(ui, state);
 }

@@ -377,5 +377,10 @@ fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> Slider<'_> {
         .logarithmic(true)
         .clamping(egui::SliderClamping::Never)
         .custom_formatter(|value, _| super::figure(value))
-        .custom_parser(|text| text.trim().parse().ok().filter(|value: &f64| *value > 0.0))
+        .custom_parser(|text| {
+            let value = text.trim().parse::<f32>().ok()?;
+            (f32::MIN_POSITIVE..=f32::MAX)
+                .contains(&value)
+                .then_some(f64::from(value))
+        })
 }

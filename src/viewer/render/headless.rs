@@ -9,7 +9,13 @@ use super::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target};
 use crate::{
     scene::Scene,
     solver::Snapshot,
-    viewer::{camera::Camera, cluster_lines, light_range, theme, view::ViewSettings},
+    viewer::{
+        camera::Camera,
+        cluster_lines, light_range,
+        saver::{self, EncodeError},
+        theme,
+        view::ViewSettings,
+    },
 };
 
 /// Why there is no headless picture.
@@ -37,20 +43,12 @@ pub struct HeadlessPicture {
 }
 
 impl HeadlessPicture {
-    /// Write a file; `.exr` takes the radiance, anything else the display colours.
+    /// The bytes of a file of this name; `.exr` takes the radiance, anything else the display colours.
     ///
     /// # Errors
-    /// When the file cannot be written or its ending names no format.
-    pub fn save(&self, path: &Path) -> image::ImageResult<()> {
-        let is_exr = path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
-        match (&self.radiance, is_exr) {
-            (Some(radiance), true) => radiance.save(path),
-            _ => image::DynamicImage::from(self.display.clone())
-                .into_rgb8()
-                .save(path),
-        }
+    /// See [`EncodeError`].
+    pub fn encode(self, path: &Path) -> Result<Vec<u8>, EncodeError> {
+        saver::encode(self.display, self.radiance, path)
     }
 }
 

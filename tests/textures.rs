@@ -1,0 +1,191 @@
+//! Pictures that a material names: which are read, which are not, and that neither takes what it should not.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{fs, path::Path};
+
+use glam::Vec3;
+use vecrad::scene::{Scene, SceneOptions, WarningKind, read_obj};
+
+/// A triangle whose material names a picture.
+fn read(folder: &Path, picture: &str) -> Scene {
+    let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n";
+    fs::write(folder.join("scene.obj"), obj).unwrap();
+    let mtl = format!("newmtl m\nKd 0.5 0.25 0.125\nmap_Kd {picture}\n");
+    fs::write(folder.join("a.mtl"), mtl).unwrap();
+    read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap()
+}
+
+/// The picture is not used, the plain colour is, and a warning at the material says why.
+fn assert_refused(folder: &Path, picture: &str, why: &str) {
+    let scene = read(folder, picture);
+    assert!(scene.textures.is_empty(), "{picture}");
+    let plain = Vec3::new(0.5, 0.25, 0.125);
+    assert!(scene.surfaces[0].reflectance.abs_diff_eq(plain, 1e-6));
+    let said = scene.warnings.iter();
+    let said: Vec<_> = said
+        .filter(|warning| warning.kind == WarningKind::TextureMissing)
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(said.len(), 1, "{picture}: {said:?}");
+    assert!(said[0].starts_with("a.mtl:1: texture '"), "{}", said[0]);
+    assert!(said[0].contains(why), "{picture}: {}", said[0]);
+    assert!(
+        said[0].ends_with("; the plain colour is used"),
+        "{}",
+        said[0]
+    );
+}
+
+fn save(path: &Path, side: u32) {
+    let picture = image::RgbImage::from_pixel(side, side, image::Rgb([255, 0, 0]));
+    picture.save(path).unwrap();
+}
+
+/// A PNG that promises so many pixels of four channels and has none.
+fn png_header(width: u32, height: u32) -> Vec<u8> {
+    let mut header = b"IHDR".to_vec();
+    header.extend(width.to_be_bytes());
+    header.extend(height.to_be_bytes());
+    header.extend([8, 6, 0, 0, 0]);
+    // CRC-32 of the chunk (ISO 3309), without which a reader stops before it believes the size.
+    let check = header.iter().fold(u32::MAX, |check, &byte| {
+        (0..8).fold(check ^ u32::from(byte), |check, _| {
+            (check >> 1) ^ (0xedb8_8320 * (check & 1))
+        })
+    });
+    let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
+    png.extend(header);
+    png.extend((!check).to_be_bytes());
+    png
+}
+
+/// A BMP of 24 bits that promises so many pixels and has none.
+fn bmp_header(width: i32, height: i32) -> Vec<u8> {
+    let mut bmp = b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0".to_vec();
+    bmp.extend(width.to_le_bytes());
+    bmp.extend(height.to_le_bytes());
+    bmp.extend([1, 0, 24, 0]);
+    bmp.extend([0; 24]);
+    bmp
+}
+
+#[test]
+fn pictures_beside_the_scene_are_read_whatever_their_ending() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::create_dir(folder.join("maps")).unwrap();
+    save(&folder.join("one.png"), 1);
+    save(&folder.join("maps/b c.bmp"), 3);
+    fs::copy(folder.join("one.png"), folder.join("png.jpg")).unwrap();
+    for picture in [
+        "one.png",
+        "maps/b c.bmp",
+        "maps\\b c.bmp",
+        "maps/../one.png",
+        "C:\\Users\\me\\one.png",
+        "png.jpg",
+    ] {
+        let scene = read(folder, picture);
+        assert_eq!(scene.textures.len(), 1, "{picture}: {:?}", scene.warnings);
+        let red = Vec3::new(0.5, 0.0, 0.0);
+        assert!(scene.surfaces[0].reflectance.abs_diff_eq(red, 1e-5));
+    }
+}
+
+#[test]
+fn broken_pictures_leave_the_plain_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    save(&folder.join("whole.png"), 64);
+    save(&folder.join("whole.bmp"), 64);
+    for name in ["png", "bmp"] {
+        let whole = fs::read(folder.join(format!("whole.{name}"))).unwrap();
+        let cut = &whole[..whole.len() / 2];
+        fs::write(folder.join(format!("cut.{name}")), cut).unwrap();
+    }
+    fs::write(folder.join("empty.png"), "").unwrap();
+    fs::write(folder.join("words.png"), "these are words\n").unwrap();
+    fs::write(
+        folder.join("noise.jpg"),
+        b"\xff\xd8\xff\xe0\0\x10JFIF noise",
+    )
+    .unwrap();
+    fs::create_dir(folder.join("folder.png")).unwrap();
+    assert_refused(folder, "missing.png", "was not found");
+    assert_refused(folder, "folder.png", "was not found");
+    for picture in [
+        "cut.png",
+        "cut.bmp",
+        "empty.png",
+        "words.png",
+        "noise.jpg",
+        "a.mtl",
+    ] {
+        assert_refused(folder, picture, "cannot be used: ");
+    }
+}
+
+#[test]
+fn pictures_that_promise_too_much_are_refused_before_memory_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, bytes) in [
+        // A thousand million pixels: beyond the longest side.
+        ("huge.png", png_header(100_000, 10_000)),
+        ("most.png", png_header(u32::MAX >> 1, u32::MAX >> 1)),
+        ("huge.bmp", bmp_header(30_000, 30_000)),
+        // Just within the limits, but without a pixel.
+        ("16k.png", png_header(16_384, 16_384)),
+        ("16k.bmp", bmp_header(16_384, 16_384)),
+        ("none.png", png_header(0, 7)),
+    ] {
+        fs::write(folder.join(name), bytes).unwrap();
+        assert_refused(folder, name, "cannot be used: ");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn nothing_outside_the_folder_and_no_device_is_read() {
+    use std::os::unix::fs::symlink;
+    let outer = tempfile::tempdir().unwrap();
+    let folder = outer.path().join("scene");
+    fs::create_dir_all(folder.join("maps")).unwrap();
+    save(&outer.path().join("secret.png"), 1);
+    save(&folder.join("maps/inner.png"), 1);
+    symlink("../secret.png", folder.join("link.png")).unwrap();
+    symlink("..", folder.join("up")).unwrap();
+    symlink("/dev/zero", folder.join("zero.png")).unwrap();
+    symlink("loop.png", folder.join("loop.png")).unwrap();
+    symlink("maps/inner.png", folder.join("good.png")).unwrap();
+    let made = std::process::Command::new("mkfifo")
+        .arg(folder.join("pipe.png"))
+        .status();
+    assert!(made.unwrap().success());
+    let outside = "lies outside the folder of the OBJ file and was not read";
+    let absolute = outer.path().join("secret.png");
+    for picture in [
+        "../secret.png",
+        "maps/../../secret.png",
+        "link.png",
+        "up/secret.png",
+        &absolute.to_string_lossy(),
+    ] {
+        assert_refused(&folder, picture, outside);
+    }
+    for picture in ["pipe.png", "zero.png", "loop.png"] {
+        assert_refused(&folder, picture, "was not found");
+    }
+    assert_eq!(read(&folder, "good.png").textures.len(), 1);
+    // The same holds for material files.
+    let mtl = "newmtl m\nKd 0.1\n";
+    fs::write(outer.path().join("secret.mtl"), mtl).unwrap();
+    symlink("../secret.mtl", folder.join("link.mtl")).unwrap();
+    let obj = "mtllib link.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+    fs::write(folder.join("scene.obj"), obj).unwrap();
+    let scene = read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
+    let said = scene.warnings[0].to_string();
+    assert!(said.contains(outside), "{said}");
+    assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.5));
+}
