@@ -5,12 +5,14 @@
 //! gathering and pushing until the light settles, and gathers once more for the vertices.
 
 mod adapt;
+mod anderson;
 mod closure;
 mod direct;
 mod display;
 mod gather;
 mod inspect;
 mod inspection;
+mod iterate;
 mod reconstruct;
 mod report;
 mod settings;
@@ -57,9 +59,6 @@ impl Cancel {
 /// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
 /// again costs more than the new ones.
 const THRESHOLD_FACTOR: f32 = 2.0;
-
-/// Sweeps of one step at most: enough for reflectance 0.98 from nothing.
-const MOST_SWEEPS: u32 = 400;
 
 /// Refinement passes of one step at most: elements divided in one pass take their links over in the next.
 const MOST_PASSES: u32 = 4;
@@ -318,54 +317,6 @@ impl Solver {
         }
         self.pull();
         Some(())
-    }
-
-    /// Gather, push and pull until the change is below tolerance.
-    fn iterate(&mut self, report: &mut StepReport, cancel: &Cancel) -> Option<()> {
-        let mut last_change = f64::INFINITY;
-        loop {
-            if cancel.is_cancelled() {
-                return None;
-            }
-            let mut gathered = gather::gather(self.kernel(), &self.links, self.settings.push);
-            self.scale_to_closure(&mut gathered);
-            let change = gather::area_sum(&self.hierarchy, |leaf| {
-                (gathered[leaf] - self.linked[leaf]).abs()
-            });
-            let total = gather::area_sum(&self.hierarchy, |leaf| {
-                gathered[leaf] + self.direct_of(leaf)
-            });
-            self.linked = gathered;
-            self.pull();
-            report.sweeps += 1;
-            let change = change.element_sum();
-            report.residual = (change / total.element_sum().max(f64::MIN_POSITIVE)) as f32;
-            if last_change.is_finite() && last_change > 0.0 {
-                report.contraction = (change / last_change) as f32;
-            }
-            last_change = change;
-            if report.residual <= self.settings.tolerance || report.sweeps >= MOST_SWEEPS {
-                return Some(());
-            }
-        }
-    }
-
-    /// Scale the colours of all leaves so that their form factors add to the closure.
-    fn scale_to_closure(&self, irradiance: &mut [Vec4]) {
-        let mesh = &self.hierarchy.mesh;
-        // Area and sum of form factors times area, by patch.
-        let mut sums = vec![(0.0f32, 0.0f32); self.hierarchy.patches.len()];
-        for leaf in mesh.leaves() {
-            let element = &mesh.elements[leaf];
-            let area = element.area_vector.length();
-            let sum = &mut sums[element.patch as usize];
-            *sum = (sum.0 + area, sum.1 + area * irradiance[leaf].w);
-        }
-        for leaf in mesh.leaves() {
-            let patch = mesh.elements[leaf].patch as usize;
-            let factor = self.closures[patch].factor_for(irradiance[leaf].w, sums[patch]);
-            irradiance[leaf] = (irradiance[leaf].truncate() * factor).extend(irradiance[leaf].w);
-        }
     }
 
     /// Bytes held.

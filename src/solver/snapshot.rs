@@ -108,9 +108,10 @@ pub struct StepReport {
     pub memory_bytes: u64,
     /// Sweeps of the iteration in this step.
     pub sweeps: u32,
-    /// Change of the last sweep relative to the total power.
+    /// What gathering once more changes, relative to the total power: the residual of the equation that is solved.
     pub residual: f32,
-    /// Largest ratio of successive changes; below 1 while the iteration contracts.
+    /// Largest ratio by which a sweep changed the distance of two lights; below 1 while the iteration contracts, 0 where
+    /// too few sweeps were needed to tell.
     pub contraction: f32,
     /// Power arriving over links and samples, relative to the power that left for it; 1 in a closed scene.
     pub energy_balance: f64,
