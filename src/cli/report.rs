@@ -145,6 +145,19 @@ impl Machine {
     }
 }
 
+impl Machine {
+    /// Processor, cores and system in a phrase.
+    pub(super) fn describe(&self) -> String {
+        let processor = self.processor.as_deref().unwrap_or(self.architecture);
+        let build = if self.debug_build {
+            ", debug build"
+        } else {
+            ""
+        };
+        format!("{processor} ({} cores, {}{build})", self.cores, self.os)
+    }
+}
+
 /// Logical cores that the program may use.
 pub(super) fn core_count() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)

@@ -170,7 +170,7 @@ fn check_outputs(arguments: &SolveArguments) -> Result<()> {
 }
 
 /// A flag that Ctrl+C sets; a second Ctrl+C is the same.
-fn interruption() -> Result<Arc<AtomicBool>> {
+pub(super) fn interruption() -> Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = interrupted.clone();
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))

@@ -21,7 +21,8 @@ pub struct ErrorMeasures {
     pub relative_rms: f64,
     /// The same with the reference's noise still in it.
     pub relative_rms_noisy: f64,
-    /// `relative_rms` without the worst 1 % of the points, which are mostly leaks under contact edges.
+    /// `relative_rms` without the worst 1 % of the points, which are mostly leaks under contact edges. Only points that
+    /// differ by more than the reference's noise can explain are left out.
     pub relative_rms_trimmed: f64,
     /// Mean measured over mean reference; 1 is right, absent where the reference is black.
     pub energy_ratio: Option<f64>,
@@ -141,15 +142,23 @@ fn luminance_measures(samples: &[Sample]) -> ErrorMeasures {
     }
 }
 
+/// Standard errors of the reference by which a point must differ to be left out. Smaller, and noise is trimmed away and
+/// then subtracted once more; larger, and nothing can be trimmed under a noisy reference.
+const OUTLIER_DEVIATIONS: f64 = 4.0;
+
 /// Mean noise-corrected square without the worst 1 %.
 fn trimmed_square(samples: &[Sample]) -> f64 {
-    let mut squares: Vec<f64> = samples
+    let corrected = |s: &Sample| s.difference().powi(2) - s.error.powi(2);
+    let mut outliers: Vec<f64> = samples
         .iter()
-        .map(|s| s.difference().powi(2) - s.error.powi(2))
+        .filter(|s| s.difference().abs() > OUTLIER_DEVIATIONS * s.error)
+        .map(corrected)
         .collect();
-    squares.sort_by(f64::total_cmp);
-    let kept = ((0.99 * squares.len() as f64) as usize).max(1);
-    mean(squares[..kept].iter().copied())
+    outliers.sort_by(|a, b| b.total_cmp(a));
+    let dropped = (samples.len() / 100).min(outliers.len());
+    let sum: f64 = samples.iter().map(corrected).sum();
+    let left = sum - outliers[..dropped].iter().sum::<f64>();
+    left / (samples.len() - dropped).max(1) as f64
 }
 
 /// A measured value that can be summed.

@@ -1,9 +1,15 @@
-//! Measures of error against the truth.
+//! Measures of error against the truth, and of how it falls with time.
 
+mod comparison;
 mod error;
 mod lookup;
+mod scaling;
+mod trajectory;
 mod vertex;
 
+pub use comparison::{ReferenceFacts, Row, SceneComparison, TARGETS, digits, grouped};
 pub use error::{ErrorMeasures, measure_error};
 pub use lookup::MeshLookup;
+pub use scaling::{COST_KINDS, CostKind, SizeCost, exponent_of, fitted_exponent, scaling_markdown};
+pub use trajectory::{Crossing, Measurement, Runner, Trajectory};
 pub use vertex::VertexReference;

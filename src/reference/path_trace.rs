@@ -16,7 +16,7 @@ use super::{
     luminance,
 };
 use crate::{
-    geometry::{Random, RayTree, centroid, low_discrepancy_2d, triangle_point},
+    geometry::{Random, RayTree, low_discrepancy_2d, triangle_point},
     scene::{Scene, TriangleId},
 };
 
@@ -288,66 +288,5 @@ fn surface_point(scene: &Scene, id: TriangleId, is_back: bool, square: Vec2) -> 
         irradiance: Vec3::ZERO,
         irradiance_error: 0.0,
         standard_error: 0.0,
-    }
-}
-
-/// A point to bake: a vertex of one of the triangles that share it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BakePoint {
-    /// Position in frame units.
-    pub position: Vec3,
-    /// Unit normal towards the lit side.
-    pub normal: Vec3,
-    /// The triangle it belongs to.
-    pub triangle: TriangleId,
-}
-
-/// How far a baked vertex is drawn into its triangle, in frame units: at the vertex itself, rays would start in the
-/// plane of the wall beside it and pass through. Far above the offset of rays, far below what can be seen.
-const BAKE_INSET: f32 = 2e-3;
-
-/// Irradiance at given points, each by `samples` paths (rounded up to groups of 8); `None` when cancelled.
-/// Calls with different seeds are independent, so their means may be averaged.
-pub fn bake(
-    scene: &Scene,
-    rays: &RayTree,
-    points: &[BakePoint],
-    samples: u32,
-    seed: u64,
-    cancel: &(dyn Fn() -> bool + Sync),
-) -> Option<Vec<Vec3>> {
-    let emitters = Emitters::new(scene);
-    let estimator = Estimator {
-        scene,
-        rays,
-        emitters: &emitters,
-    };
-    let groups = samples.div_ceil(GROUP).max(1);
-    points
-        .par_iter()
-        .enumerate()
-        .map(|(index, point)| {
-            (!cancel()).then(|| {
-                let start = inset(scene, point);
-                let sum: Vec3 = (0..groups)
-                    .map(|group| {
-                        let stream = (index as u64) << 32 | u64::from(group);
-                        estimate_group(&estimator, start, &mut Random::new(seed, stream)).0
-                    })
-                    .sum();
-                sum / groups as f32
-            })
-        })
-        .collect()
-}
-
-/// Where the paths of a baked vertex start: a little inside its triangle.
-fn inset(scene: &Scene, point: &BakePoint) -> PathPoint {
-    let inward = centroid(scene.corners(point.triangle)) - point.position;
-    let distance = BAKE_INSET.min(inward.length() / 3.0);
-    PathPoint {
-        position: point.position + inward.normalize_or_zero() * distance,
-        normal: point.normal,
-        triangle: point.triangle,
     }
 }

@@ -16,6 +16,7 @@ mod tiled_room;
 
 pub use furnace::{furnace, sphere_furnace};
 pub use plates::{perpendicular_plates, plates};
+pub use room::room_of;
 
 use glam::DVec3;
 

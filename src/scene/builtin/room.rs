@@ -57,6 +57,24 @@ pub(super) fn room_1m() -> SceneBuilder {
     })
 }
 
+/// The fewest triangles of a room: below, walls have no room for light and pedestal.
+const FEWEST: usize = 1_000;
+
+/// The room in this many triangles (at least 1,000), its bodies as dense against the walls as in the sizes above.
+pub fn room_of(triangle_count: usize) -> SceneBuilder {
+    let triangle_count = triangle_count.max(FEWEST);
+    let edge = (triangle_count as f64).sqrt();
+    let cloth = (0.075 * edge).round() as u32;
+    let mut builder = room(&Plan {
+        triangle_count,
+        figure: (0.2 * edge - 1.2).round() as u32,
+        gourd: (0.092 * edge).round() as u32,
+        cloth: cloth + (cloth + triangle_count as u32) % 2,
+    });
+    builder.source.name = format!("room-{triangle_count}");
+    builder
+}
+
 /// Where the lines of the walls must run: walls, pedestal and light in x and z; floor, pedestal top and ceiling in y.
 const X_BREAKS: [f64; 5] = [0.0, 1.1, 1.8, 2.4, 4.0];
 const Y_BREAKS: [f64; 3] = [0.0, 0.7, 2.8];
@@ -231,4 +249,19 @@ fn cloth(rows: u32, material: MaterialId) -> Mesh {
         row_above = this_row;
     }
     mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneOptions;
+
+    #[test]
+    fn a_room_has_the_triangles_that_are_asked_for() {
+        for wanted in [1, 1_022, 4_096, 8_621, 16_385] {
+            let scene = room_of(wanted).finish(&SceneOptions::default()).unwrap();
+            assert_eq!(scene.triangles.len(), wanted.max(FEWEST));
+            assert!(scene.has_emitter() && scene.warnings.is_empty(), "{wanted}");
+        }
+    }
 }

@@ -1,0 +1,204 @@
+//! Solver runs: the worker that the window drives, too, with the error of every step measured off the clock.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use anyhow::{Context as _, Result, bail};
+
+use super::{
+    plan::Configuration,
+    session::{Session, Truth},
+};
+use crate::{
+    metrics::{ErrorMeasures, Measurement, Runner, Trajectory},
+    scene::Scene,
+    solver::{
+        Cancel, DisplayMesh, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject,
+    },
+    worker::{Event, Job, Stepper, StopReason, WorkerHandle},
+};
+
+/// How often an interruption is looked for.
+const POLL: Duration = Duration::from_millis(50);
+
+/// What a configuration brought.
+pub(super) struct SolverRun {
+    /// Error over time.
+    pub(super) trajectory: Trajectory,
+    /// The meshes of the first and of the last step; none if no step came to its end.
+    pub(super) meshes: Option<[Arc<DisplayMesh>; 2]>,
+}
+
+/// What is written down while a run goes on.
+#[derive(Default)]
+struct Record {
+    errors: BTreeMap<u32, ErrorMeasures>,
+    meshes: Option<[Arc<DisplayMesh>; 2]>,
+}
+
+/// Run a configuration as often as asked for.
+pub(super) fn solve(
+    session: &mut Session<'_>,
+    scene: &Arc<Scene>,
+    truth: &Arc<Truth>,
+    configuration: &Configuration,
+) -> Result<SolverRun> {
+    let (mut runs, mut meshes) = (Vec::new(), None);
+    for _ in 0..session.arguments.plan.repeats {
+        if session.is_interrupted() {
+            break;
+        }
+        let run = solve_once(session, scene, truth, configuration)?;
+        meshes = meshes.or(run.meshes);
+        runs.push(run.trajectory);
+    }
+    let trajectory = Trajectory::median(runs).unwrap_or_else(|| trajectory(configuration));
+    Ok(SolverRun { trajectory, meshes })
+}
+
+/// A run without measurements.
+fn trajectory(configuration: &Configuration) -> Trajectory {
+    Trajectory {
+        label: configuration.label.clone(),
+        runner: Runner::Solver,
+        settings: Some(configuration.settings.clone()),
+        repeats: 1,
+        is_cut_short: true,
+        points: Vec::new(),
+    }
+}
+
+fn solve_once(
+    session: &mut Session<'_>,
+    scene: &Arc<Scene>,
+    truth: &Arc<Truth>,
+    configuration: &Configuration,
+) -> Result<SolverRun> {
+    let record = Arc::new(Mutex::new(Record::default()));
+    let mut worker = worker(truth.clone(), record.clone())?;
+    let title = format!("{}: {}", scene.name, configuration.label);
+    session.say(format!("{title}, preparing"));
+    worker.start(
+        scene.clone(),
+        configuration.settings.clone(),
+        session.run_options(),
+    );
+    let (reports, reason) = drain(session, &worker, &title)?;
+    drop(worker);
+    let record = std::mem::take(&mut *record.lock().unwrap_or_else(PoisonError::into_inner));
+    let is_cut_short = reason != StopReason::Converged && reason != StopReason::StepLimit;
+    if is_cut_short {
+        session.note_cut();
+    }
+    let points = reports.into_iter().filter_map(|report| {
+        let error = record.errors.get(&report.step)?.clone();
+        Some(measurement(&report, error))
+    });
+    Ok(SolverRun {
+        trajectory: Trajectory {
+            is_cut_short,
+            points: points.collect(),
+            ..trajectory(configuration)
+        },
+        meshes: record.meshes,
+    })
+}
+
+fn measurement(report: &StepReport, error: ErrorMeasures) -> Measurement {
+    Measurement {
+        step: report.step,
+        time_s: report.solve_s,
+        epsilon: Some(report.epsilon),
+        samples: None,
+        rays: report.shadow_rays,
+        links: report.links,
+        elements: report.elements,
+        memory_bytes: report.memory_bytes,
+        error,
+    }
+}
+
+/// Follow a run to its end.
+fn drain(
+    session: &mut Session<'_>,
+    worker: &WorkerHandle,
+    title: &str,
+) -> Result<(Vec<StepReport>, StopReason)> {
+    let (mut reports, mut is_stopping) = (Vec::new(), false);
+    loop {
+        if session.is_interrupted() && !is_stopping {
+            worker.stop();
+            is_stopping = true;
+        }
+        match worker.next_event(POLL) {
+            None => session.tick(),
+            Some(Event::Stepped(report)) => {
+                session.say(format!("{title}, step {}", report.step));
+                reports.push(report);
+            }
+            Some(Event::Finished(reason)) => return Ok((reports, reason)),
+            Some(Event::Failed(message)) => bail!("the solver failed: {message}"),
+            Some(
+                Event::Started
+                | Event::Prepared { .. }
+                | Event::Inspected(_)
+                | Event::Paused
+                | Event::Continued,
+            ) => {}
+        }
+    }
+}
+
+/// A worker whose solvers are measured after each step.
+fn worker(truth: Arc<Truth>, record: Arc<Mutex<Record>>) -> Result<WorkerHandle> {
+    let make = move |job: Job| {
+        Box::new(Recorder {
+            solver: Solver::new(job.scene, job.settings, job.memory_limit),
+            truth: truth.clone(),
+            record: record.clone(),
+        }) as Box<dyn Stepper>
+    };
+    WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make))
+        .context("cannot start the solver thread")
+}
+
+/// A solver that is measured. The worker's clock stands still while it shows itself.
+struct Recorder {
+    solver: Solver,
+    truth: Arc<Truth>,
+    record: Arc<Mutex<Record>>,
+}
+
+impl Stepper for Recorder {
+    fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        self.solver.step(cancel)
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let snapshot = self.solver.snapshot();
+        if snapshot.step > 0 {
+            let error =
+                self.truth
+                    .measure_mesh(self.solver.scene(), &snapshot.mesh, &snapshot.light);
+            let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(error) = error {
+                record.errors.insert(snapshot.step, error);
+            }
+            let first = record.meshes.take().map(|[first, _]| first);
+            let last = snapshot.mesh.clone();
+            record.meshes = Some([first.unwrap_or_else(|| last.clone()), last]);
+        }
+        snapshot
+    }
+
+    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        self.solver.inspect(subject)
+    }
+
+    fn change_settings(&mut self, settings: SolveSettings) {
+        self.solver.change_settings(settings);
+    }
+}
