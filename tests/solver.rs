@@ -30,7 +30,7 @@ fn finish(builder: SceneBuilder) -> Arc<Scene> {
 
 /// All steps of a solve; each state is checked.
 fn solve(scene: &Arc<Scene>, settings: SolveSettings) -> Snapshot {
-    let mut solver = Solver::new(scene.clone(), settings, None);
+    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
     loop {
         let report = solver.step(&Cancel::default()).unwrap();
         solver.hierarchy().validate().unwrap();
@@ -150,7 +150,8 @@ fn solve_furnace(
         ..one_sided()
     };
     let scene = Arc::new(builder.finish(&options).unwrap());
-    let mut solver = Solver::new(scene.clone(), settings.clone(), None);
+    let mut solver =
+        Solver::new(scene.clone(), settings.clone(), None, &Cancel::default()).unwrap();
     let mut reports: Vec<StepReport> = Vec::new();
     while reports.last().is_none_or(|report| !report.is_final) {
         reports.push(solver.step(&Cancel::default()).unwrap());
@@ -344,8 +345,68 @@ fn a_scene_without_emitters_is_black() {
 }
 
 #[test]
+fn a_memory_limit_holds_and_keeps_what_fits() {
+    let settings = SolveSettings {
+        epsilon: 0.0,
+        min_area: 0.0,
+        max_steps: 6,
+        ..SolveSettings::normal()
+    };
+    let scene = scene("room-1022");
+    for mebibytes in [1, 4, 16] {
+        let limit = mebibytes << 20;
+        let solve = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let never = Cancel::default();
+                let mut solver =
+                    Solver::new(scene.clone(), settings.clone(), Some(limit), &never).unwrap();
+                loop {
+                    let report = solver.step(&never).unwrap();
+                    assert!(report.memory_bytes <= limit, "{mebibytes} MiB: {report:?}");
+                    assert_presentable(&solver.snapshot());
+                    solver.links().validate(solver.hierarchy()).unwrap();
+                    if report.is_final {
+                        return (report, solver.snapshot().light);
+                    }
+                }
+            })
+        };
+        let (report, light) = solve(1);
+        assert!(report.is_full && report.links > 0, "{report:?}");
+        assert!(
+            report
+                .notes
+                .iter()
+                .any(|note| note.contains("memory limit"))
+        );
+        assert!(
+            light
+                .irradiance
+                .iter()
+                .any(|light| light.min_element() > 0.0)
+        );
+        assert_eq!((report, light), solve(3));
+    }
+}
+
+#[test]
+fn a_cancelled_preparation_gives_nothing() {
+    let cancel = Cancel::default();
+    cancel.cancel();
+    let solver = Solver::new(scene("cornell"), SolveSettings::draft(), None, &cancel);
+    assert!(solver.is_none());
+}
+
+#[test]
 fn a_cancelled_step_leaves_the_last_light() {
-    let mut solver = Solver::new(scene("cornell"), SolveSettings::draft(), None);
+    let mut solver = Solver::new(
+        scene("cornell"),
+        SolveSettings::draft(),
+        None,
+        &Cancel::default(),
+    )
+    .unwrap();
     solver.step(&Cancel::default()).unwrap();
     let before = solver.snapshot();
     let cancel = Cancel::default();

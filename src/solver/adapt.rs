@@ -34,6 +34,8 @@ pub(super) struct Limits {
     pub shadow_samples: u32,
     /// Seed of the rays.
     pub seed: u64,
+    /// Elements that there may be.
+    pub most_elements: u64,
 }
 
 /// Direct light on a mesh.
@@ -43,11 +45,13 @@ pub(super) struct DirectField {
     vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
     centres: Vec<Option<DirectLight>>,
+    /// Whether the number of elements kept the last adaptation from being finer.
+    pub(super) is_full: bool,
 }
 
-/// Divide elements that are too large to be trusted with their corners.
-pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, min_area: f32) {
-    let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * min_area);
+/// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
+pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
+    let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * limits.min_area);
     loop {
         let elements = &hierarchy.mesh.elements;
         let wanted: Vec<u32> = hierarchy
@@ -56,8 +60,11 @@ pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, min_area: f32) {
             .filter(|&leaf| elements[leaf].area_vector.length() > largest)
             .map(|leaf| leaf as u32)
             .collect();
+        if !hierarchy.mesh.fits(&wanted, limits.most_elements) {
+            return false;
+        }
         if wanted.is_empty() || !hierarchy.mesh.divide(&wanted) {
-            return;
+            return true;
         }
     }
 }
@@ -69,6 +76,7 @@ impl DirectField {
             lights,
             vertices: Vec::new(),
             centres: Vec::new(),
+            is_full: false,
         }
     }
 
@@ -118,12 +126,14 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let mut ray_count = 0;
+        self.is_full = false;
         for _ in 0..MOST_ROUNDS {
             ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
             ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, limits, mean);
-            if !hierarchy.mesh.divide(&wanted) {
+            self.is_full = !hierarchy.mesh.fits(&wanted, limits.most_elements);
+            if self.is_full || !hierarchy.mesh.divide(&wanted) {
                 break;
             }
         }

@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::Solver;
+use super::{Cancel, Solver};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Cluster, Hierarchy},
@@ -129,17 +129,23 @@ impl Solver {
     }
 }
 
-/// Closure of every patch, and the rays shot.
-pub(super) fn closures(hierarchy: &Hierarchy, rays: &RayTree, seed: u64) -> (Vec<Closure>, u64) {
+/// Closure of every patch, and the rays shot; `None` when cancelled.
+pub(super) fn closures(
+    hierarchy: &Hierarchy,
+    rays: &RayTree,
+    seed: u64,
+    cancel: &Cancel,
+) -> Option<(Vec<Closure>, u64)> {
     let groups = groups(hierarchy);
     let closed: Vec<bool> = groups
         .par_iter()
         .map(|cluster| {
             let range = cluster.patches();
-            (0..GROUP_RAYS).all(|ray| {
-                let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
-                probe(hierarchy, rays, patch, 1, ray, seed) == 1
-            })
+            !cancel.is_cancelled()
+                && (0..GROUP_RAYS).all(|ray| {
+                    let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
+                    probe(hierarchy, rays, patch, 1, ray, seed) == 1
+                })
         })
         .collect();
     let is_open = |group: &(&Cluster, bool)| !group.1;
@@ -156,15 +162,23 @@ pub(super) fn closures(hierarchy: &Hierarchy, rays: &RayTree, seed: u64) -> (Vec
         .collect();
     let found: Vec<Closure> = patches
         .par_iter()
-        .map(|&patch| Closure::of(probe(hierarchy, rays, patch, count as u32, 0, seed), count))
+        .map(|&patch| {
+            if cancel.is_cancelled() {
+                return Closure::CLOSED;
+            }
+            Closure::of(probe(hierarchy, rays, patch, count as u32, 0, seed), count)
+        })
         .collect();
+    if cancel.is_cancelled() {
+        return None;
+    }
     for (patch, closure) in patches.into_iter().zip(found) {
         closures[patch] = closure;
     }
-    (
+    Some((
         closures,
         (groups.len() * GROUP_RAYS as usize + open * count) as u64,
-    )
+    ))
 }
 
 /// The largest clusters with few enough patches, in the order of the patches.

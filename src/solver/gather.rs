@@ -77,10 +77,7 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
         .with_min_len(TASK_NODES)
         .map(|index| cluster_incident(kernel, links, index))
         .collect();
-    for index in 1..incident.len() {
-        let above = incident[hierarchy.clusters[index].parent as usize];
-        incident[index].merge(&above);
-    }
+    merge_down(hierarchy, &mut incident);
     let mut leaf_of = vec![0u32; hierarchy.patches.len()];
     for (index, cluster) in hierarchy
         .clusters
@@ -97,6 +94,35 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
             incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
         })
         .collect()
+}
+
+/// Add to each cluster what those above it have. Parents come before their children.
+fn merge_down(hierarchy: &Hierarchy, incident: &mut [Moments<Vec4>]) {
+    let cover = &hierarchy.subtrees;
+    let parent = |index: usize| hierarchy.clusters[index].parent as usize;
+    for &index in cover.top.iter().skip(1) {
+        let above = incident[parent(index)];
+        incident[index].merge(&above);
+    }
+    let roots: Vec<Moments<Vec4>> = cover
+        .runs
+        .iter()
+        .map(|run| incident[parent(run.start)])
+        .collect();
+    let parts = cover.parts(incident);
+    parts
+        .into_par_iter()
+        .zip(&cover.runs)
+        .zip(&roots)
+        .for_each(|((part, run), root)| {
+            for index in run.clone() {
+                let above = match parent(index).checked_sub(run.start) {
+                    Some(local) => part[local],
+                    None => *root,
+                };
+                part[index - run.start].merge(&above);
+            }
+        });
 }
 
 /// The vector irradiances of all links of one cluster.

@@ -6,6 +6,7 @@
 
 mod adapt;
 mod anderson;
+mod budget;
 mod closure;
 mod direct;
 mod display;
@@ -33,7 +34,7 @@ use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, Reading, Tables},
     scene::Scene,
-    transport::{Estimate, Judge, Kernel, LinkStore, PairSampler, Refiner, luminance},
+    transport::{Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, Refiner, luminance},
 };
 use adapt::DirectField;
 use closure::Closure;
@@ -60,6 +61,13 @@ impl Cancel {
 /// again costs more than the new ones.
 const THRESHOLD_FACTOR: f32 = 2.0;
 
+/// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
+/// `MOST_RAISES`: then the root's exchange with itself is left.
+const RAISE_FACTOR: f32 = 8.0;
+
+/// See [`RAISE_FACTOR`].
+const MOST_RAISES: u32 = 16;
+
 /// Refinement passes of one step at most: elements divided in one pass take their links over in the next.
 const MOST_PASSES: u32 = 4;
 
@@ -81,6 +89,8 @@ pub struct Solver {
     closures: Vec<Closure>,
     leaves: Vec<LeafLight>,
     mean_irradiance: f32,
+    /// Whether the memory limit kept the last step from being finer.
+    is_full: bool,
     step: u32,
     ray_count: u64,
     snapshot: Snapshot,
@@ -88,11 +98,20 @@ pub struct Solver {
 
 impl Solver {
     /// Prepare a solve: hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
-    pub fn new(scene: Arc<Scene>, settings: SolveSettings, memory_limit: Option<u64>) -> Self {
+    /// Returns `None` when cancelled on the way.
+    pub fn new(
+        scene: Arc<Scene>,
+        settings: SolveSettings,
+        memory_limit: Option<u64>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
+        let proceed = || (!cancel.is_cancelled()).then_some(());
+        proceed()?;
         let rays = RayTree::new(&scene);
-        let hierarchy = Hierarchy::new(&scene, settings.crease_degrees);
+        let is_cancelled = || cancel.is_cancelled();
+        let hierarchy = Hierarchy::build(&scene, settings.crease_degrees, &is_cancelled)?;
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
-        let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed);
+        let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed, cancel)?;
         let mut solver = Self {
             closures,
             area_sums: PairSampler::area_sums(&hierarchy),
@@ -102,6 +121,7 @@ impl Solver {
             linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
             mean_irradiance: 0.0,
+            is_full: false,
             step: 0,
             ray_count,
             snapshot: Snapshot::default(),
@@ -112,8 +132,9 @@ impl Solver {
             hierarchy,
         };
         solver.pull();
+        proceed()?;
         solver.show();
-        solver
+        Some(solver)
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.
@@ -126,16 +147,17 @@ impl Solver {
         let fineness =
             THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
         report.epsilon = self.settings.epsilon * fineness;
+        self.is_full = false;
         self.adapt_to_direct(fineness, cancel)?;
         self.pull();
         self.estimate_mean();
-        self.refine(report.epsilon, cancel)?;
+        report.epsilon = self.refine(report.epsilon, cancel)?;
         self.iterate(&mut report, cancel)?;
         self.leaves = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures);
         self.step = report.step;
         self.fill(&mut report);
         self.show();
-        report.is_final = self.step >= self.settings.max_steps;
+        report.is_final = report.is_full || self.step >= self.settings.max_steps;
         Some(report)
     }
 
@@ -230,10 +252,12 @@ impl Solver {
             min_area: self.min_area(),
             shadow_samples: self.settings.shadow_samples,
             seed: self.settings.seed,
+            most_elements: self.most_elements(),
         };
-        adapt::divide_coarse(&mut self.hierarchy, limits.min_area);
+        self.is_full |= !adapt::divide_coarse(&mut self.hierarchy, limits);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
+            self.is_full |= field.is_full;
         }
         self.extend_to_new_elements();
         Some(())
@@ -267,11 +291,14 @@ impl Solver {
         self.mean_irradiance = mean;
     }
 
-    /// Bring the links to a smaller threshold.
-    fn refine(&mut self, epsilon: f32, cancel: &Cancel) -> Option<()> {
-        for _ in 0..MOST_PASSES {
+    /// Bring the links to a smaller threshold. Returns the threshold that they have: where links do not fit into memory,
+    /// those from before stay, and the first ones are made coarser.
+    fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
+        let (mut passes, mut raises) = (0, 0);
+        while passes < MOST_PASSES {
             self.pull();
             let is_first = self.links.is_empty();
+            let most_links = self.most_links();
             let refinement = {
                 let sampler = PairSampler {
                     hierarchy: &self.hierarchy,
@@ -294,6 +321,7 @@ impl Solver {
                     min_area: self.min_area(),
                     seed: self.settings.seed,
                     cancelled: &|| cancel.is_cancelled(),
+                    budget: LinkBudget::new(most_links),
                 };
                 refiner.refine(is_first)
             };
@@ -301,12 +329,27 @@ impl Solver {
                 return None;
             }
             self.ray_count += refinement.ray_count;
+            if !refinement.fits {
+                self.is_full = true;
+                if !is_first || raises >= MOST_RAISES {
+                    break;
+                }
+                raises += 1;
+                epsilon *= RAISE_FACTOR;
+                continue;
+            }
+            passes += 1;
             self.links = LinkStore::from_runs(
                 self.hierarchy.node_count(),
                 &refinement.runs,
                 &refinement.links,
             );
-            if !self.hierarchy.mesh.divide(&refinement.wanted) {
+            let fits = self
+                .hierarchy
+                .mesh
+                .fits(&refinement.wanted, self.most_elements());
+            self.is_full |= !fits;
+            if !fits || !self.hierarchy.mesh.divide(&refinement.wanted) {
                 break;
             }
             self.extend_to_new_elements();
@@ -316,26 +359,7 @@ impl Solver {
             }
         }
         self.pull();
-        Some(())
-    }
-
-    /// Bytes held.
-    fn memory_bytes(&self) -> u64 {
-        let own = self.hierarchy.memory_bytes()
-            + self.rays.memory_bytes()
-            + self.power.memory_bytes()
-            + self.links.memory_bytes()
-            + size_of_val(self.area_sums.as_slice())
-            + size_of_val(self.linked.as_slice())
-            + size_of_val(self.leaves.as_slice())
-            + self.direct.as_ref().map_or(0, DirectField::memory_bytes);
-        own as u64
-    }
-
-    /// Whether the memory limit is reached.
-    fn is_out_of_memory(&self) -> bool {
-        self.memory_limit
-            .is_some_and(|limit| self.memory_bytes() > limit)
+        Some(epsilon)
     }
 }
 

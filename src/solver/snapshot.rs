@@ -83,6 +83,26 @@ pub struct Snapshot {
     pub clusters: Arc<Vec<ClusterBox>>,
 }
 
+impl Snapshot {
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        let (mesh, light) = (&self.mesh, &self.light);
+        size_of_val(mesh.positions.as_slice())
+            + size_of_val(mesh.normals.as_slice())
+            + size_of_val(mesh.texcoords.as_slice())
+            + size_of_val(mesh.reflectance.as_slice())
+            + size_of_val(mesh.emission.as_slice())
+            + size_of_val(mesh.indices.as_slice())
+            + size_of_val(mesh.triangle_of.as_slice())
+            + size_of_val(mesh.is_back.as_slice())
+            + size_of_val(mesh.element_of.as_slice())
+            + size_of_val(light.irradiance.as_slice())
+            + size_of_val(light.direct.as_slice())
+            + size_of_val(light.uncertainty.as_slice())
+            + size_of_val(self.clusters.as_slice())
+    }
+}
+
 /// Figures of one step. Quantities in world units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StepReport {
@@ -125,6 +145,8 @@ pub struct StepReport {
     pub estimated_error: f32,
     /// Whether a further step can change anything.
     pub is_final: bool,
+    /// Whether the memory limit kept the step from being finer: further ones would fare alike.
+    pub is_full: bool,
     /// What the solver had to do to stay stable, one sentence each.
     pub notes: Vec<String>,
 }
