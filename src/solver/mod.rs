@@ -63,7 +63,10 @@ const THRESHOLD_FACTOR: f32 = 2.0;
 
 /// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
 /// `MOST_RAISES`: then the root's exchange with itself is left.
-const RAISE_FACTOR: f32 = 8.0;
+const RAISE_FACTOR: f32 = 4.0;
+
+/// Thresholds below this are raised to it first: a threshold of 0 would stay.
+const LEAST_RAISED: f32 = 1e-4;
 
 /// See [`RAISE_FACTOR`].
 const MOST_RAISES: u32 = 16;
@@ -328,17 +331,18 @@ impl Solver {
             if cancel.is_cancelled() {
                 return None;
             }
-            self.ray_count += refinement.ray_count;
             if !refinement.fits {
                 self.is_full = true;
                 if !is_first || raises >= MOST_RAISES {
                     break;
                 }
                 raises += 1;
-                epsilon *= RAISE_FACTOR;
+                epsilon = (epsilon * RAISE_FACTOR).max(LEAST_RAISED);
                 continue;
             }
             passes += 1;
+            // Where links did not fit, threads stopped at different places: their rays are not counted.
+            self.ray_count += refinement.ray_count;
             self.links = LinkStore::from_runs(
                 self.hierarchy.node_count(),
                 &refinement.runs,
