@@ -155,7 +155,8 @@ fn the_bound_of_a_receiver_holds_its_error_against_the_full_matrix() {
         max_steps: 2,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene.clone(), settings, None);
+    let mut solver =
+        Solver::new(scene.clone(), settings, None, &Cancel::default()).expect("nobody cancels");
     while !solver
         .step(&Cancel::default())
         .is_none_or(|report| report.is_final)

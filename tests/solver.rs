@@ -10,7 +10,7 @@ use vecrad::{
     metrics::{MeshLookup, measure_error},
     reference::{PathSettings, PathTraced, PathTracer},
     scene::{Scene, SceneBuilder, SceneOptions, Sides, builtin},
-    solver::{Cancel, Direct, Method, Oracle, Push, Snapshot, SolveSettings, Solver},
+    solver::{Cancel, Direct, Method, Oracle, Push, Snapshot, SolveSettings, Solver, StepReport},
 };
 
 fn one_sided() -> SceneOptions {
@@ -30,7 +30,7 @@ fn finish(builder: SceneBuilder) -> Arc<Scene> {
 
 /// All steps of a solve; each state is checked.
 fn solve(scene: &Arc<Scene>, settings: SolveSettings) -> Snapshot {
-    let mut solver = Solver::new(scene.clone(), settings, None);
+    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
     loop {
         let report = solver.step(&Cancel::default()).unwrap();
         solver.hierarchy().validate().unwrap();
@@ -136,6 +136,82 @@ fn a_furnace_has_radiosity_emission_over_one_minus_reflectance() {
             (found / expected - 1.0).abs() < 0.005,
             "ρ {reflectance} {direct:?}: {found} for {expected}"
         );
+    }
+}
+
+/// All reports of a solve of a furnace of radiance 1, and its mean irradiance relative to the closed form.
+fn solve_furnace(
+    builder: SceneBuilder,
+    reflectance: f32,
+    settings: &SolveSettings,
+) -> (Vec<StepReport>, f64) {
+    let options = SceneOptions {
+        max_reflectance: 0.9999,
+        ..one_sided()
+    };
+    let scene = Arc::new(builder.finish(&options).unwrap());
+    let mut solver =
+        Solver::new(scene.clone(), settings.clone(), None, &Cancel::default()).unwrap();
+    let mut reports: Vec<StepReport> = Vec::new();
+    while reports.last().is_none_or(|report| !report.is_final) {
+        reports.push(solver.step(&Cancel::default()).unwrap());
+        assert_presentable(&solver.snapshot());
+    }
+    let expected = f64::from(PI) / (1.0 - f64::from(reflectance));
+    let found = mean_irradiance(&scene, &solver.snapshot(), |_| true);
+    (reports, found / expected)
+}
+
+#[test]
+fn white_furnaces_settle_in_few_sweeps() {
+    // Single precision resolves 6e-8, which 1 / (1 − ρ) amplifies, and the tolerance is 1e-4.
+    for (reflectance, tolerance) in [
+        (0.5, 1e-3),
+        (0.9, 1e-3),
+        (0.98, 1e-3),
+        (0.999, 2e-3),
+        (0.9999, 1e-2),
+    ] {
+        let settings = SolveSettings {
+            direct: Direct::Linked,
+            tolerance: 1e-4,
+            max_steps: 2,
+            ..SolveSettings::normal()
+        };
+        let (reports, ratio) = solve_furnace(
+            builtin::furnace(reflectance, 1.0, 4),
+            reflectance,
+            &settings,
+        );
+        assert!(
+            (ratio - 1.0).abs() < tolerance,
+            "ρ {reflectance}: {ratio} {reports:?}"
+        );
+        for report in reports {
+            assert!(report.sweeps <= 40 && report.residual <= 1e-4, "{report:?}");
+            assert!((report.energy_balance - 1.0).abs() < 1e-3, "{report:?}");
+            assert!(report.contraction < 1.0, "{report:?}");
+        }
+    }
+}
+
+#[test]
+fn growth_at_coarse_links_is_named_and_held() {
+    for (method, grows) in [(Method::SixFace, true), (Method::Bounded, false)] {
+        let settings = SolveSettings {
+            method,
+            push: Push::AtOnce,
+            direct: Direct::Linked,
+            epsilon: 0.05,
+            max_steps: 1,
+            ..SolveSettings::normal()
+        };
+        let (reports, ratio) =
+            solve_furnace(builtin::sphere_furnace(0.98, 1.0, 14), 0.98, &settings);
+        let report = &reports[0];
+        let is_named = report.notes.iter().any(|note| note.contains("keep energy"));
+        assert_eq!(is_named, grows, "{method:?}: {report:?}");
+        assert!((ratio - 1.0).abs() < 1e-2, "{method:?}: {ratio}");
     }
 }
 
@@ -269,8 +345,70 @@ fn a_scene_without_emitters_is_black() {
 }
 
 #[test]
+fn a_memory_limit_holds_and_keeps_what_fits() {
+    let settings = SolveSettings {
+        epsilon: 0.0,
+        min_area: 0.0,
+        max_steps: 6,
+        ..SolveSettings::normal()
+    };
+    let scene = scene("room-1022");
+    for mebibytes in [2, 6, 16] {
+        let limit = mebibytes << 20;
+        let solve = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let never = Cancel::default();
+                let mut solver =
+                    Solver::new(scene.clone(), settings.clone(), Some(limit), &never).unwrap();
+                loop {
+                    let report = solver.step(&never).unwrap();
+                    assert!(report.memory_bytes <= limit, "{mebibytes} MiB: {report:?}");
+                    assert_presentable(&solver.snapshot());
+                    solver.links().validate(solver.hierarchy()).unwrap();
+                    if report.is_final {
+                        return (report, solver.snapshot().light);
+                    }
+                }
+            })
+        };
+        let (report, light) = solve(1);
+        assert!(report.is_full && report.links > 0, "{report:?}");
+        assert!(
+            report
+                .notes
+                .iter()
+                .any(|note| note.contains("memory limit"))
+        );
+        assert!(
+            light
+                .irradiance
+                .iter()
+                .any(|light| light.min_element() > 0.0)
+        );
+        let (other_report, other_light) = solve(3);
+        assert_eq!(report, other_report);
+        assert!(light == other_light, "{mebibytes} MiB");
+    }
+}
+
+#[test]
+fn a_cancelled_preparation_gives_nothing() {
+    let cancel = Cancel::default();
+    cancel.cancel();
+    let solver = Solver::new(scene("cornell"), SolveSettings::draft(), None, &cancel);
+    assert!(solver.is_none());
+}
+
+#[test]
 fn a_cancelled_step_leaves_the_last_light() {
-    let mut solver = Solver::new(scene("cornell"), SolveSettings::draft(), None);
+    let mut solver = Solver::new(
+        scene("cornell"),
+        SolveSettings::draft(),
+        None,
+        &Cancel::default(),
+    )
+    .unwrap();
     solver.step(&Cancel::default()).unwrap();
     let before = solver.snapshot();
     let cancel = Cancel::default();

@@ -113,13 +113,13 @@ impl Drop for FakeSolver {
 
 fn worker(script: &Arc<Script>) -> WorkerHandle {
     let script = script.clone();
-    let make = move |job: Job| {
+    let make = move |job: Job, _: &Cancel| {
         script.made.fetch_add(1, Ordering::SeqCst);
-        Box::new(FakeSolver {
+        Some(Box::new(FakeSolver {
             script: script.clone(),
             settings: job.settings,
             step: 0,
-        }) as Box<dyn Stepper>
+        }) as Box<dyn Stepper>)
     };
     WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap()
 }
@@ -420,12 +420,12 @@ fn every_event_wakes_the_owner() {
         Arc::new(move || {
             counter.fetch_add(1, Ordering::SeqCst);
         }),
-        Arc::new(move |job: Job| {
-            Box::new(FakeSolver {
+        Arc::new(move |job: Job, _: &Cancel| {
+            Some(Box::new(FakeSolver {
                 script: make_script.clone(),
                 settings: job.settings,
                 step: 0,
-            }) as Box<dyn Stepper>
+            }) as Box<dyn Stepper>)
         }),
     )
     .unwrap();
@@ -433,6 +433,39 @@ fn every_event_wakes_the_owner() {
     let events = wait_for(&worker, is_finished);
     drop(worker);
     assert_eq!(wakes.load(Ordering::SeqCst) as usize, events.len());
+}
+
+#[test]
+fn a_pause_ends_the_preparation_and_going_on_prepares_anew() {
+    let made = Arc::new(AtomicU32::new(0));
+    let (counter, script) = (made.clone(), Arc::new(Script::default()));
+    let make = move |job: Job, cancel: &Cancel| {
+        if counter.fetch_add(1, Ordering::SeqCst) == 0 {
+            // The first preparation lasts until it is told to end.
+            while !cancel.is_cancelled() {
+                thread::yield_now();
+            }
+            return None;
+        }
+        Some(Box::new(FakeSolver {
+            script: script.clone(),
+            settings: job.settings,
+            step: 0,
+        }) as Box<dyn Stepper>)
+    };
+    let mut worker = WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap();
+    worker.start(triangle(), short(), one_thread());
+    worker.pause();
+    wait_for(&worker, |event| matches!(event, Event::Paused));
+    worker.resume();
+    let events = wait_for(&worker, is_finished);
+    assert!(
+        events
+            .iter()
+            .any(|event| matches!(event, Event::Prepared { .. }))
+    );
+    // The pause may have come before the first preparation began.
+    assert!(made.load(Ordering::SeqCst) <= 2);
 }
 
 /// Steps that the answers among some events are of.

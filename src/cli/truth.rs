@@ -151,12 +151,12 @@ fn matrix_point(scene: &Scene, patch: &MatrixPatch, barycentric: Vec3) -> Refere
 /// Makes solvers that measure the error of each snapshot. The measuring counts as elapsed, not as solved time.
 pub(super) fn measured_solvers(truth: Truth, errors: Errors) -> MakeStepper {
     let truth = Arc::new(truth);
-    Arc::new(move |job: Job| {
-        Box::new(MeasuredSolver {
-            solver: Solver::new(job.scene, job.settings, job.memory_limit),
+    Arc::new(move |job: Job, cancel: &Cancel| {
+        Some(Box::new(MeasuredSolver {
+            solver: Solver::new(job.scene, job.settings, job.memory_limit, cancel)?,
             truth: truth.clone(),
             errors: errors.clone(),
-        }) as Box<dyn Stepper>
+        }) as Box<dyn Stepper>)
     })
 }
 

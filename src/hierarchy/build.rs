@@ -26,8 +26,11 @@ struct Item {
     centroid: Vec3,
 }
 
-/// Clusters, and patches in the order of the tree.
-pub(super) fn build(scene: &Scene) -> (Vec<Cluster>, Vec<Patch>) {
+/// Clusters, and patches in the order of the tree; `None` when cancelled.
+pub(super) fn build(
+    scene: &Scene,
+    cancelled: &dyn Fn() -> bool,
+) -> Option<(Vec<Cluster>, Vec<Patch>)> {
     let mut items = lit_sides(scene);
     let mut clusters = vec![cluster(0, items.len(), u32::MAX)];
     let mut pending = vec![(0usize, 0u32)];
@@ -36,6 +39,9 @@ pub(super) fn build(scene: &Scene) -> (Vec<Cluster>, Vec<Patch>) {
         let range = start as usize..end as usize;
         if range.len() <= LEAF_PATCHES {
             continue;
+        }
+        if cancelled() {
+            return None;
         }
         let middle = range.start + split(&mut items[range.clone()], depth >= MEDIAN_DEPTH);
         let first = clusters.len();
@@ -47,7 +53,7 @@ pub(super) fn build(scene: &Scene) -> (Vec<Cluster>, Vec<Patch>) {
     }
     let patches: Vec<Patch> = items.iter().map(|item| patch(scene, item)).collect();
     fit_boxes(scene, &patches, &mut clusters);
-    (clusters, patches)
+    Some((clusters, patches))
 }
 
 /// Fronts of all triangles and backs of the two-sided ones.

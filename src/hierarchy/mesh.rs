@@ -8,6 +8,7 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::Patch;
 use crate::scene::Scene;
@@ -76,8 +77,13 @@ fn edge(a: u32, b: u32) -> (u32, u32) {
 }
 
 impl Mesh {
-    /// One element per patch.
-    pub(super) fn new(scene: &Scene, patches: &[Patch], crease_degrees: f32) -> Self {
+    /// One element per patch; `None` when cancelled.
+    pub(super) fn new(
+        scene: &Scene,
+        patches: &[Patch],
+        crease_degrees: f32,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<Self> {
         let corners: Vec<[u32; 3]> = patches
             .iter()
             .map(|patch| {
@@ -85,7 +91,8 @@ impl Mesh {
                 if patch.is_back { [a, c, b] } else { [a, b, c] }
             })
             .collect();
-        let (vertices, vertex_of) = share_vertices(scene, patches, &corners, crease_degrees);
+        let (vertices, vertex_of) =
+            share_vertices(scene, patches, &corners, crease_degrees, cancelled)?;
         let mut mesh = Self {
             points: scene.positions.clone(),
             vertices,
@@ -104,7 +111,7 @@ impl Mesh {
             );
             mesh.elements.push(element);
         }
-        mesh
+        Some(mesh)
     }
 
     fn element(
@@ -148,6 +155,11 @@ impl Mesh {
     /// The leaves in order.
     pub fn leaves(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.elements.len()).filter(|&index| self.elements[index].is_leaf())
+    }
+
+    /// Whether so many elements are enough for dividing these, and about as many neighbours as balance asks.
+    pub fn fits(&self, wanted: &[u32], most_elements: u64) -> bool {
+        wanted.is_empty() || (self.elements.len() + 8 * wanted.len()) as u64 <= most_elements
     }
 
     /// Divide the given leaves, and their neighbours as far as balance asks. Elements that are no leaves are passed
@@ -339,7 +351,8 @@ fn share_vertices(
     patches: &[Patch],
     corners: &[[u32; 3]],
     crease_degrees: f32,
-) -> (Vec<Vertex>, Vec<[u32; 3]>) {
+    cancelled: &dyn Fn() -> bool,
+) -> Option<(Vec<Vertex>, Vec<[u32; 3]>)> {
     let mut corner_group = Groups::new(corners.len() * 3);
     // Half edges sorted by edge: neighbours are then adjacent. The last fields tell which corners they join.
     let mut half_edges: Vec<(u32, u32, bool, u32, u8)> = Vec::with_capacity(corners.len() * 3);
@@ -349,7 +362,10 @@ fn share_vertices(
             half_edges.push((a.min(b), a.max(b), a < b, patch as u32, side as u8));
         }
     }
-    half_edges.sort_unstable();
+    half_edges.par_sort_unstable();
+    if cancelled() {
+        return None;
+    }
     let smooth = crease_degrees.to_radians().cos();
     for run in half_edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         let first_down = run.partition_point(|half| !half.2);
@@ -379,6 +395,9 @@ fn share_vertices(
             }
         }
     }
+    if cancelled() {
+        return None;
+    }
     let mut vertices = Vec::new();
     let mut vertex_of_group = vec![u32::MAX; corners.len() * 3];
     let vertex_of = corners
@@ -399,7 +418,7 @@ fn share_vertices(
             })
         })
         .collect();
-    (vertices, vertex_of)
+    Some((vertices, vertex_of))
 }
 
 fn same_material(scene: &Scene, patches: &[Patch], a: u32, b: u32) -> bool {

@@ -8,11 +8,13 @@
 mod build;
 mod directional;
 mod mesh;
+mod subtrees;
 mod tables;
 mod validate;
 
 pub use directional::{Moments, Quantity, Reading};
 pub use mesh::{Element, Mesh, Vertex};
+pub use subtrees::Subtrees;
 pub use tables::{Tables, luminance};
 
 use glam::Vec3;
@@ -132,6 +134,8 @@ pub struct Hierarchy {
     pub mesh: Mesh,
     /// Sum of all patch areas.
     pub area: f64,
+    /// Parts of the binary tree for several threads.
+    pub subtrees: Subtrees,
     /// The patches on the front and on the back of each triangle; `u32::MAX` for a back that is not lit.
     sides: Vec<[u32; 2]>,
 }
@@ -139,20 +143,26 @@ pub struct Hierarchy {
 impl Hierarchy {
     /// Build the tree of a scene. `crease_degrees` is the angle between faces above which vertices are not shared.
     pub fn new(scene: &Scene, crease_degrees: f32) -> Self {
-        let (clusters, patches) = build::build(scene);
-        let mesh = Mesh::new(scene, &patches, crease_degrees);
+        Self::build(scene, crease_degrees, &|| false).expect("nothing stops it")
+    }
+
+    /// As [`Self::new`], or `None` once `cancelled` says so.
+    pub fn build(scene: &Scene, crease_degrees: f32, cancelled: &dyn Fn() -> bool) -> Option<Self> {
+        let (clusters, patches) = build::build(scene, cancelled)?;
+        let mesh = Mesh::new(scene, &patches, crease_degrees, cancelled)?;
         let mut sides = vec![[u32::MAX; 2]; scene.triangles.len()];
         for (index, patch) in patches.iter().enumerate() {
             sides[patch.triangle.index()][usize::from(patch.is_back)] = index as u32;
         }
         let area = patches.iter().map(|patch| f64::from(patch.area)).sum();
-        Self {
+        Some(Self {
+            subtrees: Subtrees::new(&clusters),
             clusters,
             patches,
             mesh,
             area,
             sides,
-        }
+        })
     }
 
     /// The root cluster.

@@ -4,8 +4,9 @@
 //! `w` holds projected area, as irradiance the sum of form factors, which must be 1 in a closed scene.
 
 use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
-use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _};
+use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Subtrees};
 
 /// Source tables of all nodes.
 #[derive(Clone, Debug, Default)]
@@ -25,72 +26,85 @@ pub struct Tables {
 
 impl Tables {
     /// Tables of a hierarchy whose leaves have the radiosity that `leaf` gives by element index.
-    pub fn new(hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Vec4) -> Self {
+    pub fn new(hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Vec4 + Sync) -> Self {
         let mut tables = Self::default();
         tables.pull(hierarchy, leaf);
         tables
     }
 
-    /// Take the radiosity of the leaves and carry it up to their parents and clusters.
-    pub fn pull(&mut self, hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Vec4) {
+    /// Take the radiosity of the leaves and carry it up to their parents and clusters. Sums are in the order of the
+    /// tree, on any number of threads.
+    pub fn pull(&mut self, hierarchy: &Hierarchy, leaf: impl Fn(usize) -> Vec4 + Sync) {
+        let weighed = self.pull_elements(hierarchy, leaf);
+        let count = hierarchy.clusters.len();
+        self.clusters.resize(count, Moments::default());
+        self.brightest.resize(count, Vec4::ZERO);
+        self.centres.resize(count, Vec3::ZERO);
+        let mut sums = vec![Vec4::ZERO; count];
+        let cover = &hierarchy.subtrees;
+        let level = Level {
+            hierarchy,
+            elements: &self.elements,
+            brightest: &self.brightest_in_elements,
+            weighed: &weighed,
+        };
+        let mut whole = Slices {
+            start: 0,
+            clusters: &mut self.clusters,
+            brightest: &mut self.brightest,
+            centres: &mut self.centres,
+            sums: &mut sums,
+        };
+        let parts = whole.parts(cover);
+        parts
+            .into_par_iter()
+            .zip(&cover.runs)
+            .for_each(|(mut part, run)| {
+                // Children come after their parents.
+                run.clone().rev().for_each(|index| part.pull(level, index));
+            });
+        for &index in cover.top.iter().rev() {
+            whole.pull(level, index);
+        }
+    }
+
+    /// Carry radiosity up to the patches. Returns the power of each element times its centroid, in luminance.
+    fn pull_elements(
+        &mut self,
+        hierarchy: &Hierarchy,
+        leaf: impl Fn(usize) -> Vec4 + Sync,
+    ) -> Vec<Vec4> {
         let elements = &hierarchy.mesh.elements;
         self.elements.resize(elements.len(), Vec4::ZERO);
-        self.clusters
-            .resize(hierarchy.clusters.len(), Moments::default());
-        self.brightest.resize(hierarchy.clusters.len(), Vec4::ZERO);
-        self.centres.resize(hierarchy.clusters.len(), Vec3::ZERO);
-        self.brightest_in_elements
-            .resize(elements.len(), Vec4::ZERO);
-        // Power of each element times its centroid, in luminance.
-        let mut weighed = vec![Vec4::ZERO; elements.len()];
-        // Children come after their parents.
-        for index in (0..elements.len()).rev() {
-            let element = &elements[index];
-            if element.is_leaf() {
-                let radiosity = leaf(index);
-                self.elements[index] = radiosity;
-                self.brightest_in_elements[index] = radiosity;
+        self.elements
+            .par_iter_mut()
+            .zip(elements)
+            .enumerate()
+            .filter(|(_, (_, element))| element.is_leaf())
+            .for_each(|(index, (radiosity, _))| *radiosity = leaf(index));
+        self.brightest_in_elements.clone_from(&self.elements);
+        let mut weighed: Vec<Vec4> = elements
+            .par_iter()
+            .zip(&self.elements)
+            .map(|(element, &radiosity)| {
                 let power = luminance(radiosity) * element.area_vector.length();
-                weighed[index] = element.centroid.extend(1.0) * power;
-            } else {
-                let first = element.first_child as usize;
-                let children = first..first + 4;
-                self.elements[index] = self.elements[children.clone()].iter().sum::<Vec4>() * 0.25;
-                self.brightest_in_elements[index] = self.brightest_in_elements[children.clone()]
-                    .iter()
-                    .fold(Vec4::ZERO, |most, value| most.upper_of(*value));
-                weighed[index] = weighed[children].iter().sum();
+                element.centroid.extend(1.0) * power
+            })
+            .collect();
+        // Children come after their parents.
+        for (index, element) in elements.iter().enumerate().rev() {
+            if element.is_leaf() {
+                continue;
             }
+            let first = element.first_child as usize;
+            let children = first..first + 4;
+            self.elements[index] = self.elements[children.clone()].iter().sum::<Vec4>() * 0.25;
+            self.brightest_in_elements[index] = self.brightest_in_elements[children.clone()]
+                .iter()
+                .fold(Vec4::ZERO, |most, value| most.upper_of(*value));
+            weighed[index] = weighed[children].iter().sum();
         }
-        let mut weighed_clusters = vec![Vec4::ZERO; hierarchy.clusters.len()];
-        for (index, cluster) in hierarchy.clusters.iter().enumerate().rev() {
-            let mut moments = Moments::default();
-            let mut brightest = Vec4::ZERO;
-            let mut sum = Vec4::ZERO;
-            if cluster.is_leaf() {
-                for patch in cluster.patches() {
-                    moments.add(hierarchy.patches[patch].area_vector, self.elements[patch]);
-                    brightest = brightest.upper_of(self.brightest_in_elements[patch]);
-                    sum += weighed[patch];
-                }
-            } else {
-                let first = cluster.first_child as usize;
-                for child in [first, first + 1] {
-                    moments.merge(&self.clusters[child]);
-                    brightest = brightest.upper_of(self.brightest[child]);
-                    sum += weighed_clusters[child];
-                }
-            }
-            self.clusters[index] = moments;
-            self.brightest[index] = brightest;
-            weighed_clusters[index] = sum;
-            let centre = sum.truncate() / sum.w;
-            self.centres[index] = if sum.w > 0.0 && centre.is_finite() {
-                centre
-            } else {
-                cluster.centroid
-            };
-        }
+        weighed
     }
 
     /// Where the power of a node comes from on average.
@@ -126,6 +140,82 @@ impl Tables {
             + size_of_val(self.centres.as_slice())
             + size_of_val(self.elements.as_slice())
             + size_of_val(self.brightest_in_elements.as_slice())
+    }
+}
+
+/// What clusters are pulled from.
+#[derive(Clone, Copy)]
+struct Level<'a> {
+    hierarchy: &'a Hierarchy,
+    elements: &'a [Vec4],
+    brightest: &'a [Vec4],
+    weighed: &'a [Vec4],
+}
+
+/// The tables of a run of clusters.
+struct Slices<'a> {
+    /// The first cluster of the run.
+    start: usize,
+    clusters: &'a mut [Moments<Vec4>],
+    brightest: &'a mut [Vec4],
+    centres: &'a mut [Vec3],
+    /// Power times centroid, in luminance.
+    sums: &'a mut [Vec4],
+}
+
+impl Slices<'_> {
+    /// The tables of each run of a cover.
+    fn parts(&mut self, cover: &Subtrees) -> Vec<Slices<'_>> {
+        let clusters = cover.parts(self.clusters).into_iter();
+        let brightest = cover.parts(self.brightest);
+        let centres = cover.parts(self.centres);
+        let sums = cover.parts(self.sums);
+        clusters
+            .zip(brightest)
+            .zip(centres)
+            .zip(sums)
+            .zip(&cover.runs)
+            .map(|((((clusters, brightest), centres), sums), run)| Slices {
+                start: run.start,
+                clusters,
+                brightest,
+                centres,
+                sums,
+            })
+            .collect()
+    }
+
+    /// Sum up one cluster, whose children are done and in this run.
+    fn pull(&mut self, level: Level<'_>, index: usize) {
+        let hierarchy = level.hierarchy;
+        let cluster = &hierarchy.clusters[index];
+        let mut moments = Moments::default();
+        let mut brightest = Vec4::ZERO;
+        let mut sum = Vec4::ZERO;
+        if cluster.is_leaf() {
+            for patch in cluster.patches() {
+                moments.add(hierarchy.patches[patch].area_vector, level.elements[patch]);
+                brightest = brightest.upper_of(level.brightest[patch]);
+                sum += level.weighed[patch];
+            }
+        } else {
+            let first = cluster.first_child as usize - self.start;
+            for child in [first, first + 1] {
+                moments.merge(&self.clusters[child]);
+                brightest = brightest.upper_of(self.brightest[child]);
+                sum += self.sums[child];
+            }
+        }
+        let at = index - self.start;
+        self.clusters[at] = moments;
+        self.brightest[at] = brightest;
+        self.sums[at] = sum;
+        let centre = sum.truncate() / sum.w;
+        self.centres[at] = if sum.w > 0.0 && centre.is_finite() {
+            centre
+        } else {
+            cluster.centroid
+        };
     }
 }
 

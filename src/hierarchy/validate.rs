@@ -141,6 +141,48 @@ mod tests {
     }
 
     #[test]
+    fn a_hundred_thousand_triangles_of_one_centroid_make_a_shallow_tree() {
+        let mut builder = SceneBuilder::default();
+        let material = builder.push_material(Material::plain("grey", Vec3::splat(0.5), Vec3::ONE));
+        for index in 0..100_000 {
+            let angle = f64::from(index) * 1e-3;
+            let size = 1.0 + f64::from(index) * 1e-5;
+            let corners = [0.0, 1.0, 2.0].map(|third| {
+                let (sine, cosine) = (angle + third * std::f64::consts::TAU / 3.0).sin_cos();
+                builder.push_position(DVec3::new(size * cosine, 0.0, size * sine))
+            });
+            builder.push_triangle(corners, material);
+        }
+        let hierarchy = hierarchy(builder);
+        hierarchy.validate().unwrap();
+        let deepest = (0..hierarchy.patches.len())
+            .map(|patch| hierarchy.clusters_over(patch).count())
+            .max();
+        // Cuts by extent go on for a while among rounding; from the given depth on each halves the patches.
+        assert!(deepest <= Some(48 + 18), "{deepest:?}");
+    }
+
+    #[test]
+    fn subtrees_cover_the_tree_once() {
+        for side in [1, 30, 90] {
+            let hierarchy = hierarchy(sheet(side, 2));
+            let cover = &hierarchy.subtrees;
+            let mut seen: Vec<usize> = cover.runs.iter().cloned().flatten().collect();
+            seen.extend(&cover.top);
+            seen.sort_unstable();
+            assert!(seen.iter().copied().eq(0..hierarchy.clusters.len()));
+            for run in &cover.runs {
+                let root = hierarchy.clusters[run.start].parent;
+                assert!(cover.top.contains(&(root as usize)));
+                let is_inside = |&parent: &u32| parent == root || run.contains(&(parent as usize));
+                let mut parents = hierarchy.clusters[run.clone()].iter().map(|c| c.parent);
+                assert!(parents.all(|parent| is_inside(&parent)));
+            }
+            assert!(side < 90 || cover.top.len() < 100, "{}", cover.top.len());
+        }
+    }
+
+    #[test]
     fn random_divisions_stay_balanced() {
         for seed in 0..5 {
             let mut hierarchy = hierarchy(sheet(4, seed));

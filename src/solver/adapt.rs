@@ -35,6 +35,8 @@ pub(super) struct Limits {
     pub shadow_samples: u32,
     /// Seed of the rays.
     pub seed: u64,
+    /// Elements that there may be.
+    pub most_elements: u64,
 }
 
 /// Direct light on a mesh.
@@ -46,11 +48,13 @@ pub(super) struct DirectField {
     centres: Vec<Option<DirectLight>>,
     /// Visible fraction to show by vertex; shorter than the vertices where some are new.
     smooth: Vec<Vec4>,
+    /// Whether the number of elements kept the last adaptation from being finer.
+    pub(super) is_full: bool,
 }
 
-/// Divide elements that are too large to be trusted with their corners.
-pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, min_area: f32) {
-    let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * min_area);
+/// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
+pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
+    let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * limits.min_area);
     loop {
         let elements = &hierarchy.mesh.elements;
         let wanted: Vec<u32> = hierarchy
@@ -59,8 +63,11 @@ pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, min_area: f32) {
             .filter(|&leaf| elements[leaf].area_vector.length() > largest)
             .map(|leaf| leaf as u32)
             .collect();
+        if !hierarchy.mesh.fits(&wanted, limits.most_elements) {
+            return false;
+        }
         if wanted.is_empty() || !hierarchy.mesh.divide(&wanted) {
-            return;
+            return true;
         }
     }
 }
@@ -73,6 +80,7 @@ impl DirectField {
             vertices: Vec::new(),
             centres: Vec::new(),
             smooth: Vec::new(),
+            is_full: false,
         }
     }
 
@@ -129,12 +137,14 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let mut ray_count = 0;
+        self.is_full = false;
         for _ in 0..MOST_ROUNDS {
             ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
             ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, limits, mean);
-            if !hierarchy.mesh.divide(&wanted) {
+            self.is_full = !hierarchy.mesh.fits(&wanted, limits.most_elements);
+            if self.is_full || !hierarchy.mesh.divide(&wanted) {
                 break;
             }
         }

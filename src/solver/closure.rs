@@ -3,9 +3,10 @@
 //! It is 1 in a closed room, less in an open scene or where backs are seen. The sum of form factors of each leaf must
 //! equal it, so it tells by how much the kernel and the visibility of its links err together, and scales it away.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::{Cancel, Solver};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Cluster, Hierarchy},
@@ -89,17 +90,62 @@ impl Closure {
     }
 }
 
-/// Closure of every patch, and the rays shot.
-pub(super) fn closures(hierarchy: &Hierarchy, rays: &RayTree, seed: u64) -> (Vec<Closure>, u64) {
+impl Solver {
+    /// Scale the colours of all leaves so that their form factors add to the closure, and no leaf's to more than 1 where
+    /// `bounds_rows`.
+    pub(super) fn scale_to_closure(&self, irradiance: &mut [Vec4], bounds_rows: bool) {
+        let elements = &self.hierarchy.mesh.elements;
+        let patch_count = self.hierarchy.patches.len();
+        // Area and sum of form factors times area, by patch.
+        let part = |index: usize| {
+            let (area, row) = (elements[index].area_vector.length(), irradiance[index].w);
+            if elements[index].is_leaf() {
+                (area, area * row)
+            } else {
+                (0.0, 0.0)
+            }
+        };
+        let mut sums: Vec<(f32, f32)> = (0..patch_count).into_par_iter().map(part).collect();
+        for (index, element) in elements.iter().enumerate().skip(patch_count) {
+            let (area, weighted) = part(index);
+            let sum = &mut sums[element.patch as usize];
+            *sum = (sum.0 + area, sum.1 + weighted);
+        }
+        irradiance
+            .par_iter_mut()
+            .zip(elements)
+            .with_min_len(1024)
+            .filter(|(_, element)| element.is_leaf())
+            .for_each(|(value, element)| {
+                let patch = element.patch as usize;
+                let factor = self.closures[patch].factor_for(value.w, sums[patch]);
+                let most = if bounds_rows && value.w > 0.0 {
+                    1.0 / value.w
+                } else {
+                    f32::INFINITY
+                };
+                *value = (value.truncate() * factor.min(most)).extend(value.w);
+            });
+    }
+}
+
+/// Closure of every patch, and the rays shot; `None` when cancelled.
+pub(super) fn closures(
+    hierarchy: &Hierarchy,
+    rays: &RayTree,
+    seed: u64,
+    cancel: &Cancel,
+) -> Option<(Vec<Closure>, u64)> {
     let groups = groups(hierarchy);
     let closed: Vec<bool> = groups
         .par_iter()
         .map(|cluster| {
             let range = cluster.patches();
-            (0..GROUP_RAYS).all(|ray| {
-                let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
-                probe(hierarchy, rays, patch, 1, ray, seed) == 1
-            })
+            !cancel.is_cancelled()
+                && (0..GROUP_RAYS).all(|ray| {
+                    let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
+                    probe(hierarchy, rays, patch, 1, ray, seed) == 1
+                })
         })
         .collect();
     let is_open = |group: &(&Cluster, bool)| !group.1;
@@ -116,15 +162,23 @@ pub(super) fn closures(hierarchy: &Hierarchy, rays: &RayTree, seed: u64) -> (Vec
         .collect();
     let found: Vec<Closure> = patches
         .par_iter()
-        .map(|&patch| Closure::of(probe(hierarchy, rays, patch, count as u32, 0, seed), count))
+        .map(|&patch| {
+            if cancel.is_cancelled() {
+                return Closure::CLOSED;
+            }
+            Closure::of(probe(hierarchy, rays, patch, count as u32, 0, seed), count)
+        })
         .collect();
+    if cancel.is_cancelled() {
+        return None;
+    }
     for (patch, closure) in patches.into_iter().zip(found) {
         closures[patch] = closure;
     }
-    (
+    Some((
         closures,
         (groups.len() * GROUP_RAYS as usize + open * count) as u64,
-    )
+    ))
 }
 
 /// The largest clusters with few enough patches, in the order of the patches.

@@ -7,7 +7,7 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::Push;
+use super::{Push, anderson::ordered_sum};
 use crate::{
     hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
     transport::{Kernel, LinkStore, self_irradiance},
@@ -24,13 +24,15 @@ pub(super) fn gather(kernel: Kernel<'_>, links: &LinkStore, push: Push) -> Vec<V
         Push::Combined => push_moments(kernel, links),
         Push::AtOnce => push_at_once(kernel, links),
     };
+    let patch_count = from_clusters.len();
+    irradiance[..patch_count]
+        .par_iter_mut()
+        .zip(from_clusters)
+        .for_each(|(sum, above)| *sum += above);
     // Parents come before their children.
-    for index in 0..irradiance.len() {
-        let element = &hierarchy.mesh.elements[index];
-        let above = match element.parent {
-            u32::MAX => from_clusters[index],
-            parent => irradiance[parent as usize],
-        };
+    for index in patch_count..irradiance.len() {
+        let parent = hierarchy.mesh.elements[index].parent as usize;
+        let above = irradiance[parent];
         irradiance[index] += above;
     }
     irradiance
@@ -75,10 +77,7 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
         .with_min_len(TASK_NODES)
         .map(|index| cluster_incident(kernel, links, index))
         .collect();
-    for index in 1..incident.len() {
-        let above = incident[hierarchy.clusters[index].parent as usize];
-        incident[index].merge(&above);
-    }
+    merge_down(hierarchy, &mut incident);
     let mut leaf_of = vec![0u32; hierarchy.patches.len()];
     for (index, cluster) in hierarchy
         .clusters
@@ -95,6 +94,35 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
             incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
         })
         .collect()
+}
+
+/// Add to each cluster what those above it have. Parents come before their children.
+fn merge_down(hierarchy: &Hierarchy, incident: &mut [Moments<Vec4>]) {
+    let cover = &hierarchy.subtrees;
+    let parent = |index: usize| hierarchy.clusters[index].parent as usize;
+    for &index in cover.top.iter().skip(1) {
+        let above = incident[parent(index)];
+        incident[index].merge(&above);
+    }
+    let roots: Vec<Moments<Vec4>> = cover
+        .runs
+        .iter()
+        .map(|run| incident[parent(run.start)])
+        .collect();
+    let parts = cover.parts(incident);
+    parts
+        .into_par_iter()
+        .zip(&cover.runs)
+        .zip(&roots)
+        .for_each(|((part, run), root)| {
+            for index in run.clone() {
+                let above = match parent(index).checked_sub(run.start) {
+                    Some(local) => part[local],
+                    None => *root,
+                };
+                part[index - run.start].merge(&above);
+            }
+        });
 }
 
 /// The vector irradiances of all links of one cluster.
@@ -179,14 +207,14 @@ fn push_one(
     }
 }
 
-/// Sum over leaves of area times a colour, in order and in double precision.
-pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4) -> glam::DVec3 {
-    hierarchy
-        .mesh
-        .leaves()
-        .map(|leaf| {
-            let area = f64::from(hierarchy.mesh.elements[leaf].area_vector.length());
-            of(leaf).truncate().as_dvec3() * area
-        })
-        .sum()
+/// Sum over leaves of area times a colour, in fixed order and in double precision.
+pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> glam::DVec3 {
+    let elements = &hierarchy.mesh.elements;
+    ordered_sum(elements.len(), |index| {
+        if !elements[index].is_leaf() {
+            return glam::DVec3::ZERO;
+        }
+        let area = f64::from(elements[index].area_vector.length());
+        of(index).truncate().as_dvec3() * area
+    })
 }

@@ -257,7 +257,8 @@ mod tests {
         let scene = builtin::builtin(name, &options)
             .expect("the scene is valid")
             .expect("the scene is known");
-        let mut solver = Solver::new(Arc::new(scene), settings, None);
+        let mut solver = Solver::new(Arc::new(scene), settings, None, &Cancel::default())
+            .expect("nobody cancels");
         while !solver
             .step(&Cancel::default())
             .expect("nobody cancels")

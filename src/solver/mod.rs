@@ -5,12 +5,15 @@
 //! gathering and pushing until the light settles, and gathers once more for the vertices.
 
 mod adapt;
+mod anderson;
+mod budget;
 mod closure;
 mod direct;
 mod display;
 mod gather;
 mod inspect;
 mod inspection;
+mod iterate;
 mod reconstruct;
 mod report;
 mod settings;
@@ -32,7 +35,7 @@ use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, Reading, Tables},
     scene::Scene,
-    transport::{Estimate, Judge, Kernel, LinkStore, PairSampler, Refiner, luminance},
+    transport::{Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, Refiner, luminance},
 };
 use adapt::DirectField;
 use closure::Closure;
@@ -59,8 +62,15 @@ impl Cancel {
 /// again costs more than the new ones.
 const THRESHOLD_FACTOR: f32 = 2.0;
 
-/// Sweeps of one step at most: enough for reflectance 0.98 from nothing.
-const MOST_SWEEPS: u32 = 400;
+/// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
+/// `MOST_RAISES`: then the root's exchange with itself is left.
+const RAISE_FACTOR: f32 = 4.0;
+
+/// Thresholds below this are raised to it first: a threshold of 0 would stay.
+const LEAST_RAISED: f32 = 1e-4;
+
+/// See [`RAISE_FACTOR`].
+const MOST_RAISES: u32 = 16;
 
 /// Refinement passes of one step at most: elements divided in one pass take their links over in the next.
 const MOST_PASSES: u32 = 4;
@@ -83,6 +93,8 @@ pub struct Solver {
     closures: Vec<Closure>,
     leaves: Vec<LeafLight>,
     mean_irradiance: f32,
+    /// Whether the memory limit kept the last step from being finer.
+    is_full: bool,
     step: u32,
     ray_count: u64,
     snapshot: Snapshot,
@@ -90,11 +102,20 @@ pub struct Solver {
 
 impl Solver {
     /// Prepare a solve: hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
-    pub fn new(scene: Arc<Scene>, settings: SolveSettings, memory_limit: Option<u64>) -> Self {
+    /// Returns `None` when cancelled on the way.
+    pub fn new(
+        scene: Arc<Scene>,
+        settings: SolveSettings,
+        memory_limit: Option<u64>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
+        let proceed = || (!cancel.is_cancelled()).then_some(());
+        proceed()?;
         let rays = RayTree::new(&scene);
-        let hierarchy = Hierarchy::new(&scene, settings.crease_degrees);
+        let is_cancelled = || cancel.is_cancelled();
+        let hierarchy = Hierarchy::build(&scene, settings.crease_degrees, &is_cancelled)?;
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
-        let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed);
+        let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed, cancel)?;
         let mut solver = Self {
             closures,
             area_sums: PairSampler::area_sums(&hierarchy),
@@ -104,6 +125,7 @@ impl Solver {
             linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
             mean_irradiance: 0.0,
+            is_full: false,
             step: 0,
             ray_count,
             snapshot: Snapshot::default(),
@@ -113,24 +135,23 @@ impl Solver {
             rays,
             hierarchy,
         };
-        solver.first_light();
+        solver.first_light(cancel)?;
         solver.pull();
+        proceed()?;
         solver.show();
-        solver
+        Some(solver)
     }
 
     /// Sample direct light on the first mesh, so that there is something to see before the first link.
-    fn first_light(&mut self) {
-        let min_area = self.min_area();
-        adapt::divide_coarse(&mut self.hierarchy, min_area);
+    fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
+        let limits = self.direct_limits(1.0);
+        adapt::divide_coarse(&mut self.hierarchy, limits);
         if let Some(field) = &mut self.direct {
-            let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
-            let never = Cancel::default();
-            self.ray_count += field
-                .cover(&self.rays, &self.hierarchy, count, seed, &never)
-                .unwrap_or(0);
+            let (count, seed) = (limits.shadow_samples, limits.seed);
+            self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
         self.extend_to_new_elements();
+        Some(())
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.
@@ -143,16 +164,17 @@ impl Solver {
         let fineness =
             THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
         report.epsilon = self.settings.epsilon * fineness;
+        self.is_full = false;
         self.adapt_to_direct(fineness, cancel)?;
         self.pull();
         self.estimate_mean();
-        self.refine(report.epsilon, cancel)?;
+        report.epsilon = self.refine(report.epsilon, cancel)?;
         self.iterate(&mut report, cancel)?;
         self.leaves = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures);
         self.step = report.step;
         self.fill(&mut report);
         self.show();
-        report.is_final = self.step >= self.settings.max_steps;
+        report.is_final = report.is_full || self.step >= self.settings.max_steps;
         Some(report)
     }
 
@@ -242,18 +264,24 @@ impl Solver {
 
     /// Make direct light known at all vertices, and divide elements where it bends.
     fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
-        let limits = adapt::Limits {
+        let limits = self.direct_limits(fineness);
+        self.is_full |= !adapt::divide_coarse(&mut self.hierarchy, limits);
+        if let Some(field) = &mut self.direct {
+            self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
+            self.is_full |= field.is_full;
+        }
+        self.extend_to_new_elements();
+        Some(())
+    }
+
+    fn direct_limits(&self, fineness: f32) -> adapt::Limits {
+        adapt::Limits {
             tolerance: self.settings.mesh_tolerance * fineness,
             min_area: self.min_area(),
             shadow_samples: self.settings.shadow_samples,
             seed: self.settings.seed,
-        };
-        adapt::divide_coarse(&mut self.hierarchy, limits.min_area);
-        if let Some(field) = &mut self.direct {
-            self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
+            most_elements: self.most_elements(),
         }
-        self.extend_to_new_elements();
-        Some(())
     }
 
     /// Elements inherit the linked irradiance of the one that was divided.
@@ -284,11 +312,14 @@ impl Solver {
         self.mean_irradiance = mean;
     }
 
-    /// Bring the links to a smaller threshold.
-    fn refine(&mut self, epsilon: f32, cancel: &Cancel) -> Option<()> {
-        for _ in 0..MOST_PASSES {
+    /// Bring the links to a smaller threshold. Returns the threshold that they have: where links do not fit into memory,
+    /// those from before stay, and the first ones are made coarser.
+    fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
+        let (mut passes, mut raises) = (0, 0);
+        while passes < MOST_PASSES {
             self.pull();
             let is_first = self.links.is_empty();
+            let most_links = self.most_links();
             let refinement = {
                 let sampler = PairSampler {
                     hierarchy: &self.hierarchy,
@@ -311,19 +342,36 @@ impl Solver {
                     min_area: self.min_area(),
                     seed: self.settings.seed,
                     cancelled: &|| cancel.is_cancelled(),
+                    budget: LinkBudget::new(most_links),
                 };
                 refiner.refine(is_first)
             };
             if cancel.is_cancelled() {
                 return None;
             }
+            if !refinement.fits {
+                self.is_full = true;
+                if !is_first || raises >= MOST_RAISES {
+                    break;
+                }
+                raises += 1;
+                epsilon = (epsilon * RAISE_FACTOR).max(LEAST_RAISED);
+                continue;
+            }
+            passes += 1;
+            // Where links did not fit, threads stopped at different places: their rays are not counted.
             self.ray_count += refinement.ray_count;
             self.links = LinkStore::from_runs(
                 self.hierarchy.node_count(),
                 &refinement.runs,
                 &refinement.links,
             );
-            if !self.hierarchy.mesh.divide(&refinement.wanted) {
+            let fits = self
+                .hierarchy
+                .mesh
+                .fits(&refinement.wanted, self.most_elements());
+            self.is_full |= !fits;
+            if !fits || !self.hierarchy.mesh.divide(&refinement.wanted) {
                 break;
             }
             self.extend_to_new_elements();
@@ -333,74 +381,7 @@ impl Solver {
             }
         }
         self.pull();
-        Some(())
-    }
-
-    /// Gather, push and pull until the change is below tolerance.
-    fn iterate(&mut self, report: &mut StepReport, cancel: &Cancel) -> Option<()> {
-        let mut last_change = f64::INFINITY;
-        loop {
-            if cancel.is_cancelled() {
-                return None;
-            }
-            let mut gathered = gather::gather(self.kernel(), &self.links, self.settings.push);
-            self.scale_to_closure(&mut gathered);
-            let change = gather::area_sum(&self.hierarchy, |leaf| {
-                (gathered[leaf] - self.linked[leaf]).abs()
-            });
-            let total = gather::area_sum(&self.hierarchy, |leaf| {
-                gathered[leaf] + self.direct_of(leaf)
-            });
-            self.linked = gathered;
-            self.pull();
-            report.sweeps += 1;
-            let change = change.element_sum();
-            report.residual = (change / total.element_sum().max(f64::MIN_POSITIVE)) as f32;
-            if last_change.is_finite() && last_change > 0.0 {
-                report.contraction = (change / last_change) as f32;
-            }
-            last_change = change;
-            if report.residual <= self.settings.tolerance || report.sweeps >= MOST_SWEEPS {
-                return Some(());
-            }
-        }
-    }
-
-    /// Scale the colours of all leaves so that their form factors add to the closure.
-    fn scale_to_closure(&self, irradiance: &mut [Vec4]) {
-        let mesh = &self.hierarchy.mesh;
-        // Area and sum of form factors times area, by patch.
-        let mut sums = vec![(0.0f32, 0.0f32); self.hierarchy.patches.len()];
-        for leaf in mesh.leaves() {
-            let element = &mesh.elements[leaf];
-            let area = element.area_vector.length();
-            let sum = &mut sums[element.patch as usize];
-            *sum = (sum.0 + area, sum.1 + area * irradiance[leaf].w);
-        }
-        for leaf in mesh.leaves() {
-            let patch = mesh.elements[leaf].patch as usize;
-            let factor = self.closures[patch].factor_for(irradiance[leaf].w, sums[patch]);
-            irradiance[leaf] = (irradiance[leaf].truncate() * factor).extend(irradiance[leaf].w);
-        }
-    }
-
-    /// Bytes held.
-    fn memory_bytes(&self) -> u64 {
-        let own = self.hierarchy.memory_bytes()
-            + self.rays.memory_bytes()
-            + self.power.memory_bytes()
-            + self.links.memory_bytes()
-            + size_of_val(self.area_sums.as_slice())
-            + size_of_val(self.linked.as_slice())
-            + size_of_val(self.leaves.as_slice())
-            + self.direct.as_ref().map_or(0, DirectField::memory_bytes);
-        own as u64
-    }
-
-    /// Whether the memory limit is reached.
-    fn is_out_of_memory(&self) -> bool {
-        self.memory_limit
-            .is_some_and(|limit| self.memory_bytes() > limit)
+        Some(epsilon)
     }
 }
 

@@ -16,10 +16,10 @@ impl Solver {
         report.estimated_error = self.estimated_error();
         self.fill_row_sums(report);
         if self.is_out_of_memory() {
-            report.is_final = true;
-            report
-                .notes
-                .push("the memory limit is reached; refinement stops here".to_owned());
+            report.is_full = true;
+            report.notes.push(
+                "the memory limit is reached; refinement stops here with what fits".to_owned(),
+            );
         }
     }
 

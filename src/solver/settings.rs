@@ -83,7 +83,8 @@ pub struct SolveSettings {
     pub crease_degrees: f32,
     /// Steps at most; at least 1. The threshold falls geometrically to `epsilon` over about this many.
     pub max_steps: u32,
-    /// Sweeps stop when the change falls below this fraction of the total power; above 0.
+    /// Sweeps stop when what a sweep changes, and what it leaves to be changed, fall below this fraction of the total
+    /// power; above 0.
     pub tolerance: f32,
     /// Seed of every random choice.
     pub seed: u64,

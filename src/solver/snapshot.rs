@@ -93,6 +93,24 @@ impl Snapshot {
                 .iter()
                 .any(|light| *light != Vec3::ZERO)
     }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        let (mesh, light) = (&self.mesh, &self.light);
+        size_of_val(mesh.positions.as_slice())
+            + size_of_val(mesh.normals.as_slice())
+            + size_of_val(mesh.texcoords.as_slice())
+            + size_of_val(mesh.reflectance.as_slice())
+            + size_of_val(mesh.emission.as_slice())
+            + size_of_val(mesh.indices.as_slice())
+            + size_of_val(mesh.triangle_of.as_slice())
+            + size_of_val(mesh.is_back.as_slice())
+            + size_of_val(mesh.element_of.as_slice())
+            + size_of_val(light.irradiance.as_slice())
+            + size_of_val(light.direct.as_slice())
+            + size_of_val(light.uncertainty.as_slice())
+            + size_of_val(self.clusters.as_slice())
+    }
 }
 
 /// Figures of one step. Quantities in world units.
@@ -120,9 +138,10 @@ pub struct StepReport {
     pub memory_bytes: u64,
     /// Sweeps of the iteration in this step.
     pub sweeps: u32,
-    /// Change of the last sweep relative to the total power.
+    /// What gathering once more changes, relative to the total power: the residual of the equation that is solved.
     pub residual: f32,
-    /// Largest ratio of successive changes; below 1 while the iteration contracts.
+    /// Largest ratio by which a sweep changed the distance of two lights; below 1 while the iteration contracts, 0 where
+    /// too few sweeps were needed to tell.
     pub contraction: f32,
     /// Power arriving over links and samples, relative to the power that left for it; 1 in a closed scene.
     pub energy_balance: f64,
@@ -136,6 +155,8 @@ pub struct StepReport {
     pub estimated_error: f32,
     /// Whether a further step can change anything.
     pub is_final: bool,
+    /// Whether the memory limit kept the step from being finer: further ones would fare alike.
+    pub is_full: bool,
     /// What the solver had to do to stay stable, one sentence each.
     pub notes: Vec<String>,
 }

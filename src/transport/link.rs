@@ -91,6 +91,7 @@ impl LinkStore {
         self.validate_below(hierarchy, Hierarchy::ROOT, &mut covering)
     }
 
+    /// The depth of the recursion is that of cluster and element trees, which both are bounded for any scene.
     /// `covering` holds, for each source that a receiver on the path from the root links to, that receiver.
     fn validate_below(
         &self,

@@ -10,7 +10,7 @@ pub use kernel::{Incident, Kernel, element_form_factor};
 pub use link::{Link, LinkStore};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};
-pub use refine::{Refinement, Refiner};
+pub use refine::{LinkBudget, Refinement, Refiner};
 pub use visibility::PairSampler;
 
 pub use crate::hierarchy::luminance;

@@ -4,6 +4,8 @@
 //! exceeds the threshold is replaced by pairs with the children of the node that causes the error, which is the larger
 //! one. Links that are good enough stay as they are: nothing is traced again.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::{Judge, Judgement, Link, kernel::element_form_factor};
 use glam::Vec3;
 
@@ -57,6 +59,9 @@ pub struct Refinement {
     pub wanted: Vec<u32>,
     /// Rays shot.
     pub ray_count: u64,
+    /// Whether the links fit into the budget. If not, they are incomplete and must be thrown away; the same on any
+    /// number of threads.
+    pub fits: bool,
 }
 
 impl Refinement {
@@ -82,6 +87,29 @@ pub struct Refiner<'a, F> {
     pub seed: u64,
     /// Tells to stop; the result is then incomplete and must be thrown away.
     pub cancelled: &'a (dyn Fn() -> bool + Sync),
+    /// How many links there may be.
+    pub budget: LinkBudget,
+}
+
+/// Counts links as they are made, on all threads.
+#[derive(Debug)]
+pub struct LinkBudget {
+    made: AtomicU64,
+    most: u64,
+}
+
+impl LinkBudget {
+    /// So many links may be made.
+    pub fn new(most: u64) -> Self {
+        Self {
+            made: AtomicU64::new(0),
+            most,
+        }
+    }
+
+    fn is_spent(&self) -> bool {
+        self.made.load(Ordering::Relaxed) > self.most
+    }
 }
 
 /// What becomes of a pair.
@@ -100,7 +128,16 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         } else {
             Vec::new()
         };
-        self.visit(Hierarchy::ROOT, &start)
+        let refinement = self.visit(Hierarchy::ROOT, &start);
+        Refinement {
+            fits: !self.budget.is_spent(),
+            ..refinement
+        }
+    }
+
+    /// Whether the rest is not worth doing.
+    fn is_stopped(&self) -> bool {
+        (self.cancelled)() || self.budget.is_spent()
     }
 
     fn hierarchy(&self) -> &'a Hierarchy {
@@ -110,7 +147,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     /// Refine a receiver and all below it; `sources` are handed down from above.
     fn visit(&self, receiver: NodeId, sources: &[NodeId]) -> Refinement {
         let mut refinement = Refinement::default();
-        if (self.cancelled)() {
+        if self.is_stopped() {
             return refinement;
         }
         let mut down = Vec::new();
@@ -140,6 +177,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
 
     /// As `visit`, within one task. Depth is bounded by that of the trees.
     fn visit_into(&self, receiver: NodeId, sources: &[NodeId], refinement: &mut Refinement) {
+        if self.is_stopped() {
+            return;
+        }
         let mut down = Vec::new();
         self.refine_links(receiver, sources, refinement, &mut down);
         for child in self.hierarchy().children(receiver) {
@@ -173,6 +213,10 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
         pending.extend(sources.iter().rev());
         while let Some(source) = pending.pop() {
+            let made = (out.links.len() - before) as u64;
+            if (self.cancelled)() || made > self.budget.most {
+                break;
+            }
             let decision = self.decide(source, receiver, None, out);
             self.apply(
                 &decision,
@@ -186,6 +230,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             );
         }
         let count = (out.links.len() - before) as u32;
+        self.budget
+            .made
+            .fetch_add(u64::from(count), Ordering::Relaxed);
         if count > 0 {
             out.runs.push((receiver, count));
         }

@@ -42,6 +42,8 @@ pub(super) struct Controller {
     run: Option<Run>,
     /// Set while a solve is away in the pool, even one of an older run.
     away: Option<Cancel>,
+    /// Whether what is away is being prepared.
+    prepares: bool,
 }
 
 impl Controller {
@@ -60,6 +62,7 @@ impl Controller {
             pool: None,
             run: None,
             away: None,
+            prepares: false,
         }
     }
 
@@ -111,6 +114,7 @@ impl Controller {
         };
         let cancel = Cancel::default();
         self.away = Some(cancel.clone());
+        self.prepares = run.stepper.is_none();
         let visit = run.visit(&self.make, cancel);
         let inbox = self.inbox.clone();
         pool.spawn(move || {
@@ -122,6 +126,7 @@ impl Controller {
     /// Take the solve back from the pool and say what it brought.
     fn welcome(&mut self, returned: Returned) {
         self.away = None;
+        self.prepares = false;
         let Some(run) = self
             .run
             .as_mut()
@@ -131,7 +136,12 @@ impl Controller {
         };
         let generation = run.generation;
         let trip = match returned.trip {
-            Ok(trip) => trip,
+            Ok(Some(trip)) => trip,
+            Ok(None) => {
+                // There is nothing to keep: going on prepares anew.
+                self.announce_aim();
+                return;
+            }
             Err(message) => {
                 run.turn_to(Aim::Failed);
                 self.outbox.send(generation, Event::Failed(message));
@@ -251,7 +261,11 @@ impl Controller {
             }
             run.turn_to(aim);
         }
-        self.cancel_step();
+        // A run that ends keeps what it has: without the first picture that would be nothing.
+        let keeps_nothing = self.prepares && matches!(aim, Aim::End(_));
+        if !keeps_nothing {
+            self.cancel_step();
+        }
         if self.away.is_none() {
             self.announce_aim();
         }

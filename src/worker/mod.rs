@@ -33,7 +33,7 @@ pub use truth::{MeasuredStep, SAMPLE_GOAL, TruthHandle, TruthProgress, VertexErr
 
 use crate::{
     scene::Scene,
-    solver::{Snapshot, SolveSettings, Solver, Subject},
+    solver::{Cancel, Snapshot, SolveSettings, Solver, Subject},
 };
 use controller::Controller;
 use message::{Command, Message};
@@ -67,8 +67,9 @@ impl WorkerHandle {
     pub fn spawn(wake: Wake) -> io::Result<Self> {
         Self::with_steppers(
             wake,
-            Arc::new(|job: Job| {
-                Box::new(Solver::new(job.scene, job.settings, job.memory_limit)) as _
+            Arc::new(|job: Job, cancel: &Cancel| {
+                let solver = Solver::new(job.scene, job.settings, job.memory_limit, cancel)?;
+                Some(Box::new(solver) as _)
             }),
         )
     }

@@ -118,7 +118,7 @@ impl Run {
                     settings: self.settings.clone(),
                     memory_limit: self.options.memory_limit,
                 };
-                Errand::Prepare(make.clone(), job)
+                Errand::Prepare(make.clone(), job, cancel)
             }
         };
         Visit {
@@ -156,6 +156,9 @@ impl Run {
 
     /// Why the run ends after a step with this report, if it does.
     fn end_after(&self, report: &StepReport) -> Option<StopReason> {
+        if report.is_full {
+            return Some(StopReason::MemoryLimit);
+        }
         if report.is_final {
             let reached = report.epsilon <= self.settings.epsilon;
             return Some(if reached {

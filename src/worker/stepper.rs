@@ -32,8 +32,8 @@ pub struct Job {
     pub memory_limit: Option<u64>,
 }
 
-/// Prepares a solve; called on a solver thread.
-pub type MakeStepper = Arc<dyn Fn(Job) -> Box<dyn Stepper> + Send + Sync>;
+/// Prepares a solve, or gives up when cancelled; called on a solver thread.
+pub type MakeStepper = Arc<dyn Fn(Job, &Cancel) -> Option<Box<dyn Stepper>> + Send + Sync>;
 
 impl Stepper for Solver {
     fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {

@@ -19,8 +19,8 @@ pub(super) struct Visit {
 
 /// What there is to do in the pool.
 pub(super) enum Errand {
-    /// Make a solve.
-    Prepare(MakeStepper, Job),
+    /// Make a solve, unless cancelled.
+    Prepare(MakeStepper, Job, Cancel),
     /// Make one step, unless cancelled.
     Step(Box<dyn Stepper>, Cancel),
     /// Look into nodes.
@@ -31,8 +31,8 @@ pub(super) enum Errand {
 pub(super) struct Returned {
     /// The run that it belongs to.
     pub generation: Generation,
-    /// What the visit brought, or the text of a panic.
-    pub trip: Result<Trip, String>,
+    /// What the visit brought, nothing where there is no solve yet, or the text of a panic.
+    pub trip: Result<Option<Trip>, String>,
 }
 
 /// What a visit brought.
@@ -68,11 +68,11 @@ impl Visit {
 }
 
 impl Errand {
-    fn run(self) -> Trip {
+    fn run(self) -> Option<Trip> {
         let begin = Instant::now();
-        match self {
-            Self::Prepare(make, job) => {
-                let stepper = make(job);
+        Some(match self {
+            Self::Prepare(make, job, cancel) => {
+                let stepper = make(job, &cancel)?;
                 let spent = begin.elapsed();
                 Trip {
                     outcome: Outcome::Prepared(stepper.snapshot()),
@@ -99,7 +99,7 @@ impl Errand {
                     spent: begin.elapsed(),
                 }
             }
-        }
+        })
     }
 }
 

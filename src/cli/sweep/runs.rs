@@ -154,12 +154,12 @@ fn drain(
 
 /// A worker whose solvers are measured after each step.
 fn worker(truth: Arc<Truth>, record: Arc<Mutex<Record>>) -> Result<WorkerHandle> {
-    let make = move |job: Job| {
-        Box::new(Recorder {
-            solver: Solver::new(job.scene, job.settings, job.memory_limit),
+    let make = move |job: Job, cancel: &Cancel| {
+        Some(Box::new(Recorder {
+            solver: Solver::new(job.scene, job.settings, job.memory_limit, cancel)?,
             truth: truth.clone(),
             record: record.clone(),
-        }) as Box<dyn Stepper>
+        }) as Box<dyn Stepper>)
     };
     WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make))
         .context("cannot start the solver thread")

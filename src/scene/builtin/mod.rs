@@ -14,7 +14,7 @@ mod shapes;
 mod soup;
 mod tiled_room;
 
-pub use furnace::furnace;
+pub use furnace::{furnace, sphere_furnace};
 pub use plates::{perpendicular_plates, plates};
 pub use room::room_of;
 
