@@ -7,6 +7,7 @@ use super::{
     Cancel,
     direct::{DirectLight, Lights, Receiver},
     reconstruct::INSET,
+    smooth,
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
 
@@ -47,6 +48,8 @@ pub(super) struct DirectField {
     centres: Vec<Option<DirectLight>>,
     /// Whether the number of elements kept the last adaptation from being finer.
     pub(super) is_full: bool,
+    /// Visible fraction to show by vertex; shorter than the vertices where some are new.
+    smooth: Vec<Vec4>,
 }
 
 /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
@@ -77,6 +80,7 @@ impl DirectField {
             vertices: Vec::new(),
             centres: Vec::new(),
             is_full: false,
+            smooth: Vec::new(),
         }
     }
 
@@ -92,11 +96,18 @@ impl DirectField {
         }
     }
 
-    /// Direct irradiance at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
+    /// Bring what is shown at vertices up to date with the samples.
+    pub(super) fn smooth(&mut self, hierarchy: &Hierarchy) {
+        self.smooth = smooth::fractions(hierarchy, &self.vertices);
+    }
+
+    /// Direct irradiance to show at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
     /// mean of its ends.
     pub(super) fn vertex(&self, hierarchy: &Hierarchy, vertex: u32) -> (Vec4, f32) {
         if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
-            return (light.irradiance(), light.error());
+            let fraction = self.smooth.get(vertex as usize).copied();
+            let shown = light.unoccluded() * fraction.unwrap_or_else(|| light.fraction());
+            return (shown, light.error());
         }
         match hierarchy.mesh.vertices[vertex as usize].ends {
             // Ends were made before the vertices between them, so this descends.
@@ -315,7 +326,9 @@ impl DirectField {
 
     /// Bytes held.
     pub(super) fn memory_bytes(&self) -> usize {
-        size_of_val(self.vertices.as_slice()) + size_of_val(self.centres.as_slice())
+        size_of_val(self.vertices.as_slice())
+            + size_of_val(self.centres.as_slice())
+            + size_of_val(self.smooth.as_slice())
     }
 }
 

@@ -228,6 +228,16 @@ impl DirectLight {
 
     /// Direct irradiance.
     pub(super) fn irradiance(&self) -> Vec4 {
+        self.exact * self.fraction()
+    }
+
+    /// Unoccluded irradiance.
+    pub(super) fn unoccluded(&self) -> Vec4 {
+        self.exact
+    }
+
+    /// The part of the unoccluded irradiance that arrives, by colour, 0…1.
+    pub(super) fn fraction(&self) -> Vec4 {
         let ratio = |arrived: f32, sent: f32| {
             if sent > 0.0 {
                 (arrived / sent).clamp(0.0, 1.0)
@@ -235,19 +245,23 @@ impl DirectLight {
                 0.0
             }
         };
-        let fraction = Vec4::new(
+        Vec4::new(
             ratio(self.arrived.x, self.sent.x),
             ratio(self.arrived.y, self.sent.y),
             ratio(self.arrived.z, self.sent.z),
             0.0,
-        );
-        self.exact * fraction
+        )
+    }
+
+    /// Square of the standard error of the fraction, as if the rays were independent: 0 where all agree.
+    pub(super) fn fraction_variance(&self) -> f32 {
+        let shot = self.shot.max(1) as f32;
+        let fraction = self.visible as f32 / shot;
+        fraction * (1.0 - fraction) / shot
     }
 
     /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.
     pub(super) fn error(&self) -> f32 {
-        let shot = self.shot.max(1) as f32;
-        let fraction = self.visible as f32 / shot;
-        luminance(self.exact) * (fraction * (1.0 - fraction) / shot).sqrt()
+        luminance(self.exact) * self.fraction_variance().sqrt()
     }
 }

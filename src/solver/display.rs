@@ -22,6 +22,9 @@ impl Solver {
         if has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown() {
             self.snapshot.mesh = Arc::new(self.display_mesh());
         }
+        if let Some(field) = &mut self.direct {
+            field.smooth(&self.hierarchy);
+        }
         let light = self.vertex_light();
         self.snapshot = Snapshot {
             step: self.step,

@@ -17,6 +17,7 @@ mod iterate;
 mod reconstruct;
 mod report;
 mod settings;
+mod smooth;
 mod snapshot;
 
 use std::sync::{
@@ -134,10 +135,23 @@ impl Solver {
             rays,
             hierarchy,
         };
+        solver.first_light(cancel)?;
         solver.pull();
         proceed()?;
         solver.show();
         Some(solver)
+    }
+
+    /// Sample direct light on the first mesh, so that there is something to see before the first link.
+    fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
+        let limits = self.limits(1.0);
+        adapt::divide_coarse(&mut self.hierarchy, limits);
+        if let Some(field) = &mut self.direct {
+            let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
+            self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
+        }
+        self.extend_to_new_elements();
+        Some(())
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.
@@ -250,13 +264,7 @@ impl Solver {
 
     /// Make direct light known at all vertices, and divide elements where it bends.
     fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
-        let limits = adapt::Limits {
-            tolerance: self.settings.mesh_tolerance * fineness,
-            min_area: self.min_area(),
-            shadow_samples: self.settings.shadow_samples,
-            seed: self.settings.seed,
-            most_elements: self.most_elements(),
-        };
+        let limits = self.limits(fineness);
         self.is_full |= !adapt::divide_coarse(&mut self.hierarchy, limits);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
@@ -264,6 +272,17 @@ impl Solver {
         }
         self.extend_to_new_elements();
         Some(())
+    }
+
+    /// When elements are divided for direct light.
+    fn limits(&self, fineness: f32) -> adapt::Limits {
+        adapt::Limits {
+            tolerance: self.settings.mesh_tolerance * fineness,
+            min_area: self.min_area(),
+            shadow_samples: self.settings.shadow_samples,
+            seed: self.settings.seed,
+            most_elements: self.most_elements(),
+        }
     }
 
     /// Elements inherit the linked irradiance of the one that was divided.

@@ -73,7 +73,7 @@ pub struct ClusterBox {
 /// The state after a step.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Number of the step, from 1; 0 before any light.
+    /// Number of the step, from 1; before that 0, when the light is that of sampled emitters alone.
     pub step: u32,
     /// The mesh; the same `Arc` as before where elements did not change.
     pub mesh: Arc<DisplayMesh>,
@@ -100,6 +100,16 @@ impl Snapshot {
             + size_of_val(light.direct.as_slice())
             + size_of_val(light.uncertainty.as_slice())
             + size_of_val(self.clusters.as_slice())
+    }
+
+    /// Whether there is light to show: after a step, or before the first where light was sampled.
+    pub fn is_lit(&self) -> bool {
+        self.step > 0
+            || self
+                .light
+                .irradiance
+                .iter()
+                .any(|light| *light != Vec3::ZERO)
     }
 }
 

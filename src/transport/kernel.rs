@@ -70,6 +70,17 @@ impl Kernel<'_> {
         }
     }
 
+    /// Lower and upper bound of the power that a node sends along a unit direction, whatever the reading.
+    pub fn power_bounds(&self, node: NodeId, unit: Vec3) -> (Vec4, Vec4) {
+        match self.hierarchy.kind(node) {
+            Kind::Cluster(index) => self.tables.clusters[index].bounds(unit),
+            Kind::Element(_) => {
+                let power = self.projected_power(node, unit);
+                (power, power)
+            }
+        }
+    }
+
     fn cluster_power(&self, index: usize, unit: Vec3) -> Vec4 {
         if let Some(reading) = self.reading {
             return self.tables.clusters[index].project(unit, reading);

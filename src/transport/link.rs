@@ -9,7 +9,8 @@ pub struct Link {
     pub source: NodeId,
     /// Unoccluded fraction of the transfer, 0…1.
     pub visibility: f32,
-    /// Estimated error of the irradiance that the receiver gets over this link (luminance).
+    /// Bound of the error of the irradiance that a face gets over this link (luminance): guaranteed but for visibility,
+    /// which adds twice its standard error.
     pub error: f32,
     /// Form factor including visibility between elements, where it is a constant; else 0.
     pub form_factor: f32,

@@ -32,8 +32,11 @@ pub enum Judgement {
     Transfer {
         /// Its likely value.
         irradiance: f32,
-        /// How far it may be off, or vary over the receiver.
+        /// How far it may be off, or vary over the receiver, towards the source: what decides about division.
         error: f32,
+        /// How far the irradiance that is pushed to any face, at any point of the receiver, may be from the unoccluded
+        /// one. Guaranteed by `Interval` with tables read as `Bounded`; with `Samples` no more than they have seen.
+        bound: f32,
     },
 }
 
@@ -140,6 +143,7 @@ impl Judge<'_> {
             return Judgement::Transfer {
                 irradiance: 0.5 * brightest,
                 error: brightest,
+                bound: brightest,
             };
         }
         let unit = (to - from) / distance;
@@ -153,7 +157,39 @@ impl Judge<'_> {
         Judgement::Transfer {
             irradiance,
             error: (upper - lower).max(0.0),
+            bound: self.bound(source, receiver, brightest),
         }
+    }
+
+    /// Bound of the error of a face's irradiance for two nodes that do not touch.
+    ///
+    /// Seen from any point of the receiver, light of the source comes along directions within an angle α of the one
+    /// between the centres. So what arrives per area facing it lies between (L − α T)/π far² and (U + α T)/π near², with
+    /// T the total and L, U the bounds of the table; a cosine at the face is off by at most α; and the spread of a near
+    /// source adds half of itself.
+    fn bound(&self, source: NodeId, receiver: NodeId, brightest: f32) -> f32 {
+        let hierarchy = self.hierarchy();
+        let (from, to) = (
+            self.tables().centre(hierarchy, source),
+            hierarchy.centroid(receiver),
+        );
+        // The centre of power need not be that of the sphere about the source.
+        let offset = from.distance(hierarchy.centroid(source));
+        let reach = hierarchy.radius(source) + hierarchy.radius(receiver) + offset;
+        let distance = from.distance(to);
+        if distance <= reach {
+            return brightest;
+        }
+        let unit = (to - from) / distance;
+        let total = luminance(self.tables().power(hierarchy, source));
+        let (least, most) = self.kernel.power_bounds(source, unit);
+        let tilt = (reach / distance).asin();
+        let (near, far) = (distance - reach, distance + reach);
+        let upper = (luminance(most) + tilt * total).min(total) / (PI * near * near);
+        let lower = (luminance(least) - tilt * total).max(0.0) / (PI * far * far);
+        let spread = (hierarchy.radius(source) / distance).powi(2);
+        let bound = (upper - lower).max(0.0) + upper * (tilt + 0.5 * spread);
+        bound.min(brightest)
     }
 
     /// The paper's EstimateEnergy, per area of the receiver.
@@ -181,6 +217,7 @@ impl Judge<'_> {
         Judgement::Transfer {
             irradiance: sum / count as f32,
             error: most - least.min(most),
+            bound: most - least.min(most),
         }
     }
 

@@ -17,6 +17,9 @@ use crate::{
 /// Receivers with fewer patches than this are refined by one task.
 const TASK_PATCHES: u32 = 256;
 
+/// Rays of one link at least.
+const LEAST_RAYS: u32 = 2;
+
 /// Rays of one link at most.
 const MOST_RAYS: u32 = 8;
 
@@ -290,9 +293,13 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             return self.decide_self(source, weight, known, out);
         }
         let mut random = self.random(source, receiver);
-        let (irradiance, error) = match self.judge.judge(source, receiver, &mut random) {
+        let (irradiance, error, bound) = match self.judge.judge(source, receiver, &mut random) {
             Judgement::Nothing => return Decision::Drop,
-            Judgement::Transfer { irradiance, error } => (irradiance, error),
+            Judgement::Transfer {
+                irradiance,
+                error,
+                bound,
+            } => (irradiance, error, bound),
         };
         let fits = |error: f32| error * weight <= self.threshold;
         let divide = self.division(source, receiver);
@@ -308,14 +315,25 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         };
         if self.judge.is_too_near_for_tables(source, receiver) {
             // What few rays have seen must not decide: of pairs that see little, only those found blind would stay.
-            return Decision::Keep(Link { error, ..link });
+            return Decision::Keep(Link {
+                error: bound,
+                ..link
+            });
         }
         let partial = 2.0 * (link.visibility * (1.0 - link.visibility)).max(0.0).sqrt();
         let error = error * link.visibility.max(DOUBT) + PARTIAL_VISIBILITY * irradiance * partial;
         if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
             return decision;
         }
-        Decision::Keep(Link { error, ..link })
+        // What gets through is known from a few rays: the bound of the transfer, and twice the deviation of a share that so
+        // many rays found.
+        let share =
+            (link.visibility.min(1.0) * LEAST_RAYS as f32 + 1.0) / (LEAST_RAYS as f32 + 2.0);
+        let deviation = (share * (1.0 - share) / LEAST_RAYS as f32).sqrt();
+        Decision::Keep(Link {
+            error: bound + 2.0 * deviation * irradiance,
+            ..link
+        })
     }
 
     fn decide_self(
@@ -367,7 +385,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     /// Rays for a transfer, the more the more it matters.
     fn ray_count(&self, weighted: f32, most: u32) -> u32 {
         let importance = weighted / self.threshold.max(f32::MIN_POSITIVE);
-        (importance.min(64.0).ceil() as u32).clamp(2, most)
+        (importance.min(64.0).ceil() as u32).clamp(LEAST_RAYS, most)
     }
 
     /// Which node to divide: the larger that can be.

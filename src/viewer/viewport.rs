@@ -158,7 +158,7 @@ impl Viewport {
             overlay,
             camera: state.rig.current,
             view: state.view.clone(),
-            is_unlit: snapshot.step == 0,
+            is_unlit: !snapshot.is_lit(),
             range: state.false_color_range,
             size,
             background,

@@ -112,7 +112,7 @@ pub fn picture(
         light: &snapshot.light,
         errors,
         camera,
-        is_unlit: snapshot.step == 0,
+        is_unlit: !snapshot.is_lit(),
         range: light_range::false_color_range(
             snapshot,
             &view,
