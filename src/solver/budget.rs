@@ -10,7 +10,7 @@ use crate::transport::Link;
 const LINK_BYTES: u64 = 3 * size_of::<Link>() as u64 + 8;
 
 /// Bytes for each new element: itself, its edges in three maps, vertices, tables, the memory of the iteration, and its
-/// share of two snapshots. Measured in rooms; smaller, and the limit is overrun.
+/// share of two snapshots. An estimate; smaller, and the limit is overrun.
 const ELEMENT_BYTES: u64 = 800;
 
 /// Part of the free room that new elements may take; the rest is for their links.
