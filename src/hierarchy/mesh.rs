@@ -345,6 +345,10 @@ fn close([a, b, c]: [u32; 3], middles: [Option<u32>; 3], mut emit: impl FnMut([u
     }
 }
 
+/// Faces that are looked at across an edge to find the smoothest way on. Fewer, and the right one of a fan of sheets may
+/// be missed; all, and thousands of faces on one edge take the square of their number.
+const MOST_NEIGHBOURS: usize = 64;
+
 /// Vertices of the patches: corners at one point are one vertex where a chain of smooth edges joins their patches.
 fn share_vertices(
     scene: &Scene,
@@ -370,6 +374,7 @@ fn share_vertices(
     for run in half_edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         let first_down = run.partition_point(|half| !half.2);
         let (down, up) = run.split_at(first_down);
+        let down = &down[..down.len().min(MOST_NEIGHBOURS)];
         for one in up {
             let likeness = |other: &&(u32, u32, bool, u32, u8)| {
                 patches[one.3 as usize]
