@@ -312,12 +312,11 @@ impl Solver {
         self.mean_irradiance = mean;
     }
 
-    /// Bring the links to a smaller threshold. Returns the threshold that they have: where links do not fit into memory,
+    /// Bring the links to a smaller threshold; source tables are up to date before and after. Returns the threshold that they have: where links do not fit into memory,
     /// those from before stay, and the first ones are made coarser.
     fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
         let (mut passes, mut raises) = (0, 0);
         while passes < MOST_PASSES {
-            self.pull();
             let is_first = self.links.is_empty();
             let most_links = self.most_links();
             let refinement = {
@@ -379,8 +378,8 @@ impl Solver {
                 let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
                 self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
             }
+            self.pull();
         }
-        self.pull();
         Some(epsilon)
     }
 }
