@@ -5,6 +5,7 @@
 
 mod flags;
 mod load;
+mod observed;
 mod output;
 #[cfg(feature = "viewer")]
 mod picture;

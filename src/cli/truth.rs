@@ -7,6 +7,7 @@ use std::{
 
 use glam::{Vec2, Vec3};
 
+use super::observed::observed_solvers;
 #[cfg(feature = "viewer")]
 use crate::metrics::VertexReference;
 use crate::{
@@ -17,8 +18,8 @@ use crate::{
         solve_matrix,
     },
     scene::Scene,
-    solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
-    worker::{Job, MakeStepper, Stepper},
+    solver::Snapshot,
+    worker::MakeStepper,
 };
 
 /// Errors by step, filled while the solve runs.
@@ -150,43 +151,12 @@ fn matrix_point(scene: &Scene, patch: &MatrixPatch, barycentric: Vec3) -> Refere
 
 /// Makes solvers that measure the error of each snapshot. The measuring counts as elapsed, not as solved time.
 pub(super) fn measured_solvers(truth: Truth, errors: Errors) -> MakeStepper {
-    let truth = Arc::new(truth);
-    Arc::new(move |job: Job, cancel: &Cancel| {
-        Some(Box::new(MeasuredSolver {
-            solver: Solver::new(job.scene, job.settings, job.memory_limit, cancel)?,
-            truth: truth.clone(),
-            errors: errors.clone(),
-        }) as Box<dyn Stepper>)
-    })
-}
-
-struct MeasuredSolver {
-    solver: Solver,
-    truth: Arc<Truth>,
-    errors: Errors,
-}
-
-impl Stepper for MeasuredSolver {
-    fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        self.solver.step(cancel)
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        let snapshot = self.solver.snapshot();
-        if let Some(error) = self.truth.measure(self.solver.scene(), &snapshot) {
-            self.errors
+    observed_solvers(move |scene, snapshot| {
+        if let Some(error) = truth.measure(scene, snapshot) {
+            errors
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .insert(snapshot.step, error);
         }
-        snapshot
-    }
-
-    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
-        self.solver.inspect(subject)
-    }
-
-    fn change_settings(&mut self, settings: SolveSettings) {
-        self.solver.change_settings(settings);
-    }
+    })
 }

@@ -13,12 +13,11 @@ use super::{
     session::{Session, Truth},
 };
 use crate::{
+    cli::observed::observed_solvers,
     metrics::{ErrorMeasures, Measurement, Runner, Trajectory},
     scene::Scene,
-    solver::{
-        Cancel, DisplayMesh, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject,
-    },
-    worker::{Event, Job, Stepper, StopReason, WorkerHandle},
+    solver::{DisplayMesh, StepReport},
+    worker::{Event, StopReason, WorkerHandle},
 };
 
 /// How often an interruption is looked for.
@@ -154,51 +153,18 @@ fn drain(
 
 /// A worker whose solvers are measured after each step.
 fn worker(truth: Arc<Truth>, record: Arc<Mutex<Record>>) -> Result<WorkerHandle> {
-    let make = move |job: Job, cancel: &Cancel| {
-        Some(Box::new(Recorder {
-            solver: Solver::new(job.scene, job.settings, job.memory_limit, cancel)?,
-            truth: truth.clone(),
-            record: record.clone(),
-        }) as Box<dyn Stepper>)
-    };
-    WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make))
-        .context("cannot start the solver thread")
-}
-
-/// A solver that is measured. The worker's clock stands still while it shows itself.
-struct Recorder {
-    solver: Solver,
-    truth: Arc<Truth>,
-    record: Arc<Mutex<Record>>,
-}
-
-impl Stepper for Recorder {
-    fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        self.solver.step(cancel)
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        let snapshot = self.solver.snapshot();
-        if snapshot.step > 0 {
-            let error =
-                self.truth
-                    .measure_mesh(self.solver.scene(), &snapshot.mesh, &snapshot.light);
-            let mut record = self.record.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(error) = error {
-                record.errors.insert(snapshot.step, error);
-            }
-            let first = record.meshes.take().map(|[first, _]| first);
-            let last = snapshot.mesh.clone();
-            record.meshes = Some([first.unwrap_or_else(|| last.clone()), last]);
+    let make = observed_solvers(move |scene, snapshot| {
+        if snapshot.step == 0 {
+            return;
         }
-        snapshot
-    }
-
-    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
-        self.solver.inspect(subject)
-    }
-
-    fn change_settings(&mut self, settings: SolveSettings) {
-        self.solver.change_settings(settings);
-    }
+        let error = truth.measure_mesh(scene, &snapshot.mesh, &snapshot.light);
+        let mut record = record.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(error) = error {
+            record.errors.insert(snapshot.step, error);
+        }
+        let first = record.meshes.take().map(|[first, _]| first);
+        let last = snapshot.mesh.clone();
+        record.meshes = Some([first.unwrap_or_else(|| last.clone()), last]);
+    });
+    WorkerHandle::with_steppers(Arc::new(|| {}), make).context("cannot start the solver thread")
 }

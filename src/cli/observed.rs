@@ -1,0 +1,50 @@
+//! A solver that is looked at whenever it shows itself. The worker's clock of solved time stands still meanwhile.
+
+use std::sync::Arc;
+
+use crate::{
+    scene::Scene,
+    solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
+    worker::{Job, MakeStepper, Stepper},
+};
+
+/// What looks at the snapshots of a scene, the unlit one before the first step included.
+type Observe = dyn Fn(&Scene, &Snapshot) + Send + Sync;
+
+/// Makes solvers whose snapshots are all handed to `observe` first.
+pub(super) fn observed_solvers(
+    observe: impl Fn(&Scene, &Snapshot) + Send + Sync + 'static,
+) -> MakeStepper {
+    let observe: Arc<Observe> = Arc::new(observe);
+    Arc::new(move |job: Job, cancel: &Cancel| {
+        Some(Box::new(ObservedSolver {
+            solver: Solver::new(job.scene, job.settings, job.memory_limit, cancel)?,
+            observe: observe.clone(),
+        }) as Box<dyn Stepper>)
+    })
+}
+
+struct ObservedSolver {
+    solver: Solver,
+    observe: Arc<Observe>,
+}
+
+impl Stepper for ObservedSolver {
+    fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        self.solver.step(cancel)
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let snapshot = self.solver.snapshot();
+        (self.observe)(self.solver.scene(), &snapshot);
+        snapshot
+    }
+
+    fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        self.solver.inspect(subject)
+    }
+
+    fn change_settings(&mut self, settings: SolveSettings) {
+        self.solver.change_settings(settings);
+    }
+}
