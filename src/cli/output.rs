@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::UsageError;
-use crate::export::{self, folder_of};
+use crate::scene::{self, folder_of};
 
 /// Whether a name means standard output.
 pub(super) fn is_stdout(path: &Path) -> bool {
@@ -39,7 +39,7 @@ pub(super) fn check(path: &Path) -> Result<()> {
             folder.display()
         )));
     }
-    export::try_writing(path)
+    scene::try_writing(path)
         .with_context(|| format!("cannot write to the folder {}", folder.display()))
 }
 
@@ -59,7 +59,7 @@ pub(super) fn write_whole(
             written => written.context("cannot write to standard output"),
         };
     }
-    let Err(error) = export::write_whole(path, &write) else {
+    let Err(error) = scene::write_whole(path, &write) else {
         return Ok(());
     };
     Err(match rescue(path, write) {

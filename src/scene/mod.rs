@@ -18,6 +18,7 @@ mod source;
 mod texture;
 mod triangulate;
 mod warning;
+mod whole;
 mod write;
 
 pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
@@ -25,6 +26,7 @@ pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
+pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
 
 use glam::{Vec2, Vec3};

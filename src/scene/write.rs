@@ -7,13 +7,15 @@
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, BufWriter, Cursor, Write as _};
+use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbImage};
 
-use super::{Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin};
+use super::{
+    Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin, whole::write_whole,
+};
 
 /// Write `scene` to `path`, its materials beside it under the same stem, and its textures beside both.
 ///
@@ -60,28 +62,6 @@ pub fn write_builtin(name: &str, folder: &Path) -> io::Result<PathBuf> {
     let path = folder.join(format!("{name}.obj"));
     write_obj(&scene, &path)?;
     Ok(path)
-}
-
-/// Fill a file beside `path` and rename it when it is whole.
-fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
-) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    // Readable by whom the umask allows, as other files are, not by the owner alone.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
-    let mut out = BufWriter::new(&mut file);
-    fill(&mut out)?;
-    out.flush()?;
-    drop(out);
-    file.persist(path)?;
-    Ok(())
 }
 
 /// Vertices, texture coordinates, normals, objects and faces.

@@ -10,7 +10,7 @@ use std::{
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
 
 use super::state::Severity;
-use crate::{export::write_whole, worker::Wake};
+use crate::{scene::write_whole, worker::Wake};
 
 /// A sentence from another thread.
 pub type Notice = (Severity, String);

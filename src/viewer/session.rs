@@ -10,7 +10,10 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{camera::Camera, loader::SceneSource, view::ViewSettings};
-use crate::{export::write_whole, scene::Frame, solver::SolveSettings};
+use crate::{
+    scene::{Frame, write_whole},
+    solver::SolveSettings,
+};
 
 /// Scenes that the menu remembers.
 const MOST_RECENT: usize = 12;

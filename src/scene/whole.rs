@@ -9,7 +9,7 @@ use std::{
 };
 
 /// Begins the names of files that are not whole yet.
-pub const ASIDE: &str = ".vecrad-";
+const ASIDE: &str = ".vecrad-";
 
 /// Fill a file aside, then put it in its place. What was there stays until then, and where anything fails.
 ///
