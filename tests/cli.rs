@@ -22,6 +22,12 @@ fn error_of(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// Wrong usage: exit code 2 and a sentence that says what is wrong.
+fn assert_refused(output: &Output, sentence: &str, arguments: &[&str]) {
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    assert!(error_of(output).contains(sentence), "{}", error_of(output));
+}
+
 fn solve(folder: &Path, more: &[&str]) -> Output {
     let start = ["solve", "--scene", SCENE, "--preset", "draft"];
     vecrad(folder, &[&start, more].concat())
@@ -115,12 +121,7 @@ fn wrong_usage_ends_with_code_2_and_a_sentence() {
         (&["--reference", "photons"], "expected paths"),
     ] {
         let output = solve(folder.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(
-            error_of(&output).contains(sentence),
-            "{}",
-            error_of(&output)
-        );
+        assert_refused(&output, sentence, arguments);
     }
 }
 
@@ -390,12 +391,7 @@ fn a_report_says_what_is_wrong_with_its_usage() {
         ),
     ] {
         let output = vecrad(folder.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(
-            error_of(&output).contains(sentence),
-            "{}",
-            error_of(&output)
-        );
+        assert_refused(&output, sentence, arguments);
     }
 }
 

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod display_scenes;
+
 use std::{
     f32::consts::PI,
     sync::{
@@ -16,7 +18,7 @@ use glam::Vec3;
 use vecrad::{
     geometry::RayTree,
     scene::{Scene, SceneOptions, builtin},
-    solver::{DisplayMesh, Snapshot, VertexLight},
+    solver::{Snapshot, VertexLight},
     worker::{TruthHandle, TruthProgress},
 };
 
@@ -35,21 +37,7 @@ fn furnace() -> Arc<Scene> {
 
 /// The scene's own triangles under even light.
 fn snapshot(scene: &Scene, step: u32, irradiance: f32) -> Arc<Snapshot> {
-    let mut mesh = DisplayMesh::default();
-    for id in scene.triangle_ids() {
-        let first = mesh.positions.len() as u32;
-        let surface = scene.surfaces[id.index()];
-        for corner in scene.corners(id) {
-            mesh.positions.push(corner);
-            mesh.normals.push(surface.area_vector.normalize_or_zero());
-            mesh.reflectance.push(surface.reflectance);
-            mesh.emission.push(surface.emission);
-        }
-        mesh.indices.push([first, first + 1, first + 2]);
-        mesh.triangle_of.push(id.0);
-        mesh.is_back.push(false);
-        mesh.element_of.push(id.0);
-    }
+    let mesh = display_scenes::own_triangles(scene);
     let light = VertexLight {
         irradiance: vec![Vec3::splat(irradiance); mesh.positions.len()],
         ..VertexLight::default()

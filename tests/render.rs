@@ -2,6 +2,8 @@
 
 #![cfg(feature = "viewer")]
 
+mod display_scenes;
+
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
@@ -9,7 +11,7 @@ use image::RgbaImage;
 use vecrad::{
     export::{ColorOptions, ToneMap as ExportToneMap},
     scene::{Material, Scene, SceneBuilder, SceneOptions},
-    solver::{ClusterBox, DisplayMesh, Snapshot, VertexLight},
+    solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
         cluster_lines,
@@ -47,21 +49,7 @@ fn scene() -> Arc<Scene> {
 
 /// The scene's own triangles under even light.
 fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
-    let mut mesh = DisplayMesh::default();
-    for id in scene.triangle_ids() {
-        let first = mesh.positions.len() as u32;
-        let surface = scene.surfaces[id.index()];
-        for corner in scene.corners(id) {
-            mesh.positions.push(corner);
-            mesh.normals.push(surface.area_vector.normalize_or_zero());
-            mesh.reflectance.push(surface.reflectance);
-            mesh.emission.push(surface.emission);
-        }
-        mesh.indices.push([first, first + 1, first + 2]);
-        mesh.triangle_of.push(id.0);
-        mesh.is_back.push(false);
-        mesh.element_of.push(id.0);
-    }
+    let mesh = display_scenes::own_triangles(scene);
     let count = mesh.positions.len();
     let root = ClusterBox {
         min: Vec3::new(-30.0, -30.0, -1.0),

@@ -124,6 +124,18 @@ fn worker(script: &Arc<Script>) -> WorkerHandle {
     WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap()
 }
 
+/// A worker whose solver is in its first step, which ends only by being cancelled.
+fn within_a_step() -> (Arc<Script>, WorkerHandle) {
+    let script = Arc::new(Script {
+        step_time: FOREVER,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for_steps(&script, 1);
+    (script, worker)
+}
+
 fn triangle() -> Arc<Scene> {
     let mut builder = SceneBuilder::default();
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|corner| builder.push_position(corner));
@@ -266,13 +278,7 @@ fn a_stale_generation_never_shows() {
 
 #[test]
 fn a_new_start_cancels_the_run_before() {
-    let script = Arc::new(Script {
-        step_time: FOREVER,
-        ..Script::default()
-    });
-    let mut worker = worker(&script);
-    worker.start(triangle(), short(), one_thread());
-    wait_for_steps(&script, 1);
+    let (script, mut worker) = within_a_step();
     worker.start(triangle(), short(), one_thread());
     wait_for_steps(&script, 2);
     assert_eq!(script.cancelled.load(Ordering::SeqCst), 1);
@@ -308,13 +314,7 @@ fn pause_stops_steps_and_continue_goes_on_without_a_restart() {
 
 #[test]
 fn stop_interrupts_a_step_and_keeps_the_light() {
-    let script = Arc::new(Script {
-        step_time: FOREVER,
-        ..Script::default()
-    });
-    let mut worker = worker(&script);
-    worker.start(triangle(), short(), one_thread());
-    wait_for_steps(&script, 1);
+    let (_, worker) = within_a_step();
     worker.stop();
     let events = wait_for(&worker, is_finished);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Requested)));
@@ -481,13 +481,7 @@ fn answers(events: &[Event]) -> Vec<u32> {
 
 #[test]
 fn a_question_is_answered_while_the_run_rests_and_after_its_end() {
-    let script = Arc::new(Script {
-        step_time: FOREVER,
-        ..Script::default()
-    });
-    let mut worker = worker(&script);
-    worker.start(triangle(), short(), one_thread());
-    wait_for_steps(&script, 1);
+    let (script, worker) = within_a_step();
     worker.pause();
     wait_for(&worker, |event| *event == Event::Paused);
     let unknown = Subject::Cluster(NodeId(9));

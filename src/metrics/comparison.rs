@@ -217,33 +217,13 @@ pub fn grouped(count: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::ErrorMeasures;
+    use crate::metrics::trajectory::tests::trajectory_along;
 
     fn run(label: &str, runner: Runner, curve: &[(f64, f64)]) -> Trajectory {
-        let points = curve
-            .iter()
-            .enumerate()
-            .map(|(index, &(time_s, error))| Measurement {
-                step: index as u32 + 1,
-                time_s,
-                epsilon: None,
-                samples: None,
-                rays: 1_234_567,
-                links: 0,
-                elements: 1,
-                memory_bytes: 3 << 20,
-                error: ErrorMeasures {
-                    relative_rms_trimmed: error,
-                    ..ErrorMeasures::default()
-                },
-            });
         Trajectory {
             label: label.to_owned(),
             runner,
-            settings: None,
-            repeats: 1,
-            is_cut_short: false,
-            points: points.collect(),
+            ..trajectory_along(curve)
         }
     }
 

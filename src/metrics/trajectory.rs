@@ -153,10 +153,11 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn run(curve: &[(f64, f64)]) -> Trajectory {
+    /// A solver's run whose trimmed error is the second number at the time of the first.
+    pub(in crate::metrics) fn trajectory_along(curve: &[(f64, f64)]) -> Trajectory {
         let points = curve
             .iter()
             .enumerate()
@@ -165,10 +166,10 @@ mod tests {
                 time_s,
                 epsilon: None,
                 samples: None,
-                rays: 0,
+                rays: 1_234_567,
                 links: 0,
-                elements: 0,
-                memory_bytes: 0,
+                elements: 1,
+                memory_bytes: 3 << 20,
                 error: ErrorMeasures {
                     relative_rms_trimmed: error,
                     ..ErrorMeasures::default()
@@ -191,7 +192,7 @@ mod tests {
             .map(|i| f64::from(1 << (2 * i)))
             .map(|time| (time, 0.3 / time.sqrt()))
             .collect();
-        let run = run(&curve);
+        let run = trajectory_along(&curve);
         for target in [0.25, 0.1, 0.05, 0.02] {
             let crossing = run.time_to(target).unwrap();
             let expected = (0.3 / target) * (0.3 / target);
@@ -208,22 +209,22 @@ mod tests {
 
     #[test]
     fn the_first_crossing_counts_and_no_error_at_all_is_finite() {
-        let bouncing = run(&[(1.0, 0.2), (2.0, 0.05), (4.0, 0.2), (8.0, 0.05)]);
+        let bouncing = trajectory_along(&[(1.0, 0.2), (2.0, 0.05), (4.0, 0.2), (8.0, 0.05)]);
         assert!(bouncing.time_to(0.1).unwrap().time_s < 2.0);
-        let perfect = run(&[(1.0, 0.2), (2.0, 0.0)]);
+        let perfect = trajectory_along(&[(1.0, 0.2), (2.0, 0.0)]);
         let time = perfect.time_to(0.01).unwrap().time_s;
         assert!((1.0..2.0).contains(&time), "{time}");
-        let level = run(&[(1.0, 0.2), (2.0, 0.2)]);
+        let level = trajectory_along(&[(1.0, 0.2), (2.0, 0.2)]);
         assert!(level.time_to(0.2).unwrap().is_bound);
-        assert_eq!(run(&[]).time_to(0.1), None);
+        assert_eq!(trajectory_along(&[]).time_to(0.1), None);
     }
 
     #[test]
     fn repeats_give_median_times() {
         let runs = vec![
-            run(&[(1.0, 0.2), (5.0, 0.1)]),
-            run(&[(3.0, 0.2), (6.0, 0.1), (9.0, 0.05)]),
-            run(&[(2.0, 0.2)]),
+            trajectory_along(&[(1.0, 0.2), (5.0, 0.1)]),
+            trajectory_along(&[(3.0, 0.2), (6.0, 0.1), (9.0, 0.05)]),
+            trajectory_along(&[(2.0, 0.2)]),
         ];
         let merged = Trajectory::median(runs).unwrap();
         let times: Vec<f64> = merged.points.iter().map(|point| point.time_s).collect();
