@@ -11,7 +11,7 @@ use vecrad::{
     reference::{MatrixSettings, solve_matrix},
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
     solver::{Cancel, Direct, SolveSettings, Solver},
-    transport::{Estimate, Judge, Judgement, Kernel, PairSampler, luminance},
+    transport::{Estimate, Judge, Judgement, Kernel, PairSampler, PatchSums, luminance},
 };
 
 /// Random triangles in a unit cube, gathered in clumps so that clusters differ.
@@ -69,7 +69,8 @@ fn the_interval_of_a_link_holds_what_brute_force_finds() {
         let tables = Tables::new(&hierarchy, |leaf| {
             (Vec3::splat(radiosities[leaf].powi(4))).extend(1.0)
         });
-        let area_sums = PairSampler::area_sums(&hierarchy);
+        let areas = PatchSums::of_area(&hierarchy);
+        let powers = PatchSums::of_power(&hierarchy, &tables);
         let kernel = Kernel {
             hierarchy: &hierarchy,
             tables: &tables,
@@ -81,7 +82,8 @@ fn the_interval_of_a_link_holds_what_brute_force_finds() {
             sampler: PairSampler {
                 hierarchy: &hierarchy,
                 tables: &tables,
-                area_sums: &area_sums,
+                areas: &areas,
+                powers: &powers,
                 rays: &rays,
             },
         };

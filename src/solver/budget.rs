@@ -23,7 +23,7 @@ impl Solver {
             + self.rays.memory_bytes()
             + self.power.memory_bytes()
             + self.links.memory_bytes()
-            + size_of_val(self.area_sums.as_slice())
+            + self.areas.memory_bytes()
             + size_of_val(self.closures.as_slice())
             + size_of_val(self.linked.as_slice())
             + size_of_val(self.leaves.as_slice())

@@ -59,7 +59,7 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
                 sum += match hierarchy.kind(link.source) {
                     Kind::Element(source) => kernel.tables.elements[source] * link.form_factor,
                     Kind::Cluster(_) => {
-                        kernel.irradiance(link.source, point, normal) * link.visibility
+                        kernel.irradiance(link.source, point, normal) * link.transmission()
                     }
                 };
             }
@@ -134,12 +134,12 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
         if link.source.index() == index {
             sum.add_isotropic(
                 self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
-                    * link.visibility,
+                    * link.transmission(),
             );
         } else {
             kernel
                 .vector_irradiance(link.source, cluster.centroid)
-                .add_to(&mut sum, link.visibility);
+                .add_to(&mut sum, link.transmission());
         }
     }
     sum
@@ -163,7 +163,7 @@ fn push_at_once(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
                         kernel,
                         at,
                         link.source,
-                        link.visibility,
+                        link.transmission(),
                         &hierarchy.patches[range.clone()],
                         &mut sums,
                     );
@@ -188,7 +188,7 @@ fn push_one(
     kernel: Kernel<'_>,
     cluster: usize,
     source: NodeId,
-    visibility: f32,
+    transmission: Vec4,
     patches: &[crate::hierarchy::Patch],
     sums: &mut [Vec4],
 ) {
@@ -196,14 +196,14 @@ fn push_one(
     if source.index() == cluster {
         let irradiance =
             self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total())
-                * visibility;
+                * transmission;
         sums.iter_mut().for_each(|sum| *sum += irradiance);
         return;
     }
     let receiver = &hierarchy.clusters[cluster];
     let incident = kernel.vector_irradiance(source, receiver.centroid);
     for (sum, patch) in sums.iter_mut().zip(patches) {
-        *sum += incident.on_face(patch.normal) * visibility;
+        *sum += incident.on_face(patch.normal) * transmission;
     }
 }
 

@@ -231,7 +231,7 @@ fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Li
     let facing = moments.project(towards, reading).w / area;
     let cosine = Vec3::from_array(moments.linear.map(|along| along.w)).dot(towards) / area;
     let share = facing * (1.0 - incident.spread) + 0.5 * (1.0 + cosine) * incident.spread;
-    incident.strength * (share * link.visibility)
+    incident.strength * (link.transmission() * share)
 }
 
 /// By which links are ordered: luminance of what they bring.

@@ -35,7 +35,9 @@ use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, Reading, Tables},
     scene::Scene,
-    transport::{Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, Refiner, luminance},
+    transport::{
+        Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
+    },
 };
 use adapt::DirectField;
 use closure::Closure;
@@ -82,7 +84,7 @@ pub struct Solver {
     memory_limit: Option<u64>,
     rays: RayTree,
     hierarchy: Hierarchy,
-    area_sums: Vec<f64>,
+    areas: PatchSums,
     /// What links carry: reflected light, and emission where it is linked.
     power: Tables,
     links: LinkStore,
@@ -118,7 +120,7 @@ impl Solver {
         let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed, cancel)?;
         let mut solver = Self {
             closures,
-            area_sums: PairSampler::area_sums(&hierarchy),
+            areas: PatchSums::of_area(&hierarchy),
             power: Tables::default(),
             links: LinkStore::default(),
             direct: (!lights.is_empty()).then(|| DirectField::new(lights)),
@@ -320,10 +322,12 @@ impl Solver {
             let is_first = self.links.is_empty();
             let most_links = self.most_links();
             let refinement = {
+                let powers = PatchSums::of_power(&self.hierarchy, &self.power);
                 let sampler = PairSampler {
                     hierarchy: &self.hierarchy,
                     tables: &self.power,
-                    area_sums: &self.area_sums,
+                    areas: &self.areas,
+                    powers: &powers,
                     rays: &self.rays,
                 };
                 let estimate = match self.settings.oracle {

@@ -135,10 +135,13 @@ fn gather_patch(
             .map(|corner| corner.lerp(element.centroid, INSET));
         for link in path.iter().copied().flatten() {
             light.error += link.error;
-            light.centre +=
-                kernel.irradiance(link.source, element.centroid, normal) * link.visibility;
+            let transmission = match hierarchy.kind(link.source) {
+                Kind::Cluster(_) => link.transmission(),
+                Kind::Element(_) => Vec4::splat(link.visibility),
+            };
+            light.centre += kernel.irradiance(link.source, element.centroid, normal) * transmission;
             for (sum, &corner) in light.corners.iter_mut().zip(&corners) {
-                *sum += kernel.irradiance(link.source, corner, normal) * link.visibility;
+                *sum += kernel.irradiance(link.source, corner, normal) * transmission;
             }
         }
         found.push(light);
@@ -158,12 +161,12 @@ pub(super) fn chain_irradiance(
             kernel.hierarchy,
             receiver,
             kernel.tables.clusters[receiver].total(),
-        ) * link.visibility;
+        ) * link.transmission();
     }
     debug_assert!(
         !matches!(kernel.hierarchy.kind(link.source), Kind::Cluster(index) if index == receiver)
     );
-    kernel.irradiance(link.source, point, normal) * link.visibility
+    kernel.irradiance(link.source, point, normal) * link.transmission()
 }
 
 /// Area-weighted means of the leaves about each vertex.

@@ -38,9 +38,13 @@ impl Incident {
         self.strength * (cosine.max(0.0) * (1.0 - self.spread) + 0.5 * (1.0 + cosine) * self.spread)
     }
 
-    /// Add it, times a visibility, to the moments of what arrives.
-    pub fn add_to(&self, moments: &mut Moments<Vec4>, visibility: f32) {
-        moments.add_spread(self.towards_source, self.strength * visibility, self.spread);
+    /// Add it, times a transmission, to the moments of what arrives.
+    pub fn add_to(&self, moments: &mut Moments<Vec4>, transmission: Vec4) {
+        moments.add_spread(
+            self.towards_source,
+            self.strength * transmission,
+            self.spread,
+        );
     }
 }
 

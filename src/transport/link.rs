@@ -1,5 +1,7 @@
 //! Links: over which pairs of nodes light travels.
 
+use glam::{Vec3, Vec4};
+
 use crate::hierarchy::{Hierarchy, NodeId};
 
 /// A source as one receiver sees it. The receiver is known from where the link is stored.
@@ -7,13 +9,22 @@ use crate::hierarchy::{Hierarchy, NodeId};
 pub struct Link {
     /// Where the light comes from. Equal to the receiver for the light that a cluster exchanges within itself.
     pub source: NodeId,
-    /// Unoccluded fraction of the transfer, 0…1.
+    /// Unoccluded fraction of the light that is transferred, 0…1; more where near nodes exchange more than tables say.
     pub visibility: f32,
     /// Bound of the error of the irradiance that a face gets over this link (luminance): guaranteed but for visibility,
     /// which adds twice its standard error.
     pub error: f32,
-    /// Form factor including visibility between elements, where it is a constant; else 0.
+    /// Between elements, where it is a constant, the form factor including visibility. Else the visibility of the
+    /// source's area: what is bright often stands free, so its light may get through where its area does not.
     pub form_factor: f32,
+}
+
+impl Link {
+    /// By which each channel of an unoccluded irradiance from a source or to a receiver that is a cluster is multiplied:
+    /// colours by the visibility of the light, `w` (the form factor) by that of the area.
+    pub fn transmission(&self) -> Vec4 {
+        Vec3::splat(self.visibility).extend(self.form_factor)
+    }
 }
 
 /// All links, grouped by receiver.

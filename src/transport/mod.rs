@@ -11,6 +11,6 @@ pub use link::{Link, LinkStore};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};
 pub use refine::{LinkBudget, Refinement, Refiner};
-pub use visibility::PairSampler;
+pub use visibility::{PairSampler, PatchSums};
 
 pub use crate::hierarchy::luminance;

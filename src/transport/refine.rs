@@ -368,7 +368,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             source: cluster,
             visibility: fraction,
             error,
-            form_factor: 0.0,
+            form_factor: fraction,
         })
     }
 
@@ -437,16 +437,17 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mut random = self.random(source, receiver);
         let hierarchy = self.hierarchy();
         let sampler = self.judge.sampler;
-        let visibility = if self.judge.is_too_near_for_tables(source, receiver) {
+        let (visibility, of_area) = if self.judge.is_too_near_for_tables(source, receiver) {
             let ray_count = (2 * ray_count).clamp(*NEAR_RAYS.start(), *NEAR_RAYS.end());
             out.ray_count += u64::from(ray_count);
             let seen = sampler.seen_fraction(source, receiver, ray_count, &mut random);
             let expected = self.judge.kernel.mean_form_factor(source, receiver);
-            if expected > 0.0 {
+            let correction = if expected > 0.0 {
                 (seen / expected).min(MOST_CORRECTION)
             } else {
                 0.0
-            }
+            };
+            (correction, correction)
         } else {
             out.ray_count += u64::from(ray_count);
             sampler.visibility(source, receiver, ray_count, &mut random)
@@ -455,7 +456,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             (Kind::Element(from), Kind::Element(to)) => {
                 visibility * area_form_factor(hierarchy, from, to)
             }
-            _ => 0.0,
+            _ => of_area,
         };
         Link {
             source,

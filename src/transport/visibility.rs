@@ -1,8 +1,11 @@
 //! Which fraction of a transfer gets through.
 //!
 //! A fraction of area-uniform rays is biased, since most of them stand for little light. Here each ray stands for the
-//! light that it carries: of a few candidate point pairs one is kept with probability proportional to its unoccluded
-//! transfer, and the outcome of its ray counts with their mean weight (resampled importance sampling, Talbot 2005).
+//! light that it carries: points of the source are chosen by power and by area in turn, of a few candidate point pairs
+//! one is kept with probability proportional to its unoccluded transfer, and the outcome of its ray counts with their
+//! mean weight (resampled importance sampling, Talbot 2005).
+
+use std::ops::Range;
 
 use glam::Vec3;
 
@@ -17,6 +20,10 @@ use crate::{
 /// cost as much as the ray that they improve.
 const CANDIDATES: u32 = 3;
 
+/// Share of the source's points that are chosen by power; the others by area. Few bright patches carry much of the light
+/// of many clusters, and what is bright is often what stands free: chosen by area, the light would seem blocked.
+const POWER_SHARE: f32 = 0.5;
+
 /// A point on a patch of a node.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
@@ -26,6 +33,82 @@ struct Sample {
     radiosity: f32,
 }
 
+/// Running sums over the patches in tree order, to choose patches of a cluster in proportion to what is summed.
+/// One more than there are patches.
+#[derive(Clone, Debug, Default)]
+pub struct PatchSums(Vec<f64>);
+
+impl PatchSums {
+    /// Of the areas of the patches, frame units.
+    pub fn of_area(hierarchy: &Hierarchy) -> Self {
+        Self::of(hierarchy, |_, area| area)
+    }
+
+    /// Of what the patches send (luminance of radiosity, times area).
+    pub fn of_power(hierarchy: &Hierarchy, tables: &Tables) -> Self {
+        Self::of(hierarchy, |patch, area| {
+            luminance(tables.elements[patch]).max(0.0) * area
+        })
+    }
+
+    fn of(hierarchy: &Hierarchy, value: impl Fn(usize, f32) -> f32) -> Self {
+        let mut sum = 0.0;
+        let values = hierarchy.patches.iter().enumerate().map(|(index, patch)| {
+            sum += f64::from(value(index, patch.area));
+            sum
+        });
+        Self(std::iter::once(0.0).chain(values).collect())
+    }
+
+    /// The sum over some patches.
+    fn total(&self, patches: &Range<usize>) -> f64 {
+        self.0[patches.end] - self.0[patches.start]
+    }
+
+    /// One of some patches; `at` is 0…1.
+    fn choose(&self, patches: &Range<usize>, at: f32) -> usize {
+        let sums = &self.0[patches.start..=patches.end];
+        let target = sums[0] + f64::from(at) * self.total(patches);
+        let above = sums.partition_point(|&sum| sum <= target);
+        patches.start + above.clamp(1, patches.len()) - 1
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+}
+
+/// A point of a source that may be chosen.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    from: Sample,
+    /// Light that the point stands for, relative to that of a point chosen by area in a source of even radiosity.
+    light: f32,
+    /// Area that it stands for, likewise.
+    area: f32,
+}
+
+/// Which part of what was sent arrived.
+#[derive(Clone, Copy, Debug, Default)]
+struct Share {
+    sent: f32,
+    arrived: f32,
+}
+
+impl Share {
+    fn count(&mut self, weight: f32, is_visible: bool) {
+        self.sent += weight;
+        if is_visible {
+            self.arrived += weight;
+        }
+    }
+
+    fn part(&self) -> Option<f32> {
+        (self.sent > 0.0).then(|| self.arrived / self.sent)
+    }
+}
+
 /// Samples pairs of points on pairs of nodes.
 #[derive(Clone, Copy)]
 pub struct PairSampler<'a> {
@@ -33,43 +116,96 @@ pub struct PairSampler<'a> {
     pub hierarchy: &'a Hierarchy,
     /// What they send.
     pub tables: &'a Tables,
-    /// Running sums of the patch areas, in tree order, one more than there are patches.
-    pub area_sums: &'a [f64],
+    /// Areas of the patches.
+    pub areas: &'a PatchSums,
+    /// Power of the patches, as the tables have it.
+    pub powers: &'a PatchSums,
     /// What blocks.
     pub rays: &'a RayTree,
 }
 
 impl PairSampler<'_> {
-    /// Running sums of patch areas.
-    pub fn area_sums(hierarchy: &Hierarchy) -> Vec<f64> {
-        let mut sum = 0.0;
-        let mut sums = Vec::with_capacity(hierarchy.patches.len() + 1);
-        sums.push(0.0);
-        for patch in &hierarchy.patches {
-            sum += f64::from(patch.area);
-            sums.push(sum);
-        }
-        sums
-    }
-
     /// A random point of a node and its normal, uniform over its area.
     pub fn point_on(&self, node: NodeId, random: &mut Random) -> (Vec3, Vec3) {
         let sample = self.sample(node, random);
         (sample.point, sample.normal)
     }
 
+    /// Uniform over the area of a node.
     fn sample(&self, node: NodeId, random: &mut Random) -> Sample {
         let element = match self.hierarchy.kind(node) {
             Kind::Element(index) => index,
             Kind::Cluster(index) => {
-                let range = self.hierarchy.clusters[index].patches();
-                let sums = &self.area_sums[range.start..=range.end];
-                let target =
-                    sums[0] + f64::from(random.uniform()) * (sums[sums.len() - 1] - sums[0]);
-                let above = sums.partition_point(|&sum| sum <= target);
-                range.start + above.clamp(1, range.len()) - 1
+                let patches = self.hierarchy.clusters[index].patches();
+                self.areas.choose(&patches, random.uniform())
             }
         };
+        self.sample_on(element, random)
+    }
+
+    /// A point of a source, now in proportion to its power, now to its area.
+    fn sample_source(&self, node: NodeId, random: &mut Random) -> Candidate {
+        let by_power = random.uniform() < POWER_SHARE;
+        let (mut element, area, power) = match self.hierarchy.kind(node) {
+            Kind::Element(index) => {
+                let area = self.hierarchy.mesh.elements[index].area_vector.length();
+                (index, area, luminance(self.tables.elements[index]) * area)
+            }
+            Kind::Cluster(index) => {
+                let patches = self.hierarchy.clusters[index].patches();
+                let power = self.powers.total(&patches) as f32;
+                let sums = if by_power && power > 0.0 {
+                    self.powers
+                } else {
+                    self.areas
+                };
+                (
+                    sums.choose(&patches, random.uniform()),
+                    self.areas.total(&patches) as f32,
+                    power,
+                )
+            }
+        };
+        while !self.hierarchy.mesh.elements[element].is_leaf() {
+            let first = self.hierarchy.mesh.elements[element].first_child as usize;
+            element = first + self.choose_child(first, by_power, random.uniform());
+        }
+        let sample = self.sample_on(element, random);
+        let mean = power / area.max(f32::MIN_POSITIVE);
+        let relative = if mean > 0.0 {
+            sample.radiosity / mean
+        } else {
+            1.0
+        };
+        let density = (1.0 - POWER_SHARE) + POWER_SHARE * relative;
+        Candidate {
+            from: sample,
+            light: relative / density,
+            area: 1.0 / density,
+        }
+    }
+
+    /// One of the four children of an element, which all have the same area.
+    fn choose_child(&self, first: usize, by_power: bool, at: f32) -> usize {
+        let weights = [0, 1, 2, 3].map(|child| {
+            if by_power {
+                luminance(self.tables.elements[first + child]).max(0.0)
+            } else {
+                1.0
+            }
+        });
+        let target = at * weights.iter().sum::<f32>();
+        let mut sum = 0.0;
+        weights
+            .iter()
+            .position(|weight| {
+                sum += weight;
+                sum > target
+            })
+            .unwrap_or((at * 4.0) as usize & 3)
+    }
+
+    fn sample_on(&self, element: usize, random: &mut Random) -> Sample {
         let [a, b, c] = self.hierarchy.mesh.corners(element);
         let at = triangle_point(random.uniform_2d());
         let patch = self.hierarchy.patch_of(element);
@@ -81,46 +217,43 @@ impl PairSampler<'_> {
         }
     }
 
-    /// Unoccluded fraction of the transfer from a source to a receiver by `ray_count` rays, 0…1.
-    /// Where no sampled pair transfers anything, all of them count alike.
+    /// Unoccluded fractions of the light and of the area that a source shows to a receiver, by `ray_count` rays; both
+    /// 0…1. Where no sampled pair transfers anything, all of them count alike.
     pub fn visibility(
         &self,
         source: NodeId,
         receiver: NodeId,
         ray_count: u32,
         random: &mut Random,
-    ) -> f32 {
-        let (mut transferred, mut sent) = (0.0, 0.0);
-        let (mut clear, mut shot) = (0.0, 0.0);
+    ) -> (f32, f32) {
+        let (mut light, mut area) = (Share::default(), Share::default());
+        let mut all = Share::default();
         for _ in 0..ray_count {
             let (mut kept, mut sum) = (None, 0.0);
             for _ in 0..CANDIDATES {
-                let (from, to) = (self.sample(source, random), self.sample(receiver, random));
-                let weight = transfer(&from, &to);
+                let candidate = self.sample_source(source, random);
+                let to = self.sample(receiver, random);
+                let weight = transfer(&candidate.from, &to);
                 sum += weight;
                 if kept.is_none() || random.uniform() * sum < weight {
-                    kept = Some((from, to));
+                    kept = Some((candidate, to));
                 }
             }
-            let Some((from, to)) = kept else { continue };
+            let Some((candidate, to)) = kept else {
+                continue;
+            };
+            let from = candidate.from;
             let visible = !self.rays.occluded(
                 to.point,
                 from.point,
                 [Some(to.triangle), Some(from.triangle)],
             );
-            let gets_through = if visible { 1.0 } else { 0.0 };
-            transferred += sum * gets_through;
-            sent += sum;
-            clear += gets_through;
-            shot += 1.0;
+            all.count(1.0, visible);
+            light.count(sum * candidate.light, visible);
+            area.count(sum * candidate.area, visible);
         }
-        if sent > 0.0 {
-            transferred / sent
-        } else if shot > 0.0 {
-            clear / shot
-        } else {
-            1.0
-        }
+        let all = all.part().unwrap_or(1.0);
+        (light.part().unwrap_or(all), area.part().unwrap_or(all))
     }
 
     /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of
@@ -166,7 +299,7 @@ impl PairSampler<'_> {
     }
 }
 
-/// Unoccluded transfer between two points, up to a factor that is the same for all pairs of two nodes.
+/// Unoccluded transfer between two points of radiosity 1, up to a factor that is the same for all pairs of two nodes.
 fn transfer(from: &Sample, to: &Sample) -> f32 {
     let separation = to.point - from.point;
     let squared = separation.length_squared();
@@ -174,6 +307,6 @@ fn transfer(from: &Sample, to: &Sample) -> f32 {
         return 0.0;
     }
     let cosines = from.normal.dot(separation).max(0.0) * (-to.normal.dot(separation)).max(0.0);
-    let value = from.radiosity * cosines / (squared * squared);
+    let value = cosines / (squared * squared);
     if value.is_finite() { value } else { 0.0 }
 }
