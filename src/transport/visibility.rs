@@ -17,6 +17,10 @@ use crate::{
 /// cost as much as the ray that they improve.
 const CANDIDATES: u32 = 3;
 
+/// Radiosity of what is dark, beside which all light counts. Without it, dark pairs would be weighed alike, those that
+/// face each other and those that do not; sums of form factors count all sources.
+const DARK_RADIOSITY: f32 = 1e-20;
+
 /// A point on a patch of a node.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
@@ -77,7 +81,7 @@ impl PairSampler<'_> {
             point: a * at.x + b * at.y + c * at.z,
             normal: patch.normal,
             triangle: patch.triangle,
-            radiosity: luminance(self.tables.elements[element]),
+            radiosity: luminance(self.tables.elements[element]).max(DARK_RADIOSITY),
         }
     }
 

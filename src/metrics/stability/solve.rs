@@ -17,8 +17,11 @@ use crate::{
 /// factors of few rays are scaled by their mean over a patch, so those of single corners may lie above 1.
 const PEAK_SLACK: f64 = 2.0;
 
-/// Factor by which all that arrives may exceed what emitters can keep up: the noise of direct light.
+/// Factor by which all that arrives in the end may exceed what emitters can keep up: the noise of direct light.
 const POWER_SLACK: f64 = 1.1;
+
+/// The same for the coarse links of earlier steps.
+const EARLY_POWER_SLACK: f64 = 1.5;
 
 /// Points at which two solves are compared.
 const COMPARED_POINTS: u32 = 4000;
@@ -73,7 +76,7 @@ pub(super) fn solve_within(
     while reports.last().is_none_or(|report| !report.is_final) {
         let report = solver.step(cancel).ok_or(Trouble::Stopped)?;
         let broken = limits
-            .broken_by(&scene, &solver.snapshot())
+            .broken_by(&scene, &solver.snapshot(), report.is_final)
             .or_else(|| broken_by(&report))
             .or_else(|| solver.hierarchy().validate().err());
         if let Some(what) = broken {
@@ -129,12 +132,12 @@ impl Limits {
         let absorbed = DVec3::ONE - reflectance;
         Self {
             irradiance: brightest * PI / absorbed * PEAK_SLACK,
-            power: emitted_power(scene) / absorbed * POWER_SLACK,
+            power: emitted_power(scene) / absorbed,
         }
     }
 
     /// What is wrong with the light of a snapshot.
-    fn broken_by(&self, scene: &Scene, snapshot: &Snapshot) -> Option<String> {
+    fn broken_by(&self, scene: &Scene, snapshot: &Snapshot, is_final: bool) -> Option<String> {
         let light = &snapshot.light;
         if light.irradiance.len() != snapshot.mesh.positions.len() {
             return Some("vertices without light".to_owned());
@@ -156,7 +159,12 @@ impl Limits {
             ));
         }
         let power = arriving_power(scene, snapshot, |_| 1.0);
-        power.cmpgt(self.power).any().then(|| {
+        let slack = if is_final {
+            POWER_SLACK
+        } else {
+            EARLY_POWER_SLACK
+        };
+        power.cmpgt(self.power * slack).any().then(|| {
             format!(
                 "power {power} arrives, more than {} that the emitters can keep up",
                 self.power

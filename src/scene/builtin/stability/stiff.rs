@@ -21,7 +21,7 @@ pub const PIN_HOLE: f64 = 0.1;
 pub const INNER_SPHERE: f64 = 0.5;
 
 /// One in so many triangles is missing in a [`leaking_sphere`].
-pub const LEAK_EVERY: usize = 40;
+pub const LEAK_EVERY: usize = 100;
 
 /// A tube with baffles that leave its left and its right half open in turn; the near end is the lamp. Baffles are sheets:
 /// two faces back to back.
