@@ -77,6 +77,7 @@ fn the_interval_of_a_link_holds_what_brute_force_finds() {
             reading: Some(Reading::Bounded),
         };
         let judge = Judge {
+            ambient: 0.0,
             kernel,
             estimate: Estimate::Interval,
             sampler: PairSampler {

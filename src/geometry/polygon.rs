@@ -4,12 +4,16 @@
 //! `(B / 2π) Σ_k θ_k Γ_k`, with θ_k the angle that edge k subtends and Γ_k the unit normal of its fan triangle.
 //! It is finite however close the point is, and needs no samples.
 
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 
 use glam::Vec3;
 
 /// Longest polygon that clipping a triangle by a plane can leave.
 const CLIPPED_CORNERS: usize = 4;
+
+/// Beyond this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
+/// angles of the edges cancel in single precision, until nothing but rounding is left.
+const FAR: f32 = 64.0;
 
 /// Irradiance vector at `point` of a triangle of radiosity 1 that faces it, per unit radiosity.
 /// Its dot product with a unit normal whose horizon the triangle does not cross is the irradiance there.
@@ -18,8 +22,24 @@ pub fn irradiance_vector(point: Vec3, corners: [Vec3; 3]) -> Vec3 {
     if !sees_front(point, corners) {
         Vec3::ZERO
     } else {
-        edge_sum(&corners.map(|corner| corner - point))
+        far_vector(point, corners)
+            .unwrap_or_else(|| edge_sum(&corners.map(|corner| corner - point)))
     }
+}
+
+/// The irradiance vector of a triangle that is far enough to count as a point.
+fn far_vector(point: Vec3, [a, b, c]: [Vec3; 3]) -> Option<Vec3> {
+    let (u, v) = (b - a, c - a);
+    let size = u
+        .length_squared()
+        .max(v.length_squared())
+        .max((v - u).length_squared());
+    let separation = (a - point) + (u + v) * (1.0 / 3.0);
+    let squared = separation.length_squared();
+    (squared > FAR * FAR * size).then(|| {
+        let projected = (-0.5 * u.cross(v).dot(separation)).max(0.0);
+        separation * (projected / (PI * squared * squared))
+    })
 }
 
 /// Irradiance at `point` with unit `normal` of a triangle of radiosity 1, clipped at the horizon; 0…1.
@@ -27,6 +47,9 @@ pub fn irradiance_vector(point: Vec3, corners: [Vec3; 3]) -> Vec3 {
 pub fn point_irradiance(point: Vec3, normal: Vec3, corners: [Vec3; 3]) -> f32 {
     if !sees_front(point, corners) {
         return 0.0;
+    }
+    if let Some(vector) = far_vector(point, corners) {
+        return vector.dot(normal).clamp(0.0, 1.0);
     }
     let local = corners.map(|corner| corner - point);
     let heights = local.map(|corner| corner.dot(normal));
@@ -102,6 +125,21 @@ mod tests {
             .filter(|_| passes(cosine_direction(normal, random.uniform_2d()), corners))
             .count();
         met as f32 / COUNT as f32
+    }
+
+    #[test]
+    fn far_and_near_agree_and_far_light_is_not_lost_in_rounding() {
+        for distance in [50.0, 63.0, 70.0, 200.0, 1e4, 1e6] {
+            let corners = [Vec3::ZERO, Vec3::Y, Vec3::X].map(|corner| corner + Vec3::Z * distance);
+            // Half a unit of area, seen head-on.
+            let expected = 0.5 / (PI * distance * distance);
+            for found in [
+                point_irradiance(Vec3::ZERO, Vec3::Z, corners),
+                irradiance_vector(Vec3::ZERO, corners).z,
+            ] {
+                assert!((found / expected - 1.0).abs() < 2e-3, "{distance}: {found}");
+            }
+        }
     }
 
     #[test]

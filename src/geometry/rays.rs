@@ -7,12 +7,12 @@ use std::time::Duration;
 use glam::Vec3;
 use obvhs::{
     BvhBuildParams,
+    aabb::Aabb,
     cwbvh::{CwBvh, builder::build_cwbvh_from_tris},
     ray::{Ray, RayHit},
     rt_triangle::RtTriangle,
     triangle::Triangle as RayTriangle,
 };
-use rayon::prelude::*;
 
 use crate::scene::{Scene, TriangleId};
 
@@ -35,24 +35,15 @@ pub struct RayTree {
     tree: CwBvh,
     /// In the order of the tree's primitives.
     triangles: Vec<RtTriangle>,
-    /// The scene's triangle of each primitive.
-    ids: Vec<u32>,
-    /// The first triangle with the same corners in the same sense, by triangle; empty where all differ.
-    /// A builder that sees thousands of equal boxes makes a chain of them, too deep to be walked.
-    firsts: Vec<u32>,
+    crossings: f32,
 }
 
 impl RayTree {
     /// Build the tree over all triangles of a scene.
     pub fn new(scene: &Scene) -> Self {
-        let firsts = first_of_equals(scene);
-        let different: Vec<TriangleId> = scene
+        let triangles: Vec<RayTriangle> = scene
             .triangle_ids()
-            .filter(|id| firsts.is_empty() || firsts[id.index()] == id.0)
-            .collect();
-        let triangles: Vec<RayTriangle> = different
-            .iter()
-            .map(|&id| {
+            .map(|id| {
                 let [a, b, c] = scene.corners(id).map(Into::into);
                 RayTriangle {
                     v0: a,
@@ -66,21 +57,21 @@ impl RayTree {
             BvhBuildParams::medium_build(),
             &mut Duration::default(),
         );
-        let in_tree_order = tree.primitive_indices.iter().map(|&index| index as usize);
         Self {
-            triangles: in_tree_order
-                .clone()
-                .map(|index| RtTriangle::from(&triangles[index]))
+            triangles: tree
+                .primitive_indices
+                .iter()
+                .map(|&index| RtTriangle::from(&triangles[index as usize]))
                 .collect(),
-            ids: in_tree_order.map(|index| different[index].0).collect(),
+            crossings: crossings(&triangles),
             tree,
-            firsts,
         }
     }
 
-    /// The triangle that stands for this one in the tree.
-    fn first_of(&self, id: TriangleId) -> u32 {
-        self.firsts.get(id.index()).copied().unwrap_or(id.0)
+    /// How many boxes about triangles a line through the scene crosses on average: what a ray costs. Tens where triangles
+    /// lie beside each other; as many as there are where all lie across each other.
+    pub fn crossings(&self) -> f32 {
+        self.crossings
     }
 
     /// Whether anything but the two triangles of its ends lies on the segment.
@@ -97,9 +88,9 @@ impl RayTree {
             RAY_OFFSET,
             length - RAY_OFFSET,
         );
-        let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| self.first_of(id)));
+        let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
         !self.tree.ray_traverse_miss(ray, |ray, primitive| {
-            let id = self.ids[primitive];
+            let id = self.tree.primitive_indices[primitive];
             if id == first || id == second {
                 f32::INFINITY
             } else {
@@ -108,21 +99,30 @@ impl RayTree {
         })
     }
 
-    /// The nearest triangle along a ray of unit direction, leaving out the one that it starts on.
+    /// The nearest triangle along a ray of unit direction, leaving out the one that it starts on. Of two in one place, back
+    /// to back, it is the one whose front is met.
     pub fn closest(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Option<Hit> {
         let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
-        let start = from.map_or(u32::MAX, |id| self.first_of(id));
+        let start = from.map_or(u32::MAX, |id| id.0);
         let mut hit = RayHit::none();
         let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
-            if self.ids[primitive] == start {
+            if self.tree.primitive_indices[primitive] == start {
                 f32::INFINITY
             } else {
-                self.triangles[primitive].intersect(ray)
+                let triangle = &self.triangles[primitive];
+                let distance = triangle.intersect(ray);
+                let is_back =
+                    distance < f32::INFINITY && triangle.compute_normal().dot(ray.direction) > 0.0;
+                if is_back {
+                    distance + RAY_OFFSET
+                } else {
+                    distance
+                }
             }
         });
         met.then(|| Hit {
-            triangle: TriangleId(self.ids[hit.primitive_id as usize]),
-            distance: hit.t,
+            triangle: TriangleId(self.tree.primitive_indices[hit.primitive_id as usize]),
+            distance: self.triangles[hit.primitive_id as usize].intersect(&ray),
         })
     }
 
@@ -130,38 +130,23 @@ impl RayTree {
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.tree.nodes.as_slice())
             + size_of_val(self.triangles.as_slice())
-            + 2 * size_of_val(self.ids.as_slice())
-            + size_of_val(self.firsts.as_slice())
+            + size_of_val(self.tree.primitive_indices.as_slice())
     }
 }
 
-/// For each triangle the first that has the same corners in the same sense; nothing where all differ.
-fn first_of_equals(scene: &Scene) -> Vec<u32> {
-    let ids: Vec<TriangleId> = scene.triangle_ids().collect();
-    let mut keyed: Vec<([[u32; 3]; 3], u32)> = ids
-        .par_iter()
-        .map(|&id| (corner_bits(scene, id), id.0))
-        .collect();
-    keyed.par_sort_unstable();
-    if keyed.windows(2).all(|pair| pair[0].0 != pair[1].0) {
-        return Vec::new();
+/// See [`RayTree::crossings`]: areas of boxes relative to that of the box about all.
+fn crossings(triangles: &[RayTriangle]) -> f32 {
+    let (mut whole, mut sum) = (Aabb::empty(), 0.0);
+    for triangle in triangles {
+        let bounds = triangle.aabb();
+        whole.extend(bounds.min);
+        whole.extend(bounds.max);
+        sum += f64::from(bounds.half_area());
     }
-    let mut firsts: Vec<u32> = vec![0; ids.len()];
-    for equals in keyed.chunk_by(|a, b| a.0 == b.0) {
-        for &(_, id) in equals {
-            firsts[id as usize] = equals[0].1;
-        }
+    let whole = f64::from(whole.half_area());
+    if whole > 0.0 {
+        (sum / whole) as f32
+    } else {
+        0.0
     }
-    firsts
-}
-
-/// The bits of the corners, turned so that the least comes first.
-fn corner_bits(scene: &Scene, id: TriangleId) -> [[u32; 3]; 3] {
-    let [a, b, c] = scene
-        .corners(id)
-        .map(|corner| corner.to_array().map(f32::to_bits));
-    [[a, b, c], [b, c, a], [c, a, b]]
-        .into_iter()
-        .min()
-        .unwrap_or_default()
 }

@@ -1,6 +1,6 @@
 //! The light tree: split by extent, not by surface area cost.
 //!
-//! Each cluster is cut at the middle of the longest axis of its centroids, so that clusters are compact in all
+//! Each cluster is cut near the middle of the longest axis of its centroids, so that clusters are compact in all
 //! directions; a cut that leaves one side empty, or a depth that an unlucky scene would drive on, is replaced by one
 //! at the median.
 
@@ -18,6 +18,13 @@ const LEAF_PATCHES: usize = 4;
 
 /// Depth from which cuts are at the median. It bounds the depth of the tree by this plus 32.
 const MEDIAN_DEPTH: u32 = 48;
+
+/// Where a cluster is cut along its longest axis. A little below the middle, where the centroids of symmetrical scenes
+/// lie: rounding, such as that of a scene far from the origin, must not decide on which side they come.
+const CUT: f32 = 0.499;
+
+/// An axis counts as longer only by more than this share, for the same reason.
+const LONGER: f32 = 1e-3;
 
 /// A patch on its way into the tree.
 struct Item {
@@ -117,9 +124,9 @@ fn split(items: &mut [Item], at_median: bool) -> usize {
         max = max.max(item.centroid);
     }
     let extent = max - min;
-    let axis = extent.max_position();
+    let axis = longest_axis(extent);
     if !at_median && extent[axis] > 0.0 {
-        let cut = min[axis] + 0.5 * extent[axis];
+        let cut = min[axis] + CUT * extent[axis];
         let mut count = 0;
         for i in 0..items.len() {
             if items[i].centroid[axis] < cut {
@@ -139,6 +146,12 @@ fn split(items: &mut [Item], at_median: bool) -> usize {
             .then_with(|| key(a).cmp(&key(b)))
     });
     middle
+}
+
+/// The first axis than which no other is longer.
+fn longest_axis(extent: Vec3) -> usize {
+    let least = extent.max_element() * (1.0 - LONGER);
+    (0..3).find(|&axis| extent[axis] >= least).unwrap_or(0)
 }
 
 /// Boxes, areas and centroids, from the leaves up.

@@ -4,6 +4,7 @@ mod comparison;
 mod error;
 mod lookup;
 mod scaling;
+pub mod stability;
 mod trajectory;
 mod vertex;
 

@@ -1,6 +1,6 @@
 //! From raw faces in world coordinates to a [`Scene`] that keeps its promises.
 
-use std::collections::HashMap;
+use std::{cell::Cell, collections::HashMap};
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -156,6 +156,7 @@ impl SceneBuilder {
         if self.faces.is_empty() {
             return Err(no_faces(&vanished));
         }
+        self.drop_doubled_faces(&corner_of);
         let triangles = self.triangles(&corner_of, &positions, options);
         let surfaces = self.surfaces(&frame, options);
         let mut scene = Scene {
@@ -258,6 +259,22 @@ impl SceneBuilder {
         });
         self.positions = positions;
         skipped
+    }
+
+    /// Remove faces with the corners of an earlier one that look the same way: both would shine and reflect, and light would
+    /// be there twice.
+    fn drop_doubled_faces(&mut self, corner_of: &[u32]) {
+        let corners: Vec<[u32; 3]> = self
+            .faces
+            .iter()
+            .map(|face| face.corners.map(|corner| corner_of[corner as usize]))
+            .collect();
+        let coincident = sidedness::Coincident::of(&corners);
+        let index = Cell::new(0);
+        self.drop_faces(|_| {
+            let is_double = coincident.is_double(index.replace(index.get() + 1));
+            is_double.then_some("it lies on another one that looks the same way")
+        });
     }
 
     /// Remove the faces for which there is a reason, count them by reason, and keep objects at their first faces.
@@ -383,7 +400,7 @@ impl SceneBuilder {
         let mut list: Vec<Triangle> = self.faces.iter().map(make).collect();
         debug_assert!(positions.iter().all(|position| position.is_finite()));
         let shells = Shells::of(&list);
-        let flags = sidedness::two_sided(&shells, options.sides);
+        let flags = sidedness::two_sided(&shells, &list, options.sides);
         for (triangle, two_sided) in list.iter_mut().zip(flags) {
             triangle.two_sided = two_sided;
         }

@@ -7,6 +7,7 @@
 use std::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{Sides, Triangle};
 
@@ -19,14 +20,76 @@ pub(super) struct Shells {
     pub(super) closed: Vec<bool>,
 }
 
-/// One flag per triangle.
-pub(super) fn two_sided(shells: &Shells, sides: Sides) -> Vec<bool> {
+/// One flag per triangle. One that has a twin looking the other way is one-sided: each is the other's back.
+pub(super) fn two_sided(shells: &Shells, triangles: &[Triangle], sides: Sides) -> Vec<bool> {
     let flag = |&shell: &u32| match sides {
         Sides::Auto => !shells.closed[shell as usize],
         Sides::One => false,
         Sides::Two => true,
     };
-    shells.of_triangle.iter().map(flag).collect()
+    let mut flags: Vec<bool> = shells.of_triangle.iter().map(flag).collect();
+    if flags.contains(&true) {
+        let corners: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.corners).collect();
+        let coincident = Coincident::of(&corners);
+        for (triangle, flag) in flags.iter_mut().enumerate() {
+            *flag &= !coincident.has_opposite(triangle);
+        }
+    }
+    flags
+}
+
+/// Which triangles share all their corners with others.
+pub(super) struct Coincident {
+    doubles: Vec<bool>,
+    opposites: Vec<bool>,
+}
+
+impl Coincident {
+    /// Compare the corners of triangles; takes the time of sorting them.
+    pub(super) fn of(corners: &[[u32; 3]]) -> Self {
+        let mut keyed: Vec<([u32; 3], bool, u32)> = corners
+            .par_iter()
+            .enumerate()
+            .map(|(triangle, corners)| {
+                let (key, is_turned) = sorted_corners(*corners);
+                (key, is_turned, triangle as u32)
+            })
+            .collect();
+        keyed.par_sort_unstable();
+        let mut found = Self {
+            doubles: vec![false; corners.len()],
+            opposites: vec![false; corners.len()],
+        };
+        for equals in keyed.chunk_by(|a, b| a.0 == b.0) {
+            for ways in equals.chunk_by(|a, b| a.1 == b.1) {
+                for &(_, _, triangle) in &ways[1..] {
+                    found.doubles[triangle as usize] = true;
+                }
+                for &(_, _, triangle) in ways {
+                    found.opposites[triangle as usize] = ways.len() < equals.len();
+                }
+            }
+        }
+        found
+    }
+
+    /// Whether an earlier triangle has the same corners in the same sense.
+    pub(super) fn is_double(&self, triangle: usize) -> bool {
+        self.doubles[triangle]
+    }
+
+    /// Whether a triangle has the same corners in the opposite sense.
+    pub(super) fn has_opposite(&self, triangle: usize) -> bool {
+        self.opposites[triangle]
+    }
+}
+
+/// Corners in ascending order, and whether that turns the triangle round.
+fn sorted_corners([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
+    let mut sorted = [a, b, c];
+    sorted.sort_unstable();
+    let is_rotated = [[a, b, c], [b, c, a], [c, a, b]].contains(&sorted);
+    (sorted, !is_rotated)
 }
 
 impl Shells {

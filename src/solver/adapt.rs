@@ -91,7 +91,9 @@ impl DirectField {
             .map(|vertex| self.corner(vertex));
         let corners = a + b + c;
         match self.centres.get(element).copied().flatten() {
-            Some(centre) => centre.irradiance() * 0.75 + corners * (0.25 / 3.0),
+            Some(centre) => {
+                self.lights.bounded(centre.irradiance()) * 0.75 + corners * (0.25 / 3.0)
+            }
             None => corners / 3.0,
         }
     }
@@ -107,7 +109,7 @@ impl DirectField {
         if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
             let fraction = self.smooth.get(vertex as usize).copied();
             let shown = light.unoccluded() * fraction.unwrap_or_else(|| light.fraction());
-            return (shown, light.error());
+            return (self.lights.bounded(shown), light.error());
         }
         match hierarchy.mesh.vertices[vertex as usize].ends {
             // Ends were made before the vertices between them, so this descends.
@@ -125,7 +127,7 @@ impl DirectField {
             .get(vertex as usize)
             .copied()
             .flatten()
-            .map_or(Vec4::ZERO, |light| light.irradiance())
+            .map_or(Vec4::ZERO, |light| self.lights.bounded(light.irradiance()))
     }
 
     /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot.

@@ -15,8 +15,19 @@ use crate::{
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
 const GROUP_PATCHES: u32 = 64;
 
+/// Boxes of triangles that a ray crosses in usual scenes. Where it crosses many more, rays are saved, and patches share
+/// them in larger groups.
+const USUAL_CROSSINGS: f32 = 64.0;
+
 /// Rays per group.
-const GROUP_RAYS: u32 = 24;
+const GROUP_RAYS: usize = 24;
+
+/// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
+/// `GROUP_RAYS` find closed may yet see a few holes, and where walls are white these few decide.
+const SECOND_RAYS: usize = 200_000;
+
+/// Rays of the second look per group at most.
+const MOST_SECOND_RAYS: usize = 1024;
 
 /// Rays spent on all patches together where the rays of a group did not all meet a lit side, as long as that leaves
 /// each patch between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
@@ -24,6 +35,10 @@ const OPEN_RAYS: usize = 100_000;
 
 /// Rays per patch at least.
 const LEAST_PATCH_RAYS: usize = 16;
+
+/// Open patches that are probed one by one. Beyond, those of a group share their rays: a large open scene would wait long
+/// for its first picture, and where all its triangles cross each other, each ray takes long, too.
+const MOST_PROBED_PATCHES: usize = 60_000;
 
 /// Rays per patch at most.
 const MOST_PATCH_RAYS: usize = 8192;
@@ -57,6 +72,13 @@ impl Closure {
             share,
             deviation: (share * (1.0 - share) / rays).sqrt(),
         }
+    }
+
+    /// As [`Self::of`] for patches that share their rays: of each it is known no better than by a few of its own.
+    fn shared(hits: u32, rays: usize) -> Self {
+        let share = Self::of(hits, rays).share;
+        let deviation = (share * (1.0 - share) / LEAST_PATCH_RAYS as f32).sqrt();
+        Self { share, deviation }
     }
 
     /// Whether it is known without doubt, and so for every part of the patch.
@@ -136,55 +158,79 @@ pub(super) fn closures(
     seed: u64,
     cancel: &Cancel,
 ) -> Option<(Vec<Closure>, u64)> {
-    let groups = groups(hierarchy);
-    let closed: Vec<bool> = groups
-        .par_iter()
-        .map(|cluster| {
-            let range = cluster.patches();
+    let costly = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
+    let budget = |rays: usize| (rays as f32 / costly) as usize;
+    let groups = groups(hierarchy, (GROUP_PATCHES as f32 * costly) as u32);
+    let look = |group: &Cluster, first: usize, count: usize| {
+        let range = group.patches();
+        (0..count).all(|ray| {
+            let patch = range.start + (ray * range.len()) / count;
             !cancel.is_cancelled()
-                && (0..GROUP_RAYS).all(|ray| {
-                    let patch = range.start + (ray as usize * range.len()) / GROUP_RAYS as usize;
-                    probe(hierarchy, rays, patch, 1, ray, seed) == 1
-                })
+                && probe(hierarchy, rays, patch, 1, (first + ray) as u32, seed) == 1
         })
-        .collect();
-    let is_open = |group: &(&Cluster, bool)| !group.1;
-    let pairs = || groups.iter().copied().zip(closed.iter().copied());
-    let open: usize = pairs()
-        .filter(is_open)
-        .map(|(cluster, _)| cluster.patches().len())
-        .sum();
-    let count = (OPEN_RAYS / open.max(1)).clamp(LEAST_PATCH_RAYS, MOST_PATCH_RAYS);
-    let mut closures = vec![Closure::CLOSED; hierarchy.patches.len()];
-    let patches: Vec<usize> = pairs()
-        .filter(is_open)
-        .flat_map(|(cluster, _)| cluster.patches())
-        .collect();
-    let found: Vec<Closure> = patches
+    };
+    let mut closed: Vec<bool> = groups
         .par_iter()
-        .map(|&patch| {
+        .map(|group| look(group, 0, GROUP_RAYS))
+        .collect();
+    let mut ray_count = groups.len() * GROUP_RAYS;
+    if closed.iter().any(|is_closed| !is_closed) {
+        let count = (budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
+        closed
+            .par_iter_mut()
+            .zip(&groups)
+            .filter(|(is_closed, _)| **is_closed)
+            .for_each(|(is_closed, group)| *is_closed = look(group, GROUP_RAYS, count));
+        ray_count += groups.len() * count;
+    }
+    let open: Vec<&Cluster> = groups
+        .iter()
+        .zip(&closed)
+        .filter(|(_, is_closed)| !**is_closed)
+        .map(|(group, _)| *group)
+        .collect();
+    let patches: usize = open.iter().map(|group| group.patches().len()).sum();
+    let sharing = if patches > budget(MOST_PROBED_PATCHES) {
+        open.len()
+    } else {
+        patches
+    };
+    let count = (budget(OPEN_RAYS) / sharing.max(1)).clamp(LEAST_PATCH_RAYS, MOST_PATCH_RAYS);
+    ray_count += sharing * count;
+    let found: Vec<Vec<Closure>> = open
+        .par_iter()
+        .map(|group| {
+            let range = group.patches();
             if cancel.is_cancelled() {
-                return Closure::CLOSED;
+                return Vec::new();
             }
-            Closure::of(probe(hierarchy, rays, patch, count as u32, 0, seed), count)
+            if sharing == patches {
+                let probe = |patch| probe(hierarchy, rays, patch, count as u32, 0, seed);
+                return range
+                    .map(|patch| Closure::of(probe(patch), count))
+                    .collect();
+            }
+            let hits = (0..count).map(|ray| {
+                let patch = range.start + (ray * range.len()) / count;
+                probe(hierarchy, rays, patch, 1, ray as u32, seed)
+            });
+            vec![Closure::shared(hits.sum(), count); range.len()]
         })
         .collect();
     if cancel.is_cancelled() {
         return None;
     }
-    for (patch, closure) in patches.into_iter().zip(found) {
-        closures[patch] = closure;
+    let mut closures = vec![Closure::CLOSED; hierarchy.patches.len()];
+    for (group, found) in open.iter().zip(found) {
+        closures[group.patches()].copy_from_slice(&found);
     }
-    Some((
-        closures,
-        (groups.len() * GROUP_RAYS as usize + open * count) as u64,
-    ))
+    Some((closures, ray_count as u64))
 }
 
 /// The largest clusters with few enough patches, in the order of the patches.
-fn groups(hierarchy: &Hierarchy) -> Vec<&Cluster> {
+fn groups(hierarchy: &Hierarchy, most_patches: u32) -> Vec<&Cluster> {
     let is_small =
-        |cluster: &Cluster| cluster.is_leaf() || cluster.end - cluster.start <= GROUP_PATCHES;
+        |cluster: &Cluster| cluster.is_leaf() || cluster.end - cluster.start <= most_patches;
     let parent = |cluster: &Cluster| hierarchy.clusters.get(cluster.parent as usize);
     let mut groups: Vec<&Cluster> = hierarchy
         .clusters

@@ -21,6 +21,9 @@ use crate::{
 /// and every vertex looks at all of them; of the others, so many give so little each that links blur them together.
 const LEAST_SAMPLED_SHARE: f64 = 512.0;
 
+/// Places of random streams per frame unit: single precision tells 2^17 of them apart at the rim of the frame.
+const PLACES: f32 = 16_384.0;
+
 /// An emitting patch.
 #[derive(Clone, Copy, Debug)]
 struct Emitter {
@@ -45,6 +48,8 @@ pub(super) struct Receiver {
 /// The emitters that are sampled.
 pub(super) struct Lights {
     emitters: Vec<Emitter>,
+    /// Largest radiosity of an emitter by channel: no irradiance can be larger.
+    brightest: Vec4,
     /// By patch.
     is_sampled: Vec<bool>,
 }
@@ -70,20 +75,31 @@ impl Lights {
             .iter()
             .zip(&is_sampled)
             .filter(|(_, is_sampled)| **is_sampled);
-        let emitters = sampled.map(|(patch, _)| {
-            let [a, b, c] = scene.corners(patch.triangle);
-            Emitter {
-                corners: if patch.is_back { [a, c, b] } else { [a, b, c] },
-                normal: patch.normal,
-                area: patch.area,
-                triangle: patch.triangle,
-                radiosity: (patch.emission * PI).extend(0.0),
-            }
-        });
+        let emitters: Vec<Emitter> = sampled
+            .map(|(patch, _)| {
+                let [a, b, c] = scene.corners(patch.triangle);
+                Emitter {
+                    corners: if patch.is_back { [a, c, b] } else { [a, b, c] },
+                    normal: patch.normal,
+                    area: patch.area,
+                    triangle: patch.triangle,
+                    radiosity: (patch.emission * PI).extend(0.0),
+                }
+            })
+            .collect();
         Self {
-            emitters: emitters.collect(),
+            brightest: emitters
+                .iter()
+                .fold(Vec4::ZERO, |most, emitter| most.max(emitter.radiosity)),
+            emitters,
             is_sampled,
         }
+    }
+
+    /// Irradiance no larger than any surroundings can give. Of many emitters behind each other, few rays tell badly how
+    /// much is seen.
+    pub(super) fn bounded(&self, irradiance: Vec4) -> Vec4 {
+        irradiance.min(self.brightest)
     }
 
     /// Whether nothing is sampled.
@@ -137,8 +153,11 @@ impl Lights {
         let Some(&total) = sums.last().filter(|&&total| total > 0.0) else {
             return;
         };
-        // The stream belongs to the place, so that the order of points does not matter.
-        let [x, y, z] = receiver.point.to_array().map(|x| u64::from(x.to_bits()));
+        // The stream belongs to the place, so that the order of points does not matter, nor the last digit.
+        let [x, y, z] = (receiver.point * PLACES)
+            .round()
+            .to_array()
+            .map(|x| u64::from(x.to_bits()));
         let mut random = Random::new(seed, x ^ (y << 21) ^ (z << 42) ^ (z >> 22));
         let shift = random.uniform_2d();
         let count = samples.len() as f32;

@@ -137,7 +137,8 @@ impl Solver {
                 0
             };
             let is_bounded = sweep.sent <= ceiling && sweep.returned.is_finite();
-            if growing >= GROWING_SWEEPS || !is_bounded {
+            // Where rows are bounded, no place can get more than the brightest sends: only in sum it may, for a while.
+            if (growing >= GROWING_SWEEPS && !bounds_rows) || !is_bounded {
                 return Some(Ending::Growing);
             }
             let tolerance = f64::from(self.settings.tolerance);

@@ -77,6 +77,10 @@ const MOST_RAISES: u32 = 16;
 /// Refinement passes of one step at most: elements divided in one pass take their links over in the next.
 const MOST_PASSES: u32 = 4;
 
+/// Share of the mean irradiance that links are judged by even where their sources are dark. Smaller, and light is lost
+/// wherever bright surfaces see dark ones; larger, and links are spent on what sends nothing.
+const AMBIENT_SHARE: f32 = 0.1;
+
 /// A solve in progress.
 pub struct Solver {
     scene: Arc<Scene>,
@@ -338,6 +342,7 @@ impl Solver {
                     judge: Judge {
                         kernel: self.kernel(),
                         estimate,
+                        ambient: AMBIENT_SHARE * self.mean_irradiance,
                         sampler,
                     },
                     links_of: |node| self.links.of(node),

@@ -50,6 +50,9 @@ pub struct Judge<'a> {
     pub kernel: Kernel<'a>,
     /// How errors are estimated.
     pub estimate: Estimate,
+    /// Radiosity that everything is taken to have beside its own, 0 for none. Light is scaled by sums of form factors, so
+    /// they must be known of dark sources, too: those that are judged by nothing but their light keep coarse links.
+    pub ambient: f32,
     /// Draws sample points.
     pub sampler: PairSampler<'a>,
 }
@@ -65,13 +68,12 @@ impl Judge<'_> {
 
     /// Judge a pair of different nodes, neither above the other.
     pub fn judge(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> Judgement {
-        let brightest = luminance(self.tables().brightest(self.hierarchy(), source));
         if !self.can_face(source, receiver) || !self.can_face(receiver, source) {
             return Judgement::Nothing;
         }
         match self.estimate {
-            Estimate::Interval => self.interval(source, receiver, brightest),
-            Estimate::Samples(count) => self.samples(source, receiver, brightest, count, random),
+            Estimate::Interval => self.interval(source, receiver),
+            Estimate::Samples(count) => self.samples(source, receiver, count, random),
         }
     }
 
@@ -88,6 +90,16 @@ impl Judge<'_> {
                 .centroid(source)
                 .distance(hierarchy.centroid(receiver))
                 <= reach
+    }
+
+    /// Luminance of a quantity of light as it is judged.
+    fn judged(&self, light: Vec4) -> f32 {
+        luminance(light) + self.ambient * light.w
+    }
+
+    /// Luminance of the brightest patch of a node, as it is judged.
+    pub fn judged_brightest(&self, node: NodeId) -> f32 {
+        self.judged(self.tables().brightest(self.hierarchy(), node))
     }
 
     /// Luminance of the brightest patch of a node.
@@ -133,8 +145,9 @@ impl Judge<'_> {
     }
 
     /// From bounds of distance and direction.
-    fn interval(&self, source: NodeId, receiver: NodeId, brightest: f32) -> Judgement {
+    fn interval(&self, source: NodeId, receiver: NodeId) -> Judgement {
         let hierarchy = self.hierarchy();
+        let brightest = self.judged_brightest(source);
         let (from, to) = (hierarchy.centroid(source), hierarchy.centroid(receiver));
         let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
         let distance = from.distance(to);
@@ -143,12 +156,12 @@ impl Judge<'_> {
             return Judgement::Transfer {
                 irradiance: 0.5 * brightest,
                 error: brightest,
-                bound: brightest,
+                bound: self.brightest(source),
             };
         }
         let unit = (to - from) / distance;
-        let total = luminance(self.tables().power(hierarchy, source));
-        let value = luminance(self.kernel.projected_power(source, unit));
+        let total = self.judged(self.tables().power(hierarchy, source));
+        let value = self.judged(self.kernel.projected_power(source, unit));
         let swing = total * (reach / distance).asin();
         let (near, far) = (distance - reach, distance + reach);
         let upper = ((value + swing).min(total) / (PI * near * near)).min(brightest);
@@ -157,7 +170,7 @@ impl Judge<'_> {
         Judgement::Transfer {
             irradiance,
             error: (upper - lower).max(0.0),
-            bound: self.bound(source, receiver, brightest),
+            bound: self.bound(source, receiver, self.brightest(source)),
         }
     }
 
@@ -197,11 +210,11 @@ impl Judge<'_> {
         &self,
         source: NodeId,
         receiver: NodeId,
-        brightest: f32,
         count: u32,
         random: &mut Random,
     ) -> Judgement {
         let hierarchy = self.hierarchy();
+        let brightest = self.judged_brightest(source);
         let area = hierarchy.node_area(receiver);
         let (mut least, mut most, mut sum) = (f32::INFINITY, 0.0f32, 0.0);
         for _ in 0..count {
@@ -228,7 +241,7 @@ impl Judge<'_> {
         if squared <= 0.0 || !unit.is_finite() || area <= 0.0 {
             return f32::INFINITY;
         }
-        let power = luminance(self.kernel.projected_power(source, unit));
+        let power = self.judged(self.kernel.projected_power(source, unit));
         power * self.kernel.projected_power(receiver, -unit).w / (PI * squared * area)
     }
 }

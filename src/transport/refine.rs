@@ -45,6 +45,9 @@ const PARTIAL_VISIBILITY: f32 = 0.5;
 /// were once found blocked stay so; larger, and refinement goes on behind walls.
 const DOUBT: f32 = 0.1;
 
+/// Of two nodes whose radii differ by less, the source is divided: rounding must not choose among equals.
+const TIE: f32 = 0.999;
+
 /// Normals agree when their vector sum is shorter than their total area by less than this.
 const SAME_DIRECTION: f32 = 1e-6;
 
@@ -267,11 +270,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             }
             Decision::DivideReceiver => {
                 if self.hierarchy().children(receiver).is_empty() {
-                    // The element will be divided after this pass; until then its link stays.
+                    // The element will be divided after this pass, if there is room; until then its link stays.
                     *is_wanted = true;
+                    let error = self.judge.brightest(source);
                     let link = known
                         .copied()
-                        .unwrap_or_else(|| self.link(source, receiver, f32::INFINITY, 1, out));
+                        .unwrap_or_else(|| self.link(source, receiver, error, 1, out));
                     out.links.push(link);
                 } else {
                     down.push(source);
@@ -343,13 +347,13 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         known: Option<&Link>,
         out: &mut Refinement,
     ) -> Decision {
-        let error = self.judge.brightest(cluster);
-        if error <= 0.0 || self.faces_one_way(cluster) {
+        let judged = self.judge.judged_brightest(cluster);
+        if judged <= 0.0 || self.faces_one_way(cluster) {
             return Decision::Drop;
         }
         // What few rays have seen must not decide: of clusters that see little of themselves, only those found blind would
         // stay.
-        if error * SELF_SHARE * weight > self.threshold {
+        if judged * SELF_SHARE * weight > self.threshold {
             return Decision::DivideReceiver;
         }
         let fraction = match known {
@@ -367,7 +371,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         Decision::Keep(Link {
             source: cluster,
             visibility: fraction,
-            error,
+            error: self.judge.brightest(cluster),
             form_factor: fraction,
         })
     }
@@ -399,7 +403,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 !hierarchy.mesh.elements[index].is_leaf() || area * 0.25 >= self.min_area
             }
         };
-        let prefers_source = hierarchy.radius(source) >= hierarchy.radius(receiver);
+        let prefers_source = hierarchy.radius(source) >= TIE * hierarchy.radius(receiver);
         match (can_divide_source, can_divide_receiver) {
             (true, true) => Some(if prefers_source {
                 Decision::DivideSource

@@ -252,8 +252,8 @@ impl PairSampler<'_> {
             light.count(sum * candidate.light, visible);
             area.count(sum * candidate.area, visible);
         }
-        let all = all.part().unwrap_or(1.0);
-        (light.part().unwrap_or(all), area.part().unwrap_or(all))
+        let area = area.part().or(all.part()).unwrap_or(1.0);
+        (light.part().unwrap_or(area), area)
     }
 
     /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of

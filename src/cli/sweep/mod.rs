@@ -9,6 +9,7 @@ mod plan;
 mod runs;
 mod scaling;
 mod session;
+mod stability;
 mod suite;
 
 use std::{fs, path::PathBuf, time::Duration};

@@ -43,7 +43,7 @@ pub(super) struct Session<'a> {
     /// Set by Ctrl+C.
     pub(super) interrupted: Arc<AtomicBool>,
     /// Baselines run here; the solver has its own of the same size.
-    pub(super) pool: ThreadPool,
+    pub(super) pool: Arc<ThreadPool>,
     progress: Progress,
     /// Whether a limit that the user gave ended a solver run.
     is_cut_short: bool,
@@ -72,7 +72,7 @@ impl<'a> Session<'a> {
         Ok(Self {
             arguments,
             interrupted,
-            pool,
+            pool: Arc::new(pool),
             progress: Progress::new(arguments.quiet),
             is_cut_short: false,
         })

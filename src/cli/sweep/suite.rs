@@ -5,6 +5,7 @@ use anyhow::Result;
 use super::{
     error_time, scaling,
     session::{Session, Source},
+    stability,
 };
 
 /// Scenes and runs that belong together.
@@ -16,7 +17,7 @@ struct Suite {
 /// The three sizes of Sun, Gong and Pan.
 const PAPER: [&str; 3] = ["room-1022", "room-8621", "room-42879"];
 
-static SUITES: [Suite; 6] = [
+static SUITES: [Suite; 7] = [
     Suite {
         name: "paper",
         run: |session| on_builtins(session, &PAPER),
@@ -46,6 +47,10 @@ static SUITES: [Suite; 6] = [
     Suite {
         name: "scaling",
         run: scaling::scale,
+    },
+    Suite {
+        name: "stability",
+        run: stability::try_cases,
     },
 ];
 

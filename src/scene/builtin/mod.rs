@@ -12,6 +12,7 @@ mod plates;
 mod room;
 mod shapes;
 mod soup;
+pub mod stability;
 mod tiled_room;
 
 pub use furnace::{furnace, sphere_furnace};

@@ -1,0 +1,197 @@
+//! The stability suite: stiff and extreme cases, each with what is known of its light.
+
+use std::{
+    io::{self, Write},
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::mpsc,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Result, bail};
+use serde::Serialize;
+
+use super::{ReportArguments, session::Session};
+use crate::{
+    cli::{UsageError, output::write_whole, report::Machine},
+    metrics::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
+    solver::Cancel,
+};
+
+/// How often an interruption is looked for.
+const POLL: Duration = Duration::from_millis(50);
+
+/// Everything in `stability.json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    version: &'static str,
+    machine: Machine,
+    threads: usize,
+    is_interrupted: bool,
+    holds: usize,
+    fails: usize,
+    cases: &'a [Outcome],
+}
+
+/// Try every case that is asked for, and write the files after each.
+pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
+    let cases = chosen(session.arguments)?;
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    for (number, case) in cases.iter().enumerate() {
+        if session.is_interrupted() {
+            break;
+        }
+        session.say(format!(
+            "case {} of {}: {}",
+            number + 1,
+            cases.len(),
+            case.name
+        ));
+        let outcome = try_case(session, case);
+        // What an interruption left unfinished is no failure.
+        if session.is_interrupted() && !outcome.holds() {
+            break;
+        }
+        outcomes.push(outcome);
+        write(session, &outcomes)?;
+    }
+    if outcomes.is_empty() {
+        write(session, &outcomes)?;
+    }
+    let failed: Vec<&str> = outcomes
+        .iter()
+        .filter(|outcome| !outcome.holds())
+        .map(|outcome| outcome.case.as_str())
+        .collect();
+    if !failed.is_empty() {
+        session.tick();
+        bail!(
+            "{} of {} cases failed: {}",
+            failed.len(),
+            outcomes.len(),
+            failed.join("; ")
+        );
+    }
+    Ok(())
+}
+
+/// The cases whose names hold one of the given words, or whose group is one of them; all where none is given.
+fn chosen(arguments: &ReportArguments) -> Result<Vec<Case>> {
+    let words = &arguments.plan.cases;
+    let is_meant =
+        |case: &Case, word: &String| case.name.contains(word) || case.group.name() == word;
+    let mut cases = stability_cases();
+    if let Some(word) = words
+        .iter()
+        .find(|word| !cases.iter().any(|case| is_meant(case, word)))
+    {
+        bail!(UsageError(format!(
+            "no case of the stability suite is named '{word}'"
+        )));
+    }
+    cases.retain(|case| words.is_empty() || words.iter().any(|word| is_meant(case, word)));
+    Ok(cases)
+}
+
+/// Run one case in the session's pool, and stop it when its time is over or Ctrl+C is pressed.
+fn try_case(session: &mut Session<'_>, case: &Case) -> Outcome {
+    let (cancel, begin) = (Cancel::default(), Instant::now());
+    let limit = session.time_limit();
+    let (done, outcome) = mpsc::sync_channel(1);
+    let job = {
+        let cancel = cancel.clone();
+        move || {
+            let outcome = catch_unwind(AssertUnwindSafe(|| case.run(&cancel)));
+            // The session listens until there is an outcome.
+            let _ = done.send(outcome);
+        }
+    };
+    let interrupted = session.interrupted.clone();
+    let pool = session.pool.clone();
+    let outcome = pool.in_place_scope(|scope| {
+        scope.spawn(|_| job());
+        loop {
+            if let Ok(outcome) = outcome.recv_timeout(POLL) {
+                return outcome;
+            }
+            session.tick();
+            let is_over = begin.elapsed() >= limit;
+            if is_over || interrupted.load(std::sync::atomic::Ordering::Relaxed) {
+                cancel.cancel();
+            }
+        }
+    });
+    match outcome {
+        Ok(outcome) => outcome,
+        Err(panic) => {
+            let message = panic
+                .downcast_ref::<String>()
+                .map(String::as_str)
+                .or_else(|| panic.downcast_ref::<&str>().copied())
+                .unwrap_or("of unknown cause");
+            Outcome::failed(
+                case,
+                format!("panic: {message}"),
+                begin.elapsed().as_secs_f64(),
+            )
+        }
+    }
+}
+
+/// Write all files, each whole or not at all.
+fn write(session: &Session<'_>, outcomes: &[Outcome]) -> Result<()> {
+    let folder = &session.arguments.output;
+    let holds = outcomes.iter().filter(|outcome| outcome.holds()).count();
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        machine: Machine::present(),
+        threads: session.thread_count(),
+        is_interrupted: session.is_interrupted(),
+        holds,
+        fails: outcomes.len() - holds,
+        cases: outcomes,
+    };
+    write_whole(&folder.join("stability.csv"), |out| {
+        write_csv(outcomes, out)
+    })?;
+    write_whole(&folder.join("stability.json"), |out| {
+        serde_json::to_writer_pretty(&mut *out, &report)?;
+        out.write_all(b"\n")
+    })?;
+    write_whole(&folder.join("stability.md"), |out| {
+        write_markdown(&report, out)
+    })
+}
+
+fn write_csv(outcomes: &[Outcome], out: &mut dyn Write) -> io::Result<()> {
+    let mut table = csv::Writer::from_writer(out);
+    for row in outcomes.iter().flat_map(Row::of) {
+        table.serialize(row)?;
+    }
+    table.flush()
+}
+
+fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
+    let seconds: f64 = report.cases.iter().map(|outcome| outcome.seconds).sum();
+    writeln!(
+        out,
+        "# Stability\n\n\
+         vecrad {}, {}, {} threads.\n\
+         {} cases hold and {} fail, in {seconds:.0} s.\n\
+         Each line shows the figure of its case that comes nearest to failing; `stability.csv` has all of them.\n\
+         Besides, all light of all steps is finite, not negative, and no more than the emitters can keep up.\n\n{}",
+        report.version,
+        report.machine.describe(),
+        report.threads,
+        report.holds,
+        report.fails,
+        stability_markdown(report.cases),
+    )?;
+    let noted = |outcome: &&Outcome| !outcome.finding.notes.is_empty();
+    for outcome in report.cases.iter().filter(noted) {
+        writeln!(out, "\n{}:", outcome.case)?;
+        for note in &outcome.finding.notes {
+            writeln!(out, "* {note}")?;
+        }
+    }
+    Ok(())
+}
