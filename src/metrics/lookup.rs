@@ -1,4 +1,5 @@
-//! Radiance of a display mesh at reference points, as an exported file shows it: interpolated between vertices.
+//! Radiance of a display mesh at reference points, as the viewport shows it: irradiance interpolated between vertices,
+//! times the reflectance of the place, texture included.
 //!
 //! A point knows its triangle and side, so the display triangles over that side are searched, never space. A side
 //! with many of them gets a grid over its barycentric coordinates.
@@ -80,7 +81,8 @@ impl<'a> MeshLookup<'a> {
             .par_iter()
             .map(|point| {
                 let triangle = self.find(point)?;
-                Some(interpolate(self.mesh, light, triangle, point.position))
+                let irradiance = interpolate(self.mesh, light, triangle, point.position);
+                Some(point.emission + point.reflectance * irradiance * FRAC_1_PI)
             })
             .collect()
     }
@@ -174,12 +176,9 @@ fn corners(mesh: &DisplayMesh, triangle: usize) -> [Vec3; 3] {
     mesh.indices[triangle].map(|vertex| mesh.positions[vertex as usize])
 }
 
-/// Radiance of a display triangle at a position, interpolated between its vertices.
+/// Irradiance of a display triangle at a position, interpolated between its vertices.
 fn interpolate(mesh: &DisplayMesh, light: &VertexLight, triangle: usize, position: Vec3) -> Vec3 {
     let place = barycentric(position, corners(mesh, triangle));
-    let [a, b, c] = mesh.indices[triangle].map(|vertex| {
-        let vertex = vertex as usize;
-        mesh.emission[vertex] + mesh.reflectance[vertex] * light.irradiance[vertex] * FRAC_1_PI
-    });
+    let [a, b, c] = mesh.indices[triangle].map(|vertex| light.irradiance[vertex as usize]);
     a * place.x + b * place.y + c * place.z
 }

@@ -18,6 +18,10 @@ const LARGEST_SHARE: f64 = 1.0 / 1000.0;
 /// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
 const SPREAD_SHARE: f32 = 0.15;
 
+/// Where all corners of an element lie in shadow, its centroid is sampled if it could get more light than this many
+/// times the tolerance. Smaller costs rays in the shade, larger loses light on narrow faces.
+const HIDDEN_TOLERANCE: f32 = 4.0;
+
 /// Share of the shadow rays that is shot first.
 const PROBING_SHARE: f32 = 0.25;
 
@@ -254,7 +258,25 @@ impl DirectField {
         range * share.sqrt() / mean.max(f32::MIN_POSITIVE)
     }
 
-    /// Sample the centroids of leaves whose corners differ. Returns the rays shot.
+    /// The light that an element would get if nothing stood before it, as `spread` counts, where none of it reaches the
+    /// corners: rings and bands lie with all their corners under the edges of their neighbours.
+    fn hidden(&self, hierarchy: &Hierarchy, element: usize, mean: f32) -> f32 {
+        let element = &hierarchy.mesh.elements[element];
+        let lights = element
+            .vertices
+            .map(|vertex| self.vertices[vertex as usize].unwrap_or_default());
+        if lights.iter().any(|light| light.fraction() != Vec4::ZERO) {
+            return 0.0;
+        }
+        let most = lights
+            .iter()
+            .map(|light| luminance(light.unoccluded()))
+            .fold(0.0, f32::max);
+        let share = element.area_vector.length() / hierarchy.area as f32;
+        most * share.sqrt() / mean.max(f32::MIN_POSITIVE)
+    }
+
+    /// Sample the centroids of leaves whose corners differ, or may all be dark by chance. Returns the rays shot.
     fn probe_centres(
         &mut self,
         rays: &RayTree,
@@ -269,7 +291,8 @@ impl DirectField {
             .leaves()
             .filter(|&leaf| {
                 self.centres[leaf].is_none()
-                    && self.spread(hierarchy, leaf, mean) > limits.tolerance
+                    && (self.spread(hierarchy, leaf, mean) > limits.tolerance
+                        || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
             })
             .collect();
         let receivers: Vec<Receiver> = unknown

@@ -24,7 +24,7 @@ impl Solver {
             + self.power.memory_bytes()
             + self.links.memory_bytes()
             + self.areas.memory_bytes()
-            + size_of_val(self.closures.as_slice())
+            + self.closures.memory_bytes()
             + size_of_val(self.linked.as_slice())
             + size_of_val(self.leaves.as_slice())
             + self.direct.as_ref().map_or(0, DirectField::memory_bytes)

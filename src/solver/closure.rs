@@ -1,4 +1,4 @@
-//! Closure: which part of a patch's view is filled by lit surfaces.
+//! Closure: which part of a surface's view is filled by lit surfaces.
 //!
 //! It is 1 in a closed room, less in an open scene or where backs are seen. The sum of form factors of each leaf must
 //! equal it, so it tells by how much the kernel and the visibility of its links err together, and scales it away.
@@ -19,8 +19,11 @@ const GROUP_PATCHES: u32 = 64;
 /// them in larger groups.
 const USUAL_CROSSINGS: f32 = 64.0;
 
-/// Rays per group.
+/// Rays per group, at least.
 const GROUP_RAYS: usize = 24;
+
+/// More rays for groups with more cells than these times [`GROUP_RAYS`].
+const CELLS_PER_RAY: usize = 2;
 
 /// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
 /// `GROUP_RAYS` find closed may yet see a few holes, and where walls are white these few decide.
@@ -29,19 +32,19 @@ const SECOND_RAYS: usize = 200_000;
 /// Rays of the second look per group at most.
 const MOST_SECOND_RAYS: usize = 1024;
 
-/// Rays spent on all patches together where the rays of a group did not all meet a lit side, as long as that leaves
-/// each patch between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
+/// Rays spent on all cells together where the rays of a group did not all meet a lit side, as long as that leaves each
+/// cell between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
 const OPEN_RAYS: usize = 100_000;
 
-/// Rays per patch at least.
-const LEAST_PATCH_RAYS: usize = 16;
+/// Rays per cell at least.
+const LEAST_CELL_RAYS: usize = 16;
 
-/// Open patches that are probed one by one. Beyond, those of a group share their rays: a large open scene would wait long
+/// Open cells that are probed one by one. Beyond, those of a group share their rays: a large open scene would wait long
 /// for its first picture, and where all its triangles cross each other, each ray takes long, too.
-const MOST_PROBED_PATCHES: usize = 60_000;
+const MOST_PROBED_CELLS: usize = 60_000;
 
-/// Rays per patch at most.
-const MOST_PATCH_RAYS: usize = 8192;
+/// Rays per cell at most.
+const MOST_CELL_RAYS: usize = 8192;
 
 /// Form factors that add to less than this share of the closure are not trusted to stand for what is missing.
 /// Nearer to 1, and coarse links stay as wrong as they are; further, and the noise of a few rays is blown up.
@@ -74,14 +77,14 @@ impl Closure {
         }
     }
 
-    /// As [`Self::of`] for patches that share their rays: of each it is known no better than by a few of its own.
+    /// As [`Self::of`] for cells that share their rays: of each it is known no better than by a few of its own.
     fn shared(hits: u32, rays: usize) -> Self {
         let share = Self::of(hits, rays).share;
-        let deviation = (share * (1.0 - share) / LEAST_PATCH_RAYS as f32).sqrt();
+        let deviation = (share * (1.0 - share) / LEAST_CELL_RAYS as f32).sqrt();
         Self { share, deviation }
     }
 
-    /// Whether it is known without doubt, and so for every part of the patch.
+    /// Whether it is known without doubt, and so for every part of the cell.
     fn is_certain(&self) -> bool {
         self.deviation == 0.0
     }
@@ -101,8 +104,8 @@ impl Closure {
         if row > 0.0 { target / row } else { 1.0 }
     }
 
-    /// The factor for one leaf, from the sum of its form factors and, over the whole patch, the area and the sum times
-    /// area. An estimate stands for the patch as a whole only: its parts may rightly differ.
+    /// The factor for one leaf, from the sum of its form factors and, over the whole cell, the area and the sum times
+    /// area. An estimate stands for the cell as a whole only: its parts may rightly differ.
     pub(super) fn factor_for(&self, row: f32, (area, weighted): (f32, f32)) -> f32 {
         if self.is_certain() || area <= 0.0 {
             self.factor(row)
@@ -112,13 +115,38 @@ impl Closure {
     }
 }
 
+/// Closures of the cells of a mesh: of its leaves as they were before light was known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Closures(Vec<Closure>);
+
+impl Closures {
+    /// The cell that an element lies in, or is.
+    pub(super) fn cell(&self, hierarchy: &Hierarchy, mut element: usize) -> usize {
+        while element >= self.0.len() {
+            element = hierarchy.mesh.elements[element].parent as usize;
+        }
+        element
+    }
+
+    /// The closure of a cell.
+    pub(super) fn of(&self, cell: usize) -> Closure {
+        self.0[cell]
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+}
+
 impl Solver {
     /// Scale the colours of all leaves so that their form factors add to the closure, and no leaf's to more than 1 where
     /// `bounds_rows`.
     pub(super) fn scale_to_closure(&self, irradiance: &mut [Vec4], bounds_rows: bool) {
         let elements = &self.hierarchy.mesh.elements;
-        let patch_count = self.hierarchy.patches.len();
-        // Area and sum of form factors times area, by patch.
+        let cell_count = self.closures.0.len();
+        let cell = |index| self.closures.cell(&self.hierarchy, index);
+        // Area and sum of form factors times area, by cell.
         let part = |index: usize| {
             let (area, row) = (elements[index].area_vector.length(), irradiance[index].w);
             if elements[index].is_leaf() {
@@ -127,20 +155,21 @@ impl Solver {
                 (0.0, 0.0)
             }
         };
-        let mut sums: Vec<(f32, f32)> = (0..patch_count).into_par_iter().map(part).collect();
-        for (index, element) in elements.iter().enumerate().skip(patch_count) {
+        let mut sums: Vec<(f32, f32)> = (0..cell_count).into_par_iter().map(part).collect();
+        for index in cell_count..elements.len() {
             let (area, weighted) = part(index);
-            let sum = &mut sums[element.patch as usize];
+            let sum = &mut sums[cell(index)];
             *sum = (sum.0 + area, sum.1 + weighted);
         }
         irradiance
             .par_iter_mut()
             .zip(elements)
+            .enumerate()
             .with_min_len(1024)
-            .filter(|(_, element)| element.is_leaf())
-            .for_each(|(value, element)| {
-                let patch = element.patch as usize;
-                let factor = self.closures[patch].factor_for(value.w, sums[patch]);
+            .filter(|(_, (_, element))| element.is_leaf())
+            .for_each(|(index, (value, _))| {
+                let cell = cell(index);
+                let factor = self.closures.of(cell).factor_for(value.w, sums[cell]);
                 let most = if bounds_rows && value.w > 0.0 {
                     1.0 / value.w
                 } else {
@@ -151,80 +180,105 @@ impl Solver {
     }
 }
 
-/// Closure of every patch, and the rays shot; `None` when cancelled.
+/// Closures of all cells, which are the leaves of the mesh as it is now, and the rays shot; `None` when cancelled.
 pub(super) fn closures(
     hierarchy: &Hierarchy,
     rays: &RayTree,
     seed: u64,
     cancel: &Cancel,
-) -> Option<(Vec<Closure>, u64)> {
+) -> Option<(Closures, u64)> {
     let costly = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
     let budget = |rays: usize| (rays as f32 / costly) as usize;
-    let groups = groups(hierarchy, (GROUP_PATCHES as f32 * costly) as u32);
-    let look = |group: &Cluster, first: usize, count: usize| {
-        let range = group.patches();
+    let groups: Vec<Vec<usize>> = groups(hierarchy, (GROUP_PATCHES as f32 * costly) as u32)
+        .into_par_iter()
+        .map(|group| cells(hierarchy, group))
+        .collect();
+    let meets = |cell: usize, first: usize| probe(hierarchy, rays, cell, 1, first as u32, seed);
+    let look = |group: &[usize], first: usize, count: usize| {
         (0..count).all(|ray| {
-            let patch = range.start + (ray * range.len()) / count;
-            !cancel.is_cancelled()
-                && probe(hierarchy, rays, patch, 1, (first + ray) as u32, seed) == 1
+            !cancel.is_cancelled() && meets(group[ray * group.len() / count], first + ray) == 1
         })
     };
+    let first_look = |group: &[usize]| GROUP_RAYS.max(group.len() / CELLS_PER_RAY);
     let mut closed: Vec<bool> = groups
         .par_iter()
-        .map(|group| look(group, 0, GROUP_RAYS))
+        .map(|group| look(group, 0, first_look(group)))
         .collect();
-    let mut ray_count = groups.len() * GROUP_RAYS;
+    let mut ray_count: usize = groups.iter().map(|group| first_look(group)).sum();
     if closed.iter().any(|is_closed| !is_closed) {
         let count = (budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
         closed
             .par_iter_mut()
             .zip(&groups)
             .filter(|(is_closed, _)| **is_closed)
-            .for_each(|(is_closed, group)| *is_closed = look(group, GROUP_RAYS, count));
+            .for_each(|(is_closed, group)| *is_closed = look(group, first_look(group), count));
         ray_count += groups.len() * count;
     }
-    let open: Vec<&Cluster> = groups
+    let open: Vec<&[usize]> = groups
         .iter()
         .zip(&closed)
         .filter(|(_, is_closed)| !**is_closed)
-        .map(|(group, _)| *group)
+        .map(|(group, _)| group.as_slice())
         .collect();
-    let patches: usize = open.iter().map(|group| group.patches().len()).sum();
-    let sharing = if patches > budget(MOST_PROBED_PATCHES) {
-        open.len()
-    } else {
-        patches
+    let area = |cell: usize| hierarchy.mesh.elements[cell].area_vector.length();
+    let cell_count: usize = open.iter().map(|group| group.len()).sum();
+    let open_area: f32 = open.iter().copied().flatten().map(|&cell| area(cell)).sum();
+    let is_shared = cell_count > budget(MOST_PROBED_CELLS);
+    let sharing = if is_shared { open.len() } else { cell_count };
+    let even = 1.0 / sharing.max(1) as f32;
+    let count = |share: f32| {
+        let count = budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
+        (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
     };
-    let count = (budget(OPEN_RAYS) / sharing.max(1)).clamp(LEAST_PATCH_RAYS, MOST_PATCH_RAYS);
-    ray_count += sharing * count;
-    let found: Vec<Vec<Closure>> = open
+    let found: Vec<(Vec<Closure>, usize)> = open
         .par_iter()
         .map(|group| {
-            let range = group.patches();
             if cancel.is_cancelled() {
-                return Vec::new();
+                return (Vec::new(), 0);
             }
-            if sharing == patches {
-                let probe = |patch| probe(hierarchy, rays, patch, count as u32, 0, seed);
-                return range
-                    .map(|patch| Closure::of(probe(patch), count))
-                    .collect();
-            }
-            let hits = (0..count).map(|ray| {
-                let patch = range.start + (ray * range.len()) / count;
-                probe(hierarchy, rays, patch, 1, ray as u32, seed)
-            });
-            vec![Closure::shared(hits.sum(), count); range.len()]
+            let mut shot = 0;
+            let found = if is_shared {
+                shot = count(even);
+                let hits = (0..shot).map(|ray| meets(group[ray * group.len() / shot], ray));
+                vec![Closure::shared(hits.sum(), shot); group.len()]
+            } else {
+                let of = |&cell: &usize| {
+                    let count = count(area(cell) / open_area);
+                    shot += count;
+                    Closure::of(probe(hierarchy, rays, cell, count as u32, 0, seed), count)
+                };
+                group.iter().map(of).collect()
+            };
+            (found, shot)
         })
         .collect();
     if cancel.is_cancelled() {
         return None;
     }
-    let mut closures = vec![Closure::CLOSED; hierarchy.patches.len()];
-    for (group, found) in open.iter().zip(found) {
-        closures[group.patches()].copy_from_slice(&found);
+    let mut closures = vec![Closure::CLOSED; hierarchy.mesh.elements.len()];
+    for (group, (found, shot)) in open.iter().zip(found) {
+        ray_count += shot;
+        for (&cell, closure) in group.iter().zip(found) {
+            closures[cell] = closure;
+        }
     }
-    Some((closures, ray_count as u64))
+    Some((Closures(closures), ray_count as u64))
+}
+
+/// The leaf elements of a cluster, in the order of its patches.
+fn cells(hierarchy: &Hierarchy, cluster: &Cluster) -> Vec<usize> {
+    let mut cells = Vec::new();
+    let mut pending: Vec<usize> = cluster.patches().rev().collect();
+    while let Some(index) = pending.pop() {
+        let element = &hierarchy.mesh.elements[index];
+        if element.is_leaf() {
+            cells.push(index);
+        } else {
+            let first = element.first_child as usize;
+            pending.extend((first..first + 4).rev());
+        }
+    }
+    cells
 }
 
 /// The largest clusters with few enough patches, in the order of the patches.
@@ -243,19 +297,19 @@ fn groups(hierarchy: &Hierarchy, most_patches: u32) -> Vec<&Cluster> {
     groups
 }
 
-/// How many of some cosine-weighted rays from a patch meet a lit side; `first` numbers them within the patch.
+/// How many of some cosine-weighted rays from an element meet a lit side; `first` numbers them within the element.
 fn probe(
     hierarchy: &Hierarchy,
     rays: &RayTree,
-    patch: usize,
+    element: usize,
     count: u32,
     first: u32,
     seed: u64,
 ) -> u32 {
-    let mut random = Random::new(seed, (u64::from(first) << 32) | patch as u64);
+    let mut random = Random::new(seed, (u64::from(first) << 32) | element as u64);
     let shift = random.uniform_2d();
-    let [a, b, c] = hierarchy.mesh.corners(patch);
-    let patch = &hierarchy.patches[patch];
+    let [a, b, c] = hierarchy.mesh.corners(element);
+    let patch = hierarchy.patch_of(element);
     let mut is_met = |index: u32| {
         // Only the directions are stratified: a point from the same sequence would go with its direction.
         let at = triangle_point(random.uniform_2d());

@@ -137,16 +137,17 @@ impl Solver {
     /// By what the light of a leaf is scaled so that its form factors add to the closure.
     fn closure_factor(&self, leaf: usize, row_sum: f32) -> f32 {
         let elements = &self.hierarchy.mesh.elements;
-        let patch = elements[leaf].patch;
+        let cell_of = |element| self.closures.cell(&self.hierarchy, element);
+        let cell = cell_of(leaf);
         let sums = self
             .leaves
             .iter()
-            .filter(|other| elements[other.element as usize].patch == patch)
+            .filter(|other| cell_of(other.element as usize) == cell)
             .fold((0.0, 0.0), |(areas, rows), other| {
                 let area = elements[other.element as usize].area_vector.length();
                 (areas + area, rows + area * other.centre.w)
             });
-        self.closures[patch as usize].factor_for(row_sum, sums)
+        self.closures.of(cell).factor_for(row_sum, sums)
     }
 
     fn place(&self, node: NodeId) -> Place {

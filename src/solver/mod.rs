@@ -40,7 +40,7 @@ use crate::{
     },
 };
 use adapt::DirectField;
-use closure::Closure;
+use closure::Closures;
 use direct::Lights;
 use reconstruct::LeafLight;
 
@@ -95,8 +95,8 @@ pub struct Solver {
     direct: Option<DirectField>,
     /// Linked irradiance of every element, scaled so that form factors add to the closure; `w` is their raw sum.
     linked: Vec<Vec4>,
-    /// Part of each patch's view that lit surfaces fill.
-    closures: Vec<Closure>,
+    /// Part of the view of each piece of surface that lit surfaces fill.
+    closures: Closures,
     leaves: Vec<LeafLight>,
     mean_irradiance: f32,
     /// Whether the memory limit kept the last step from being finer.
@@ -121,9 +121,8 @@ impl Solver {
         let is_cancelled = || cancel.is_cancelled();
         let hierarchy = Hierarchy::build(&scene, settings.crease_degrees, &is_cancelled)?;
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
-        let (closures, ray_count) = closure::closures(&hierarchy, &rays, settings.seed, cancel)?;
         let mut solver = Self {
-            closures,
+            closures: Closures::default(),
             areas: PatchSums::of_area(&hierarchy),
             power: Tables::default(),
             links: LinkStore::default(),
@@ -133,7 +132,7 @@ impl Solver {
             mean_irradiance: 0.0,
             is_full: false,
             step: 0,
-            ray_count,
+            ray_count: 0,
             snapshot: Snapshot::default(),
             scene,
             settings,
@@ -148,10 +147,13 @@ impl Solver {
         Some(solver)
     }
 
-    /// Sample direct light on the first mesh, so that there is something to see before the first link.
+    /// Probe closures and sample direct light on the first mesh, so that there is something to see before the first link.
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(1.0);
         adapt::divide_coarse(&mut self.hierarchy, limits);
+        let (closures, shot) = closure::closures(&self.hierarchy, &self.rays, limits.seed, cancel)?;
+        self.closures = closures;
+        self.ray_count += shot;
         if let Some(field) = &mut self.direct {
             let (count, seed) = (limits.shadow_samples, limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;

@@ -7,7 +7,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::closure::Closure;
+use super::closure::{Closure, Closures};
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
     transport::{Kernel, Link, LinkStore, self_irradiance},
@@ -34,7 +34,7 @@ pub(super) struct LeafLight {
 pub(super) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    closures: &[Closure],
+    closures: &Closures,
 ) -> Vec<LeafLight> {
     let hierarchy = kernel.hierarchy;
     let leaf_clusters: Vec<usize> = (0..hierarchy.clusters.len())
@@ -49,7 +49,11 @@ pub(super) fn gather_leaves(
             for patch in hierarchy.clusters[cluster].patches() {
                 let first = found.len();
                 gather_patch(kernel, links, &chain, patch, &mut found);
-                scale_to_closure(hierarchy, closures[patch], &mut found[first..]);
+                // Leaves come depth first, so those of a cell follow each other.
+                let cell = |leaf: &LeafLight| closures.cell(hierarchy, leaf.element as usize);
+                for leaves in found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
+                    scale_to_closure(hierarchy, closures.of(cell(&leaves[0])), leaves);
+                }
             }
             found
         })
@@ -57,7 +61,7 @@ pub(super) fn gather_leaves(
     found.into_iter().flatten().collect()
 }
 
-/// Scale the light of the leaves of one patch so that their form factors add to the closure.
+/// Scale the light of the leaves of one cell so that their form factors add to the closure.
 fn scale_to_closure(hierarchy: &Hierarchy, closure: Closure, leaves: &mut [LeafLight]) {
     let sums = leaves.iter().fold((0.0, 0.0), |(areas, rows), leaf| {
         let area = hierarchy.mesh.elements[leaf.element as usize]
