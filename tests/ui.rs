@@ -283,7 +283,7 @@ fn a_new_start_forgets_what_the_solver_said() {
 #[test]
 fn clusters_are_cut_by_size_and_by_use() {
     let mut harness = picked_in_the_box();
-    let shown = |harness: &Harness<'static, App>| harness.state().state.cluster_counts.shown;
+    let shown = |harness: &Harness<'static, App>| harness.state().state.shown_clusters.shown.len();
     harness.state_mut().state.view.clusters.cut = ClusterCut::Size;
     harness.state_mut().state.view.clusters.size = 0.5;
     harness.run_steps(2);

@@ -23,9 +23,11 @@ use super::{
     panels,
     saver::{Notice, Unfinished},
     session::Recent,
+    stage::Stage,
     start::{Faults, Options},
     state::State,
     theme,
+    view::ViewSettings,
     viewport::{Viewport, viewport_ui},
 };
 use crate::worker::{Wake, WorkerHandle};
@@ -38,6 +40,7 @@ pub struct App {
     /// What it knows. Public for tests.
     pub state: State,
     worker: WorkerHandle,
+    stage: Stage,
     viewport: Option<Viewport>,
     table: Vec<Binding>,
     wake: Wake,
@@ -73,6 +76,7 @@ impl App {
             faults.watch(&render_state.device, wake.clone());
             Viewport::new(render_state)
         });
+        let adapter = viewport.as_ref().map(Viewport::adapter);
         let recent = cc
             .storage
             .and_then(|storage| storage.get_string(RECENT_KEY))
@@ -82,7 +86,7 @@ impl App {
             settings: options.settings.clone(),
             options: options.run.clone(),
             scene_options: options.scene_options,
-            view: options.view.clone(),
+            view: options.view.apply(ViewSettings::default()),
             recent,
             adapter_name: viewport
                 .as_ref()
@@ -93,6 +97,7 @@ impl App {
         let mut app = Self {
             state,
             worker: WorkerHandle::spawn(wake.clone())?,
+            stage: Stage::spawn(adapter, wake.clone())?,
             viewport,
             table: bindings::bindings(),
             wake,
@@ -191,6 +196,7 @@ impl eframe::App for App {
         for action in actions {
             self.perform(&ctx, action);
         }
+        self.want();
         self.ask();
     }
 

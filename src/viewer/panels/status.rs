@@ -18,7 +18,7 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
         let color = match &state.run.status {
             RunStatus::Failed(_) => theme::BAD,
             RunStatus::Finished(_) => theme::GOOD,
-            RunStatus::Paused => theme::WARNING,
+            RunStatus::Pausing | RunStatus::Paused => theme::WARNING,
             _ => ui.visuals().text_color(),
         };
         ui.colored_label(color, state.run.status.label());
