@@ -159,6 +159,7 @@ impl RunFlags {
             threads: self.threads.map_or(0, usize::from),
             time_limit: self.time_limit,
             memory_limit: self.memory_limit.map(|mebibytes| mebibytes << 20),
+            gives_way: false,
         }
     }
 

@@ -5,7 +5,8 @@ use std::{f32::consts::PI, sync::Arc};
 use glam::{Vec2, Vec3};
 
 use super::{
-    Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable, reconstruct::VertexMeans,
+    Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable,
+    reconstruct::VertexMeans,
 };
 use crate::{
     geometry::area_vector,

@@ -187,8 +187,7 @@ impl Solver {
         self.estimate_mean();
         report.epsilon = self.refine(report.epsilon, cancel)?;
         self.iterate(&mut report, cancel)?;
-        let found =
-            reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
+        let found = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
         self.leaves = found;
         cancel.proceed()?;
         self.fill(&mut report);

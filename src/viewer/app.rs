@@ -1,6 +1,7 @@
 //! The application: events in, panels and viewport drawn, actions carried out.
 
 mod acting;
+mod dropping;
 mod incoming;
 mod saving;
 mod scenes;
@@ -11,15 +12,13 @@ use std::{
         Arc,
         mpsc::{self, Receiver, Sender},
     },
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use eframe::egui;
 
 use super::{
-    action::Action,
     bindings::{self, Binding},
-    loader::SceneSource,
     panels,
     saver::{Notice, Unfinished},
     session::Recent,
@@ -30,7 +29,11 @@ use super::{
     view::ViewSettings,
     viewport::{Viewport, viewport_ui},
 };
-use crate::worker::{Wake, WorkerHandle};
+use crate::worker::{RunOptions, Wake, WorkerHandle};
+
+/// When the next frame is drawn after something arrived. At once would draw two frames, and on a processor that plays
+/// adapter each takes time from the solver.
+const SOON: Duration = Duration::from_millis(1);
 
 /// Where the list of recent files is kept.
 const RECENT_KEY: &str = "recent";
@@ -71,7 +74,7 @@ impl App {
     ) -> std::io::Result<Self> {
         theme::apply(&cc.egui_ctx);
         let ctx = cc.egui_ctx.clone();
-        let wake: Wake = Arc::new(move || ctx.request_repaint());
+        let wake: Wake = Arc::new(move || ctx.request_repaint_after(SOON));
         let viewport = cc.wgpu_render_state.as_ref().map(|render_state| {
             faults.watch(&render_state.device, wake.clone());
             Viewport::new(render_state)
@@ -84,7 +87,10 @@ impl App {
             .unwrap_or_default();
         let state = State {
             settings: options.settings.clone(),
-            options: options.run.clone(),
+            options: RunOptions {
+                gives_way: true,
+                ..options.run.clone()
+            },
             scene_options: options.scene_options,
             view: options.view.apply(ViewSettings::default()),
             recent,
@@ -148,13 +154,7 @@ impl eframe::App for App {
         if !ctx.egui_wants_keyboard_input() {
             actions.extend(ctx.input_mut(|input| bindings::pressed(input, &self.table)));
         }
-        let dropped = ctx.input(|input| {
-            let files = &input.raw.dropped_files;
-            files.first().map(|file| file.path().to_owned())
-        });
-        if let Some(path) = dropped {
-            actions.push(Action::Load(SceneSource::File(path)));
-        }
+        actions.extend(self.take_dropped(&ctx));
         let before = self.state.view.clone();
         if self.state.panels.shown {
             egui::Panel::top("menu").show(ui, |ui| {
@@ -185,6 +185,7 @@ impl eframe::App for App {
         panels::scene::path_window(&ctx, &mut self.state, &mut actions);
         panels::picture::picture_window(&ctx, &mut self.state, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
+        dropping::hover_ui(&ctx);
         if self.state.view != before {
             self.follow_light();
             ctx.request_repaint();

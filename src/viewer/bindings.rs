@@ -247,8 +247,7 @@ pub fn bindings() -> Vec<Binding> {
         Key::Minus,
     ];
     all.extend(
-        ROW
-            .into_iter()
+        ROW.into_iter()
             .zip(ViewMode::ALL)
             .map(|(key, mode)| alt(key, mode)),
     );

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{cluster_lines, links, render::SegmentInstance, state::State, theme, view::LinkOverlay};
+use super::{
+    cluster_lines, links, render::SegmentInstance, state::State, theme, view::LinkOverlay,
+};
 use crate::solver::{ClusterBox, Inspection};
 
 /// The lines of the last frame, and what they were made from. Arcs are held, so that an address is not used twice.

@@ -19,6 +19,7 @@ use super::{
     Effect, Event, Generation, MakeStepper, StopReason,
     message::{Command, Message, Start},
     outbox::Outbox,
+    priority::give_way,
     run::{Aim, Run},
     visit::{Outcome, Returned},
 };
@@ -31,10 +32,55 @@ const GRACE: Duration = Duration::from_millis(60);
 /// Solves left behind at once. More, and memory and cores are spent on what nobody sees: the next run then waits.
 const MOST_LEFT: usize = 2;
 
-/// The solver threads, kept while their number stays.
+/// Solver threads, kept while their number stays.
 struct Pool {
     threads: usize,
     pool: ThreadPool,
+}
+
+/// The solver threads: those that share the cores, and those that give way. Idle ones cost nothing.
+#[derive(Default)]
+struct Pools {
+    sharing: Option<Pool>,
+    giving_way: Option<Pool>,
+}
+
+impl Pools {
+    /// The pool of that many threads, made anew only when the number changes.
+    fn pool_of(
+        &mut self,
+        threads: usize,
+        gives_way: bool,
+    ) -> Result<&ThreadPool, ThreadPoolBuildError> {
+        let held = if gives_way {
+            &mut self.giving_way
+        } else {
+            &mut self.sharing
+        };
+        let fitting = held.take().filter(|held| held.threads == threads);
+        let pool = match fitting {
+            Some(pool) => pool,
+            None => Pool {
+                threads,
+                pool: ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .thread_name(|index| format!("solver-{index}"))
+                    .start_handler(move |_| {
+                        if gives_way {
+                            give_way();
+                        }
+                    })
+                    .build()?,
+            },
+        };
+        Ok(&held.insert(pool).pool)
+    }
+
+    /// Any of them.
+    fn any(&self) -> Option<&ThreadPool> {
+        let held = self.giving_way.as_ref().or(self.sharing.as_ref());
+        held.map(|held| &held.pool)
+    }
 }
 
 /// A solve in the pool.
@@ -56,7 +102,7 @@ pub(super) struct Controller {
     inbox: Sender<Message>,
     outbox: Outbox,
     make: MakeStepper,
-    pool: Option<Pool>,
+    pools: Pools,
     run: Option<Run>,
     /// The solve in the pool, even one of an older run.
     away: Option<Away>,
@@ -77,7 +123,7 @@ impl Controller {
             inbox,
             outbox,
             make,
-            pool: None,
+            pools: Pools::default(),
             run: None,
             away: None,
             left_count: 0,
@@ -123,7 +169,8 @@ impl Controller {
 
     /// A deadline passed: see which.
     fn note_time(&mut self) {
-        let has_passed = |deadline: Option<Instant>| deadline.is_some_and(|at| at <= Instant::now());
+        let has_passed =
+            |deadline: Option<Instant>| deadline.is_some_and(|at| at <= Instant::now());
         if has_passed(self.patience_ends()) {
             self.leave_behind();
         }
@@ -144,7 +191,7 @@ impl Controller {
         if let Some(away) = self.away.take() {
             away.left.cancel();
             self.left_count += 1;
-            self.pool = None;
+            self.pools = Pools::default();
         }
     }
 
@@ -156,7 +203,8 @@ impl Controller {
         let Some(run) = self.run.as_mut().filter(|run| run.wants_visit()) else {
             return;
         };
-        let pool = match pool_of(&mut self.pool, run.options.threads) {
+        let gives_way = run.options.gives_way && run.stepper.is_some();
+        let pool = match self.pools.pool_of(run.options.threads, gives_way) {
             Ok(pool) => pool,
             Err(error) => {
                 run.turn_to(Aim::Failed);
@@ -307,8 +355,8 @@ impl Controller {
 
     /// Let go of something large where it keeps no command waiting.
     fn drop_in_pool(&self, large: impl Send + 'static) {
-        match &self.pool {
-            Some(held) => held.pool.spawn(move || drop(large)),
+        match self.pools.any() {
+            Some(pool) => pool.spawn(move || drop(large)),
             None => drop(large),
         }
     }
@@ -372,20 +420,4 @@ impl Controller {
             away.cancel.cancel();
         }
     }
-}
-
-/// The pool of that many threads, made anew only when the number changes.
-fn pool_of(held: &mut Option<Pool>, threads: usize) -> Result<&ThreadPool, ThreadPoolBuildError> {
-    let fitting = held.take().filter(|held| held.threads == threads);
-    let pool = match fitting {
-        Some(pool) => pool,
-        None => Pool {
-            threads,
-            pool: ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .thread_name(|index| format!("solver-{index}"))
-                .build()?,
-        },
-    };
-    Ok(&held.insert(pool).pool)
 }

@@ -36,6 +36,9 @@ pub struct RunOptions {
     pub time_limit: Option<Duration>,
     /// Bytes that the solver may hold.
     pub memory_limit: Option<u64>,
+    /// Whether steps wait for other threads of the program where cores are few. The preparation does not: until it is
+    /// done there is nothing to look at.
+    pub gives_way: bool,
 }
 
 /// Why a run ended.

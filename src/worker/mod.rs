@@ -11,6 +11,7 @@ mod controller;
 mod effect;
 mod message;
 mod outbox;
+mod priority;
 mod run;
 mod slot;
 mod stepper;
@@ -71,9 +72,7 @@ impl WorkerHandle {
     pub fn spawn(wake: Wake) -> io::Result<Self> {
         Self::with_steppers(
             wake,
-            Arc::new(|job: Job, cancel: &Cancel| {
-                Some(Box::new(job.solver(cancel)?) as _)
-            }),
+            Arc::new(|job: Job, cancel: &Cancel| Some(Box::new(job.solver(cancel)?) as _)),
         )
     }
 

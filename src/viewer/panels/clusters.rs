@@ -26,7 +26,11 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
         ui.weak("There are no clusters yet.");
         return;
     }
-    cut_ui(ui, overlay, state.shown_clusters.deepest.unwrap_or(overlay.level));
+    cut_ui(
+        ui,
+        overlay,
+        state.shown_clusters.deepest.unwrap_or(overlay.level),
+    );
     let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
     let label = ui.label("Colour");
     row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);

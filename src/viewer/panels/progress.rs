@@ -60,8 +60,7 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
                 Action::PauseContinue,
             );
         }
-        let can_stop =
-            status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused);
+        let can_stop = status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused);
         button(
             "Stop",
             can_stop,

@@ -12,11 +12,7 @@ pub(super) struct MeshPass {
 
 impl MeshPass {
     /// Build the pipelines.
-    pub(super) fn new(
-        gpu: &Gpu,
-        view_layout: &wgpu::BindGroupLayout,
-        details: &DetailSet,
-    ) -> Self {
+    pub(super) fn new(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, details: &DetailSet) -> Self {
         let module = gpu
             .device
             .create_shader_module(wgpu::ShaderModuleDescriptor {

@@ -264,8 +264,7 @@ impl Renderer {
 
     /// Draw a picture of what was uploaded for it.
     pub fn draw(&mut self, target: &Target, picture: &Picture<'_>, uploads: &Uploads) {
-        self.line_pass
-            .prepare(&self.gpu, &picture.overlay.segments);
+        self.line_pass.prepare(&self.gpu, &picture.overlay.segments);
         self.uniforms.write(&self.gpu.queue, target.size(), picture);
         // Draw surfaces and lines into the linear picture.
         let mut encoder = self
