@@ -178,7 +178,7 @@ impl PictureFlags {
             }
         };
         let camera = self.view.camera(up).apply(opening, &scene.frame);
-        let view = self.view.request(run_flags).apply(ViewSettings::default());
+        let view = self.view.request(run_flags).apply(&ViewSettings::default());
         if !camera.is_valid() {
             bail!(UsageError(
                 "the camera is too far from the scene or in what it looks at; move --camera-position or --camera-focal-point"

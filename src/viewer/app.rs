@@ -18,6 +18,7 @@ use std::{
 use eframe::egui;
 
 use super::{
+    action::Action,
     bindings::{self, Binding},
     panels,
     saver::{Notice, Unfinished},
@@ -92,7 +93,7 @@ impl App {
                 ..options.run.clone()
             },
             scene_options: options.scene_options,
-            view: options.view.apply(ViewSettings::default()),
+            view: options.view.apply(&ViewSettings::default()),
             recent,
             adapter_name: viewport
                 .as_ref()
@@ -150,11 +151,14 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        let mut actions = Vec::new();
+        // What keys ask for shows in this frame already.
         if !ctx.egui_wants_keyboard_input() {
-            actions.extend(ctx.input_mut(|input| bindings::pressed(input, &self.table)));
+            for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
+                self.perform(&ctx, action);
+            }
+            self.want();
         }
-        actions.extend(self.take_dropped(&ctx));
+        let mut actions: Vec<Action> = self.take_dropped(&ctx).into_iter().collect();
         let before = self.state.view.clone();
         if self.state.panels.shown {
             egui::Panel::top("menu").show(ui, |ui| {

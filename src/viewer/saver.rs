@@ -52,7 +52,7 @@ pub struct Drawn {
 /// Where a picture comes from.
 pub enum Shot {
     /// The adapter, once it is done.
-    Drawn(Drawn),
+    Drawn(Box<Drawn>),
     /// The window.
     Seen(RgbaImage),
 }

@@ -199,8 +199,12 @@ pub struct Selection {
 /// What the panels hold open and half typed.
 #[derive(Clone, Debug)]
 pub struct PanelState {
-    /// Whether the side panels are shown.
+    /// Whether anything but the scene is shown.
     pub shown: bool,
+    /// Whether the panel of the run and its settings is shown beside the scene.
+    pub light: bool,
+    /// Whether the panel of what is looked into is shown beside the scene.
+    pub look: bool,
     /// Whether the key sheet is open.
     pub help: bool,
     /// Whether the dialog for pictures is open.
@@ -223,6 +227,8 @@ impl Default for PanelState {
     fn default() -> Self {
         Self {
             shown: true,
+            light: true,
+            look: true,
             help: false,
             picture: false,
             path: false,

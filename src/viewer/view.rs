@@ -267,7 +267,7 @@ pub struct ViewRequest {
 
 impl ViewRequest {
     /// A view with what was asked for put in.
-    pub fn apply(&self, view: ViewSettings) -> ViewSettings {
+    pub fn apply(&self, view: &ViewSettings) -> ViewSettings {
         ViewSettings {
             mode: self.mode.unwrap_or(view.mode),
             emission_scale: self.emission_scale.unwrap_or(view.emission_scale),
@@ -280,7 +280,7 @@ impl ViewRequest {
             clusters: self
                 .clusters
                 .map_or(view.clusters, |asked| asked.apply(view.clusters)),
-            ..view
+            ..view.clone()
         }
     }
 }

@@ -52,7 +52,7 @@ impl App {
             Ok(drawn) => {
                 let saving = saver::Saving {
                     path,
-                    shot: saver::Shot::Drawn(drawn),
+                    shot: saver::Shot::Drawn(Box::new(drawn)),
                 };
                 saving.start(self.notices.0.clone(), &self.pictures, self.wake.clone());
             }

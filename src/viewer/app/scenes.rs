@@ -114,7 +114,7 @@ impl App {
                     "the camera of the command line is too far from the scene and was not used";
                 self.state.messages.push(Severity::Warning, text);
             }
-            self.state.view = first.view.apply(self.state.view.clone());
+            self.state.view = first.view.apply(&self.state.view);
         }
         self.state.rig.jump(camera);
     }

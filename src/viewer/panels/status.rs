@@ -65,6 +65,7 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
     let button = egui::Button::new(RichText::new(text).color(color)).frame(false);
     if ui.add(button).on_hover_text("Show all messages").clicked() {
         state.panels.show_messages = true;
+        state.panels.look = true;
         state.panels.shown = true;
     }
 }
