@@ -185,7 +185,7 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Escape,
             Solve,
-            "Stop; without a run, select nothing",
+            "Stop reading or computing; else select nothing",
             Action::Stop,
         ),
         command(Key::R, Solve, "Begin again", Action::Reset),

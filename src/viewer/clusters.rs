@@ -233,6 +233,6 @@ pub(super) mod tests {
         let leaves = at_level(&tree(), 2);
         assert_eq!(containing(&tree(), &leaves, point), Some(4));
         assert_eq!(containing(&tree(), &leaves, Vec3::splat(50.0)), None);
-        assert_eq!(containing(&tree()[..2], &leaves, point), Some(1));
+        assert_eq!(containing(&tree()[..2], &leaves, point), None);
     }
 }
