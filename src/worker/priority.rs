@@ -3,9 +3,9 @@
 /// Let the calling thread wait for others of the program, such as those that draw, where the system knows such a thing.
 #[cfg(all(target_os = "linux", feature = "viewer"))]
 pub(super) fn give_way() {
-    /// At 10 a thread gets a tenth of what another gets that wants the same core. Less, and frames come half as often
-    /// where a processor plays graphics adapter; more gains nothing.
-    const NICENESS: i32 = 10;
+    /// At 5 a thread gets a third of what another gets that wants the same core. Less, and frames come half as often where
+    /// a processor plays graphics adapter; more, and other programs starve the light.
+    const NICENESS: i32 = 5;
     // Where it is refused, threads share.
     let _ = rustix::process::setpriority_process(None, NICENESS);
 }
