@@ -293,6 +293,28 @@ fn signals_at_any_moment_leave_outputs_whole_or_absent() {
 }
 
 #[test]
+fn a_signal_ends_a_long_preparation() {
+    let folder = tempfile::tempdir().unwrap();
+    let large = ["solve", "--scene", "room-1m", "--preset", "draft"];
+    let outputs = ["--export", "lit.ply", "--report", "out.json"];
+    let mut child = vecrad(folder.path(), &[&large[..], &outputs].concat())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    // The first line of progress: the scene was read, and clusters and ray tree take many times as long.
+    let mut said = String::new();
+    lines.read_line(&mut said).unwrap();
+    assert!(said.starts_with("preparing"), "{said}");
+    send("-TERM", &child);
+    lines.read_to_string(&mut said).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{said}");
+    assert!(said.contains("before there was any light"), "{said}");
+    assert_eq!(names(folder.path()), ["out.json"]);
+    whole_json(&folder.path().join("out.json"));
+}
+
+#[test]
 fn pipes_and_devices_are_no_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let made = Command::new("mkfifo")

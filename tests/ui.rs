@@ -3,6 +3,8 @@
 #![cfg(feature = "viewer")]
 
 use std::{
+    fs,
+    path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -18,7 +20,7 @@ use vecrad::{
         loader::SceneSource,
         start::Faults,
         state::{RunStatus, Severity},
-        view::{ClusterCut, LinkEnd, ViewMode},
+        view::{ClusterCut, ClusterRequest, LinkEnd, ViewMode, ViewRequest},
     },
     worker::{Effect, StopReason},
 };
@@ -81,6 +83,20 @@ fn wait_for(harness: &mut Harness<'static, App>, holds: impl Fn(&App) -> bool) {
         harness.step();
     }
     harness.run_steps(3);
+}
+
+/// Whether what is shown is what the state asks for.
+fn is_staged(app: &App) -> bool {
+    let (state, staged) = (&app.state, app.state.staged.as_ref());
+    staged.is_some_and(|staged| {
+        staged.wanted.clusters == state.view.clusters
+            && staged.wanted.mode == state.view.mode
+            && state
+                .run
+                .snapshot
+                .as_ref()
+                .is_some_and(|snapshot| Arc::ptr_eq(snapshot, &staged.wanted.snapshot))
+    })
 }
 
 fn perform(harness: &mut Harness<'static, App>, action: Action) {
@@ -283,18 +299,21 @@ fn a_new_start_forgets_what_the_solver_said() {
 #[test]
 fn clusters_are_cut_by_size_and_by_use() {
     let mut harness = picked_in_the_box();
-    let shown = |harness: &Harness<'static, App>| harness.state().state.cluster_counts.shown;
+    let shown = |harness: &Harness<'static, App>| harness.state().state.shown_clusters.shown.len();
     harness.state_mut().state.view.clusters.cut = ClusterCut::Size;
     harness.state_mut().state.view.clusters.size = 0.5;
     harness.run_steps(2);
+    wait_for(&mut harness, is_staged);
     let before = shown(&harness);
     harness.key_press(egui::Key::CloseBracket);
     harness.run_steps(2);
     let overlay = harness.state().state.view.clusters;
     assert_eq!((overlay.shown, overlay.size), (true, 0.25));
+    wait_for(&mut harness, is_staged);
     assert!(shown(&harness) > before, "smaller boxes are more");
     harness.state_mut().state.view.clusters.cut = ClusterCut::Used;
     harness.run_steps(2);
+    wait_for(&mut harness, is_staged);
     assert!(shown(&harness) > 0);
     harness.get_by_label_contains("boxes of");
 }
@@ -330,7 +349,8 @@ fn reload_keeps_camera_and_settings() {
 fn the_reference_measures_each_run_and_the_view_of_errors_is_offered() {
     let mut harness = plates();
     assert!(!ViewMode::offered(false).any(|mode| mode == ViewMode::Error));
-    harness.get_by_label("Trace reference").click();
+    // The button may lie below the fold of the panel.
+    harness.get_by_label("Trace reference").click_accesskit();
     harness.run_steps(2);
     wait_for(&mut harness, |app| app.state.truth.newest_error().is_some());
     harness.get_by_label("Relative RMS");
@@ -408,4 +428,160 @@ fn an_idle_window_asks_for_no_frames() {
     let mut harness = plates();
     // Ends only when nothing asks for another frame; a restless window exceeds the steps and panics.
     harness.run();
+}
+
+/// A file as the system hands it over.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+/// Drop files, and wait until they are read or refused.
+fn drop_files(harness: &mut Harness<'static, App>, paths: &[&Path]) {
+    let input = harness.input_mut();
+    for path in paths {
+        let file: egui::DroppedFileHandle = Arc::new(Dropped((*path).to_owned()));
+        input.dropped_files.push(file);
+    }
+    harness.step();
+    harness.input_mut().dropped_files.clear();
+    wait_for(harness, |app| app.state.loading.is_none());
+}
+
+fn last_message(harness: &Harness<'static, App>) -> (Severity, String) {
+    let message = harness.state().state.messages.all.last();
+    message.map_or((Severity::Note, String::new()), |message| {
+        (message.severity, message.text.clone())
+    })
+}
+
+fn shown_file(harness: &Harness<'static, App>) -> Option<PathBuf> {
+    let loaded = harness.state().state.loaded.as_ref()?;
+    Some(loaded.source.path()?.to_owned())
+}
+
+const LAMP: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+#[test]
+fn a_dropped_scene_is_opened() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let (scene, picture) = (folder.path().join("a.OBJ"), folder.path().join("a.png"));
+    fs::write(&scene, LAMP).expect("it can be written");
+    fs::write(&picture, [137, 80, 78, 71, 13, 10, 26, 10, 0, 0]).expect("it can be written");
+    let mut harness = window(Options::default());
+    harness.run_steps(2);
+
+    // Something else is refused, and the window stays empty.
+    drop_files(&mut harness, &[&picture]);
+    let (severity, text) = last_message(&harness);
+    assert_eq!(severity, Severity::Error);
+    assert!(text.contains("not an OBJ text file"), "{text}");
+    assert_eq!(shown_file(&harness), None);
+    let shown = harness.query_all_by_label_contains("not an OBJ text file");
+    assert!(shown.count() > 0, "the empty window says so itself");
+
+    drop_files(&mut harness, &[&scene]);
+    assert_eq!(shown_file(&harness).as_deref(), Some(scene.as_path()));
+    assert_eq!(harness.state().state.recent.files, [scene]);
+}
+
+#[test]
+fn among_several_dropped_files_the_scene_is_found() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let at = |name: &str| folder.path().join(name);
+    for name in ["a.mtl", "b.obj", "c.obj"] {
+        fs::write(at(name), LAMP).expect("it can be written");
+    }
+    let mut harness = window(Options::default());
+    drop_files(&mut harness, &[&at("a.mtl"), &at("b.obj"), &at("c.obj")]);
+    assert_eq!(shown_file(&harness), Some(at("b.obj")));
+    let messages = &harness.state().state.messages.all;
+    let is_note = |text: &str| text.starts_with("3 files were dropped") && text.contains("b.obj");
+    assert!(messages.iter().any(|message| is_note(&message.text)));
+}
+
+#[test]
+fn a_dropped_folder_is_opened_where_it_holds_one_scene() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let mut harness = window(Options::default());
+    for (count, sentence) in [(0, "no OBJ file"), (1, ""), (2, "several OBJ files")] {
+        if count > 0 {
+            let path = folder.path().join(format!("{count}.obj"));
+            fs::write(path, LAMP).expect("it can be written");
+        }
+        drop_files(&mut harness, &[folder.path()]);
+        let (severity, text) = last_message(&harness);
+        if sentence.is_empty() {
+            assert_eq!(shown_file(&harness), Some(folder.path().join("1.obj")));
+        } else {
+            assert_eq!(severity, Severity::Error);
+            assert!(text.contains(sentence), "{text}");
+        }
+    }
+}
+
+#[test]
+fn files_held_over_the_window_are_told_what_will_happen() {
+    let mut harness = window(Options::default());
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("Drop to open").is_none());
+    harness.input_mut().hovered_files.push(egui::HoveredFile {
+        path: Some("/somewhere/hall.obj".into()),
+        ..Default::default()
+    });
+    harness.run_steps(2);
+    harness.get_by_label("Drop to open hall.obj");
+    harness.input_mut().hovered_files.clear();
+    harness.run_steps(2);
+    assert!(harness.query_by_label_contains("Drop to open").is_none());
+}
+
+#[test]
+fn the_command_line_goes_before_the_sidecar() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let scene = folder.path().join("a.obj");
+    fs::write(&scene, LAMP).expect("it can be written");
+    let sidecar = "[view]\nmode = \"normals\"\nedges = true\nexposure = 3.0\nauto_exposure = false\n[settings]\nseed = 77\n";
+    fs::write(folder.path().join("a.obj.vecrad.toml"), sidecar).expect("it can be written");
+    let open = |view: ViewRequest, settings_are_asked_for| {
+        let mut harness = window(Options {
+            source: Some(SceneSource::File(scene.clone())),
+            view,
+            settings_are_asked_for,
+            ..Options::default()
+        });
+        wait_for(&mut harness, |app| app.state.loaded.is_some());
+        let state = &harness.state().state;
+        (state.view.clone(), state.settings.seed)
+    };
+    let (view, seed) = open(ViewRequest::default(), false);
+    assert_eq!(
+        (view.mode, view.edges, view.exposure),
+        (ViewMode::Normals, true, 3.0)
+    );
+    assert_eq!(seed, 77);
+    let asked = ViewRequest {
+        mode: Some(ViewMode::LightOnly),
+        exposure: Some(-1.0),
+        clusters: Some(ClusterRequest::Size(0.25)),
+        ..ViewRequest::default()
+    };
+    let (view, seed) = open(asked, true);
+    assert_eq!(
+        (view.mode, view.edges, view.exposure),
+        (ViewMode::LightOnly, true, -1.0)
+    );
+    assert_eq!(
+        (view.clusters.shown, view.clusters.cut),
+        (true, ClusterCut::Size)
+    );
+    assert_eq!(seed, SolveSettings::default().seed);
 }

@@ -65,9 +65,9 @@ impl SceneFlags {
 /// Flags of [`SolveSettings`].
 #[derive(Clone, Debug, Args)]
 pub struct SettingFlags {
-    /// Settings to start from; single flags override it
-    #[arg(long, value_enum, default_value = "normal", help_heading = "Settings")]
-    pub preset: Preset,
+    /// Settings to start from, by default normal; single flags override it
+    #[arg(long, value_enum, help_heading = "Settings")]
+    pub preset: Option<Preset>,
     /// How clusters store power and area
     #[arg(long, value_enum, help_heading = "Settings")]
     pub method: Option<MethodFlag>,
@@ -97,7 +97,7 @@ pub struct SettingFlags {
 impl SettingFlags {
     /// The preset with every given flag put in.
     pub fn settings(&self) -> SolveSettings {
-        let preset = match self.preset {
+        let preset = match self.preset.unwrap_or_default() {
             Preset::Draft => SolveSettings::draft(),
             Preset::Normal => SolveSettings::normal(),
             Preset::Final => SolveSettings::finest(),
@@ -113,6 +113,19 @@ impl SettingFlags {
             seed: self.seed.unwrap_or(preset.seed),
             ..preset
         }
+    }
+
+    /// Whether any of them is given.
+    pub fn are_given(&self) -> bool {
+        self.preset.is_some()
+            || self.method.is_some()
+            || self.oracle.is_some()
+            || self.direct.is_some()
+            || self.epsilon.is_some()
+            || self.samples.is_some()
+            || self.min_area.is_some()
+            || self.max_steps.is_some()
+            || self.seed.is_some()
     }
 }
 
@@ -132,11 +145,11 @@ pub struct RunFlags {
     #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
     pub exposure: Option<f32>,
     /// Multiply what all emitters emit, in files and pictures
-    #[arg(long, value_name = "FACTOR", value_parser = at_least_zero, default_value = "1", help_heading = "Output")]
-    pub emission_scale: f32,
-    /// Tone curve of the byte colours
-    #[arg(long, value_enum, default_value = "neutral", help_heading = "Output")]
-    pub tonemap: ToneMapFlag,
+    #[arg(long, value_name = "FACTOR", value_parser = at_least_zero, help_heading = "Output")]
+    pub emission_scale: Option<f32>,
+    /// Tone curve of the byte colours, by default neutral
+    #[arg(long, value_enum, help_heading = "Output")]
+    pub tonemap: Option<ToneMapFlag>,
 }
 
 impl RunFlags {
@@ -146,6 +159,7 @@ impl RunFlags {
             threads: self.threads.map_or(0, usize::from),
             time_limit: self.time_limit,
             memory_limit: self.memory_limit.map(|mebibytes| mebibytes << 20),
+            gives_way: false,
         }
     }
 
@@ -155,15 +169,15 @@ impl RunFlags {
             color: ColorOptions {
                 exposure_ev: self.exposure.unwrap_or(0.0),
                 tone_map: match self.tonemap {
-                    ToneMapFlag::None => ToneMap::None,
-                    ToneMapFlag::Neutral => ToneMap::Neutral,
+                    Some(ToneMapFlag::None) => ToneMap::None,
+                    Some(ToneMapFlag::Neutral) | None => ToneMap::Neutral,
                 },
             },
             up: match up {
                 UpFlag::Y => UpAxis::Y,
                 UpFlag::Z => UpAxis::Z,
             },
-            emission_scale: self.emission_scale,
+            emission_scale: self.emission_scale.unwrap_or(1.0),
         }
     }
 }

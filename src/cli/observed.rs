@@ -18,7 +18,7 @@ pub(super) fn observed_solvers(
     let observe: Arc<Observe> = Arc::new(observe);
     Arc::new(move |job: Job, cancel: &Cancel| {
         Some(Box::new(ObservedSolver {
-            solver: Solver::new(job.scene, job.settings, job.memory_limit, cancel)?,
+            solver: job.solver(cancel)?,
             observe: observe.clone(),
         }) as Box<dyn Stepper>)
     })

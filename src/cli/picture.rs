@@ -20,19 +20,20 @@ use crate::{
         camera::UpAxis,
         loader, opening,
         render::headless,
-        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+        view::{ClusterOverlay, ClusterRequest, ToneMap, ViewMode, ViewRequest, ViewSettings},
     },
 };
 
 /// What a picture shows, and from where.
 #[derive(Clone, Debug, Args)]
 pub struct ViewFlags {
-    /// What the surfaces show
-    #[arg(long, value_name = "MODE", default_value = "radiance", value_parser = view_mode(), help_heading = "Picture")]
-    pub view: String,
-    /// Draw the cluster boxes of a level of the tree
+    /// What the surfaces show, by default radiance
+    #[arg(long, value_name = "MODE", value_parser = view_mode(), help_heading = "Picture")]
+    pub view: Option<String>,
+    /// Draw cluster boxes: those of a level of the tree; size=PART for the largest below a part of the scene's extent;
+    /// used for the ends of links
     #[arg(long, value_name = "LEVEL", help_heading = "Picture")]
-    pub clusters: Option<u32>,
+    pub clusters: Option<Clusters>,
     /// Draw the edges of the elements
     #[arg(long, help_heading = "Picture")]
     pub edges: bool,
@@ -77,29 +78,25 @@ fn view_mode() -> clap::builder::PossibleValuesParser {
 }
 
 impl ViewFlags {
-    /// How the light is shown.
-    pub fn view_settings(&self, run_flags: &RunFlags) -> ViewSettings {
-        ViewSettings {
-            mode: ViewMode::from_name(&self.view).unwrap_or_default(),
+    /// How the light is to be shown.
+    pub fn request(&self, run_flags: &RunFlags) -> ViewRequest {
+        ViewRequest {
+            mode: self.mode(),
             emission_scale: run_flags.emission_scale,
-            exposure: run_flags.exposure.unwrap_or(0.0),
-            auto_exposure: run_flags.exposure.is_none(),
-            tone_map: match run_flags.tonemap {
+            exposure: run_flags.exposure,
+            tone_map: run_flags.tonemap.map(|tone_map| match tone_map {
                 ToneMapFlag::None => ToneMap::None,
                 ToneMapFlag::Neutral => ToneMap::Neutral,
-            },
+            }),
             logarithmic: self.logarithmic,
             fixed_range: self.range.map(|range| range.0),
             edges: self.edges,
-            clusters: ClusterOverlay {
-                shown: self.clusters.is_some(),
-                level: self
-                    .clusters
-                    .unwrap_or_else(|| ClusterOverlay::default().level),
-                ..ClusterOverlay::default()
-            },
-            ..ViewSettings::default()
+            clusters: self.clusters.map(|clusters| clusters.0),
         }
+    }
+
+    fn mode(&self) -> Option<ViewMode> {
+        self.view.as_deref().and_then(ViewMode::from_name)
     }
 
     /// From where.
@@ -156,7 +153,7 @@ impl PictureFlags {
 
     /// Whether a picture of the measured error is asked for.
     pub fn shows_errors(&self) -> bool {
-        self.screenshot.is_some() && self.view.view == ViewMode::Error.name()
+        self.screenshot.is_some() && self.view.mode() == Some(ViewMode::Error)
     }
 
     /// Draw and write the picture, if one is asked for.
@@ -181,7 +178,7 @@ impl PictureFlags {
             }
         };
         let camera = self.view.camera(up).apply(opening, &scene.frame);
-        let view = self.view.view_settings(run_flags);
+        let view = self.view.request(run_flags).apply(&ViewSettings::default());
         if !camera.is_valid() {
             bail!(UsageError(
                 "the camera is too far from the scene or in what it looks at; move --camera-position or --camera-focal-point"
@@ -241,6 +238,31 @@ impl FromStr for Range {
     }
 }
 
+/// Which cluster boxes are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clusters(pub ClusterRequest);
+
+impl FromStr for Clusters {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let request = match text.split_once('=') {
+            None if text == "used" => Some(ClusterRequest::Used),
+            None => text.parse().ok().map(ClusterRequest::Level),
+            Some(("size", part)) => part
+                .parse()
+                .ok()
+                .filter(|part| ClusterOverlay::SIZE_RANGE.contains(part))
+                .map(ClusterRequest::Size),
+            Some(_) => None,
+        };
+        request.map(Self).ok_or_else(|| {
+            "expected a level such as 4, size=PART with a part within 0.001 and 1, or used"
+                .to_owned()
+        })
+    }
+}
+
 /// Width and height in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size(pub [u32; 2]);
@@ -291,6 +313,13 @@ mod tests {
             assert!(wrong.parse::<Size>().is_err(), "{wrong}");
         }
         assert!("3,1".parse::<Range>().is_err());
+        let clusters = |text: &str| text.parse::<Clusters>().ok().map(|clusters| clusters.0);
+        assert_eq!(clusters("4"), Some(ClusterRequest::Level(4)));
+        assert_eq!(clusters("size=0.25"), Some(ClusterRequest::Size(0.25)));
+        assert_eq!(clusters("used"), Some(ClusterRequest::Used));
+        for wrong in ["", "-1", "size=0", "size=nan", "level=3", "used=1"] {
+            assert_eq!(clusters(wrong), None, "{wrong}");
+        }
         assert_eq!("0,-2,0".parse(), Ok(Direction(Vec3::NEG_Y)));
         assert!("0,0,0".parse::<Direction>().is_err());
     }

@@ -28,8 +28,9 @@ use crate::{
     worker::{Event, StopReason, WorkerHandle},
 };
 
-/// How often an interruption is looked for; an answer within a tenth of a second feels immediate.
-const POLL: Duration = Duration::from_millis(50);
+/// How often an interruption is looked for: an answer within a tenth of a second feels immediate, and to stop takes most
+/// of it.
+const POLL: Duration = Duration::from_millis(20);
 
 /// Flags of `vecrad solve`.
 #[derive(Debug, Args)]
@@ -252,11 +253,18 @@ fn worker(
 /// Follow the run to its end.
 fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result<Run> {
     let mut progress = Progress::new(quiet);
-    let (mut steps, mut prepare_s, mut stopping) = (Vec::new(), 0.0, false);
+    let (mut steps, mut prepare_s) = (Vec::new(), 0.0);
+    let mut is_stopping = false;
     let stop_reason = loop {
-        if interrupted.load(Ordering::Relaxed) && !stopping {
-            worker.stop();
-            stopping = true;
+        if interrupted.load(Ordering::Relaxed) {
+            // The preparation is not waited for: nothing would come of it.
+            if worker.latest().is_none() {
+                break StopReason::Requested;
+            }
+            if !is_stopping {
+                worker.stop();
+                is_stopping = true;
+            }
         }
         match worker.next_event(POLL) {
             None => progress.show(),

@@ -58,9 +58,9 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
         source: Some(source),
         scene_options: flags.scene_flags.options(),
         settings: flags.setting_flags.settings(),
+        settings_are_asked_for: flags.setting_flags.are_given(),
         run: flags.run_flags.options(),
-        view: flags.view.view_settings(&flags.run_flags),
-        exposure: flags.run_flags.exposure,
+        view: flags.view.request(&flags.run_flags),
         camera: flags.view.camera(flags.scene_flags.up),
     })?;
     Ok(Outcome::Done)

@@ -5,7 +5,8 @@ use std::{f32::consts::PI, sync::Arc};
 use glam::{Vec2, Vec3};
 
 use super::{
-    ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable, reconstruct::VertexMeans,
+    Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable,
+    reconstruct::VertexMeans,
 };
 use crate::{
     geometry::area_vector,
@@ -14,24 +15,34 @@ use crate::{
 };
 
 impl Solver {
-    /// Renew the snapshot after a step. The mesh is kept where no element was divided.
-    pub(super) fn show(&mut self) {
+    /// Renew the snapshot after a step. The mesh is kept where no element was divided. When cancelled the snapshot stays
+    /// as it was.
+    pub(super) fn show(&mut self, cancel: &Cancel) -> Option<()> {
         let shown = self.snapshot.mesh.indices.is_empty();
         let has_changed =
             shown || self.snapshot.mesh.positions.len() != self.hierarchy.mesh.vertices.len();
-        if has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown() {
-            self.snapshot.mesh = Arc::new(self.display_mesh());
-        }
+        cancel.proceed()?;
+        let mesh = if has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown()
+        {
+            Arc::new(self.display_mesh(cancel)?)
+        } else {
+            self.snapshot.mesh.clone()
+        };
+        cancel.proceed()?;
         if let Some(field) = &mut self.direct {
             field.smooth(&self.hierarchy);
         }
+        cancel.proceed()?;
         let light = self.vertex_light();
+        cancel.proceed()?;
+        let clusters = self.cluster_boxes(cancel)?;
         self.snapshot = Snapshot {
             step: self.step,
-            mesh: self.snapshot.mesh.clone(),
+            mesh,
             light: Arc::new(light),
-            clusters: Arc::new(self.cluster_boxes()),
+            clusters: Arc::new(clusters),
         };
+        Some(())
     }
 
     /// Number of leaves in the mesh that is shown: display triangles of one element follow each other.
@@ -43,8 +54,9 @@ impl Solver {
             .count()
     }
 
-    fn display_mesh(&mut self) -> DisplayMesh {
+    fn display_mesh(&mut self, cancel: &Cancel) -> Option<DisplayMesh> {
         let triangles = self.hierarchy.mesh.closed_triangles();
+        cancel.proceed()?;
         let mesh = &self.hierarchy.mesh;
         let count = mesh.vertices.len();
         let has_texcoords = !self.scene.texcoords.is_empty();
@@ -83,6 +95,7 @@ impl Solver {
                 .element_of
                 .push(self.hierarchy.clusters.len() as u32 + element);
         }
+        cancel.proceed()?;
         for (index, &weight) in weights
             .iter()
             .enumerate()
@@ -92,7 +105,7 @@ impl Solver {
             display.reflectance[index] /= weight;
             display.emission[index] /= weight;
         }
-        display
+        Some(display)
     }
 
     /// Texture coordinates of vertices on a triangle, by their barycentric coordinates there.
@@ -139,7 +152,7 @@ impl Solver {
         light
     }
 
-    fn cluster_boxes(&self) -> Vec<ClusterBox> {
+    fn cluster_boxes(&self, cancel: &Cancel) -> Option<Vec<ClusterBox>> {
         let mut boxes: Vec<ClusterBox> = Vec::with_capacity(self.hierarchy.clusters.len());
         for (index, cluster) in self.hierarchy.clusters.iter().enumerate() {
             let level = match cluster.parent {
@@ -148,13 +161,14 @@ impl Solver {
             };
             boxes.push(self.cluster_box(index, cluster, level));
         }
+        cancel.proceed()?;
         for link in self.links.all() {
             if let Some(source) = boxes.get_mut(link.source.index()) {
                 source.source_count += 1;
             }
         }
         self.add_sampled_emission(&mut boxes);
-        boxes
+        Some(boxes)
     }
 
     /// Add what tables leave out, since no link carries it: the emission of sampled emitters.

@@ -7,7 +7,7 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::{Push, anderson::ordered_sum};
+use super::{Cancel, Push, anderson::ordered_sum};
 use crate::{
     hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
     transport::{Kernel, LinkStore, self_irradiance},
@@ -16,14 +16,22 @@ use crate::{
 /// Nodes that one task gathers for.
 const TASK_NODES: usize = 256;
 
-/// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples.
-pub(super) fn gather(kernel: Kernel<'_>, links: &LinkStore, push: Push) -> Vec<Vec4> {
+/// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples. `None` when
+/// cancelled.
+pub(super) fn gather(
+    kernel: Kernel<'_>,
+    links: &LinkStore,
+    push: Push,
+    cancel: &Cancel,
+) -> Option<Vec<Vec4>> {
     let hierarchy = kernel.hierarchy;
-    let mut irradiance = own_irradiance(kernel, links);
+    let mut irradiance = own_irradiance(kernel, links, cancel);
+    cancel.proceed()?;
     let from_clusters = match push {
-        Push::Combined => push_moments(kernel, links),
-        Push::AtOnce => push_at_once(kernel, links),
+        Push::Combined => push_moments(kernel, links, cancel)?,
+        Push::AtOnce => push_at_once(kernel, links, cancel),
     };
+    cancel.proceed()?;
     let patch_count = from_clusters.len();
     irradiance[..patch_count]
         .par_iter_mut()
@@ -35,11 +43,11 @@ pub(super) fn gather(kernel: Kernel<'_>, links: &LinkStore, push: Push) -> Vec<V
         let above = irradiance[parent];
         irradiance[index] += above;
     }
-    irradiance
+    Some(irradiance)
 }
 
-/// What elements receive over their own links.
-fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
+/// What elements receive over their own links; nothing where cancelled.
+fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let base = hierarchy.clusters.len() as u32;
     (0..hierarchy.mesh.elements.len())
@@ -48,7 +56,7 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
         .map(|index| {
             let mut sum = Vec4::ZERO;
             let links = links.of(NodeId(base + index as u32));
-            if links.is_empty() {
+            if links.is_empty() || cancel.is_cancelled() {
                 return sum;
             }
             let (point, normal) = (
@@ -68,15 +76,22 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
         .collect()
 }
 
-/// What patches receive from the links of clusters, through the moments of all clusters above them.
-fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
+/// What patches receive from the links of clusters, through the moments of all clusters above them. `None` when
+/// cancelled.
+fn push_moments(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Option<Vec<Vec4>> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
     let mut incident: Vec<Moments<Vec4>> = (0..hierarchy.clusters.len())
         .into_par_iter()
         .with_min_len(TASK_NODES)
-        .map(|index| cluster_incident(kernel, links, index))
+        .map(|index| {
+            if cancel.is_cancelled() {
+                return Moments::default();
+            }
+            cluster_incident(kernel, links, index)
+        })
         .collect();
+    cancel.proceed()?;
     merge_down(hierarchy, &mut incident);
     let mut leaf_of = vec![0u32; hierarchy.patches.len()];
     for (index, cluster) in hierarchy
@@ -87,13 +102,16 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
     {
         leaf_of[cluster.patches()].fill(index as u32);
     }
-    (0..hierarchy.patches.len())
+    cancel.proceed()?;
+    let project = |patch: usize| {
+        incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
+    };
+    let pushed = (0..hierarchy.patches.len())
         .into_par_iter()
         .with_min_len(TASK_NODES)
-        .map(|patch| {
-            incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
-        })
-        .collect()
+        .map(project)
+        .collect();
+    Some(pushed)
 }
 
 /// Add to each cluster what those above it have. Parents come before their children.
@@ -145,8 +163,8 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     sum
 }
 
-/// What patches receive from the links of clusters, each vector pushed by itself.
-fn push_at_once(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
+/// What patches receive from the links of clusters, each vector pushed by itself; nothing where cancelled.
+fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let leaves: Vec<usize> = (0..hierarchy.clusters.len())
         .filter(|&index| hierarchy.clusters[index].is_leaf())
@@ -157,7 +175,7 @@ fn push_at_once(kernel: Kernel<'_>, links: &LinkStore) -> Vec<Vec4> {
             let range = hierarchy.clusters[leaf].patches();
             let mut sums = vec![Vec4::ZERO; range.len()];
             let mut at = leaf;
-            loop {
+            while !cancel.is_cancelled() {
                 for link in links.of(NodeId(at as u32)) {
                     push_one(
                         kernel,

@@ -118,12 +118,12 @@ impl Solver {
         let mut acceleration = Anderson::new(DEPTH);
         let mut growing = 0;
         for _ in 0..MOST_SWEEPS {
-            if cancel.is_cancelled() {
-                return None;
-            }
-            let sweep = self.sweep(bounds_rows);
+            cancel.proceed()?;
+            let sweep = self.sweep(bounds_rows, cancel)?;
             report.sweeps += 1;
+            cancel.proceed()?;
             let next = acceleration.next(&weights, &self.linked, &sweep.image);
+            cancel.proceed()?;
             let step = self.power_between(&next, &self.linked);
             let relative = |power: f64| power / sweep.arrived.max(f64::MIN_POSITIVE);
             let (residual, error) = (relative(sweep.change), relative(step));
@@ -153,9 +153,9 @@ impl Solver {
         Some(Ending::Unsettled)
     }
 
-    /// Gather once, and measure what came of it.
-    fn sweep(&self, bounds_rows: bool) -> Sweep {
-        let mut image = gather::gather(self.kernel(), &self.links, self.settings.push);
+    /// Gather once, and measure what came of it; `None` when cancelled.
+    fn sweep(&self, bounds_rows: bool, cancel: &Cancel) -> Option<Sweep> {
+        let mut image = gather::gather(self.kernel(), &self.links, self.settings.push, cancel)?;
         let returned = |image: &[Vec4]| {
             self.leaf_sum(|leaf| {
                 self.hierarchy.patch_of(leaf).reflectance.extend(0.0)
@@ -164,14 +164,15 @@ impl Solver {
         };
         let returned_unscaled = returned(&image);
         self.scale_to_closure(&mut image, bounds_rows);
-        Sweep {
+        cancel.proceed()?;
+        Some(Sweep {
             sent: self.leaf_sum(|leaf| self.power.elements[leaf]) + self.sampled_power(),
             returned: returned(&image),
             returned_unscaled,
             arrived: self.leaf_sum(|leaf| image[leaf] + self.direct_of(leaf)),
             change: self.power_between(&image, &self.linked),
             image,
-        }
+        })
     }
 
     fn power_between(&self, a: &[Vec4], b: &[Vec4]) -> f64 {

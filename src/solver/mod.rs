@@ -58,6 +58,11 @@ impl Cancel {
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
+
+    /// `None` where stopping was asked for.
+    pub(super) fn proceed(&self) -> Option<()> {
+        (!self.is_cancelled()).then_some(())
+    }
 }
 
 /// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
@@ -86,7 +91,7 @@ pub struct Solver {
     scene: Arc<Scene>,
     settings: SolveSettings,
     memory_limit: Option<u64>,
-    rays: RayTree,
+    rays: Arc<RayTree>,
     hierarchy: Hierarchy,
     areas: PatchSums,
     /// What links carry: reflected light, and emission where it is linked.
@@ -115,9 +120,20 @@ impl Solver {
         memory_limit: Option<u64>,
         cancel: &Cancel,
     ) -> Option<Self> {
-        let proceed = || (!cancel.is_cancelled()).then_some(());
-        proceed()?;
-        let rays = RayTree::new(&scene);
+        cancel.proceed()?;
+        let rays = Arc::new(RayTree::new(&scene));
+        Self::with_rays(scene, rays, settings, memory_limit, cancel)
+    }
+
+    /// As [`Self::new`], with the scene's ray tree.
+    pub fn with_rays(
+        scene: Arc<Scene>,
+        rays: Arc<RayTree>,
+        settings: SolveSettings,
+        memory_limit: Option<u64>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
+        cancel.proceed()?;
         let is_cancelled = || cancel.is_cancelled();
         let hierarchy = Hierarchy::build(&scene, settings.crease_degrees, &is_cancelled)?;
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
@@ -142,8 +158,7 @@ impl Solver {
         };
         solver.first_light(cancel)?;
         solver.pull();
-        proceed()?;
-        solver.show();
+        solver.show(cancel)?;
         Some(solver)
     }
 
@@ -174,14 +189,21 @@ impl Solver {
         report.epsilon = self.settings.epsilon * fineness;
         self.is_full = false;
         self.adapt_to_direct(fineness, cancel)?;
+        cancel.proceed()?;
         self.pull();
+        cancel.proceed()?;
         self.estimate_mean();
         report.epsilon = self.refine(report.epsilon, cancel)?;
         self.iterate(&mut report, cancel)?;
-        self.leaves = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures);
-        self.step = report.step;
+        let found = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
+        self.leaves = found;
+        cancel.proceed()?;
         self.fill(&mut report);
-        self.show();
+        self.step = report.step;
+        if self.show(cancel).is_none() {
+            self.step -= 1;
+            return None;
+        }
         report.is_final = report.is_full || self.step >= self.settings.max_steps;
         Some(report)
     }

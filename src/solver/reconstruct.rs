@@ -7,7 +7,10 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::closure::{Closure, Closures};
+use super::{
+    Cancel,
+    closure::{Closure, Closures},
+};
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
     transport::{Kernel, Link, LinkStore, self_irradiance},
@@ -30,12 +33,13 @@ pub(super) struct LeafLight {
     pub error: f32,
 }
 
-/// Linked irradiance of all leaves, in the order of the tree.
+/// Linked irradiance of all leaves, in the order of the tree; `None` when cancelled.
 pub(super) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
     closures: &Closures,
-) -> Vec<LeafLight> {
+    cancel: &Cancel,
+) -> Option<Vec<LeafLight>> {
     let hierarchy = kernel.hierarchy;
     let leaf_clusters: Vec<usize> = (0..hierarchy.clusters.len())
         .filter(|&index| hierarchy.clusters[index].is_leaf())
@@ -44,8 +48,11 @@ pub(super) fn gather_leaves(
         .par_iter()
         .with_min_len(8)
         .map(|&cluster| {
-            let chain = chain_above(hierarchy, links, cluster);
             let mut found = Vec::new();
+            if cancel.is_cancelled() {
+                return found;
+            }
+            let chain = chain_above(hierarchy, links, cluster);
             for patch in hierarchy.clusters[cluster].patches() {
                 let first = found.len();
                 gather_patch(kernel, links, &chain, patch, &mut found);
@@ -58,7 +65,8 @@ pub(super) fn gather_leaves(
             found
         })
         .collect();
-    found.into_iter().flatten().collect()
+    cancel.proceed()?;
+    Some(found.into_iter().flatten().collect())
 }
 
 /// Scale the light of the leaves of one cell so that their form factors add to the closure.

@@ -1,6 +1,7 @@
 //! The application: events in, panels and viewport drawn, actions carried out.
 
 mod acting;
+mod dropping;
 mod incoming;
 mod saving;
 mod scenes;
@@ -11,7 +12,7 @@ use std::{
         Arc,
         mpsc::{self, Receiver, Sender},
     },
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use eframe::egui;
@@ -19,16 +20,21 @@ use eframe::egui;
 use super::{
     action::Action,
     bindings::{self, Binding},
-    loader::SceneSource,
     panels,
     saver::{Notice, Unfinished},
     session::Recent,
+    stage::Stage,
     start::{Faults, Options},
     state::State,
     theme,
+    view::ViewSettings,
     viewport::{Viewport, viewport_ui},
 };
-use crate::worker::{Wake, WorkerHandle};
+use crate::worker::{RunOptions, Wake, WorkerHandle};
+
+/// When the next frame is drawn after something arrived. At once would draw two frames, and on a processor that plays
+/// adapter each takes time from the solver.
+const SOON: Duration = Duration::from_millis(1);
 
 /// Where the list of recent files is kept.
 const RECENT_KEY: &str = "recent";
@@ -38,6 +44,7 @@ pub struct App {
     /// What it knows. Public for tests.
     pub state: State,
     worker: WorkerHandle,
+    stage: Stage,
     viewport: Option<Viewport>,
     table: Vec<Binding>,
     wake: Wake,
@@ -68,11 +75,12 @@ impl App {
     ) -> std::io::Result<Self> {
         theme::apply(&cc.egui_ctx);
         let ctx = cc.egui_ctx.clone();
-        let wake: Wake = Arc::new(move || ctx.request_repaint());
+        let wake: Wake = Arc::new(move || ctx.request_repaint_after(SOON));
         let viewport = cc.wgpu_render_state.as_ref().map(|render_state| {
             faults.watch(&render_state.device, wake.clone());
             Viewport::new(render_state)
         });
+        let adapter = viewport.as_ref().map(Viewport::adapter);
         let recent = cc
             .storage
             .and_then(|storage| storage.get_string(RECENT_KEY))
@@ -80,9 +88,12 @@ impl App {
             .unwrap_or_default();
         let state = State {
             settings: options.settings.clone(),
-            options: options.run.clone(),
+            options: RunOptions {
+                gives_way: true,
+                ..options.run.clone()
+            },
             scene_options: options.scene_options,
-            view: options.view.clone(),
+            view: options.view.apply(&ViewSettings::default()),
             recent,
             adapter_name: viewport
                 .as_ref()
@@ -93,6 +104,7 @@ impl App {
         let mut app = Self {
             state,
             worker: WorkerHandle::spawn(wake.clone())?,
+            stage: Stage::spawn(adapter, wake.clone())?,
             viewport,
             table: bindings::bindings(),
             wake,
@@ -139,17 +151,14 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        let mut actions = Vec::new();
+        // What keys ask for shows in this frame already.
         if !ctx.egui_wants_keyboard_input() {
-            actions.extend(ctx.input_mut(|input| bindings::pressed(input, &self.table)));
+            for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
+                self.perform(&ctx, action);
+            }
+            self.want();
         }
-        let dropped = ctx.input(|input| {
-            let files = &input.raw.dropped_files;
-            files.first().map(|file| file.path().to_owned())
-        });
-        if let Some(path) = dropped {
-            actions.push(Action::Load(SceneSource::File(path)));
-        }
+        let mut actions: Vec<Action> = self.take_dropped(&ctx).into_iter().collect();
         let before = self.state.view.clone();
         if self.state.panels.shown {
             egui::Panel::top("menu").show(ui, |ui| {
@@ -180,6 +189,7 @@ impl eframe::App for App {
         panels::scene::path_window(&ctx, &mut self.state, &mut actions);
         panels::picture::picture_window(&ctx, &mut self.state, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
+        dropping::hover_ui(&ctx);
         if self.state.view != before {
             self.follow_light();
             ctx.request_repaint();
@@ -191,6 +201,7 @@ impl eframe::App for App {
         for action in actions {
             self.perform(&ctx, action);
         }
+        self.want();
         self.ask();
     }
 

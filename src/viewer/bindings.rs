@@ -185,7 +185,7 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Escape,
             Solve,
-            "Stop; without a run, select nothing",
+            "Stop reading or computing; else select nothing",
             Action::Stop,
         ),
         command(Key::R, Solve, "Begin again", Action::Reset),
@@ -232,7 +232,8 @@ pub fn bindings() -> Vec<Binding> {
         plain(Key::Questionmark, File, "This sheet", Action::ToggleHelp),
         command(Key::Q, File, "Quit", Action::Quit),
     ];
-    const DIGITS: [Key; 9] = [
+    // In the order of the keyboard.
+    const ROW: [Key; ViewMode::ALL.len()] = [
         Key::Num1,
         Key::Num2,
         Key::Num3,
@@ -242,10 +243,11 @@ pub fn bindings() -> Vec<Binding> {
         Key::Num7,
         Key::Num8,
         Key::Num9,
+        Key::Num0,
+        Key::Minus,
     ];
     all.extend(
-        DIGITS
-            .into_iter()
+        ROW.into_iter()
             .zip(ViewMode::ALL)
             .map(|(key, mode)| alt(key, mode)),
     );
@@ -350,6 +352,8 @@ mod tests {
         assert_eq!(found(Key::Num1, Modifiers::NONE), Some(front));
         let radiance = Action::Mode(ViewMode::Radiance);
         assert_eq!(found(Key::Num1, Modifiers::ALT), Some(radiance));
+        let error = Action::Mode(ViewMode::Error);
+        assert_eq!(found(Key::Minus, Modifiers::ALT), Some(error));
         assert_eq!(
             found(Key::F12, Modifiers::COMMAND),
             Some(Action::Screenshot)

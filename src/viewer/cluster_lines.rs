@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::{
-    clusters,
     render::{BoxInstance, SegmentInstance},
     theme,
     view::{ClusterColor, ClusterOverlay},
@@ -13,15 +12,15 @@ use crate::solver::ClusterBox;
 /// Boxes drawn at most. More are a grey fog and slow on a software adapter.
 pub const MAX_BOXES: usize = 200_000;
 
-/// The boxes of an overlay; empty where it is off.
-pub fn boxes(all: &[ClusterBox], overlay: &ClusterOverlay) -> Vec<BoxInstance> {
+/// The boxes of an overlay that shows these clusters of all; empty where it is off.
+pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> Vec<BoxInstance> {
     if !overlay.shown {
         return Vec::new();
     }
-    let shown: Vec<&ClusterBox> = clusters::shown(all, overlay)
-        .into_iter()
+    let shown: Vec<&ClusterBox> = shown
+        .iter()
         .take(MAX_BOXES)
-        .map(|index| &all[index])
+        .map(|&index| &all[index])
         .collect();
     let [low, high] = color_range(&shown, overlay.color);
     shown
@@ -133,11 +132,12 @@ mod tests {
     #[test]
     fn boxes_are_finite_and_only_there_when_shown() {
         let mut overlay = ClusterOverlay::default();
-        assert!(boxes(&tree(), &overlay).is_empty());
+        let all: Vec<usize> = (0..tree().len()).collect();
+        assert!(boxes(&tree(), &all, &overlay).is_empty());
         overlay.shown = true;
         for color in ClusterColor::ALL {
             overlay.color = color;
-            for instance in boxes(&tree(), &overlay) {
+            for instance in boxes(&tree(), &all, &overlay) {
                 assert!(
                     instance.iter().all(|x| x.is_finite()),
                     "{color:?} {instance:?}"

@@ -7,25 +7,28 @@ use glam::Vec3;
 use super::view::{ClusterCut, ClusterOverlay};
 use crate::solver::ClusterBox;
 
-/// Counts of a tree and of what is shown of it, kept because large trees take milliseconds to count.
-#[derive(Default)]
-pub struct ClusterCounts {
+/// What is shown of a tree, kept because large trees take a while to go through.
+#[derive(Clone, Default)]
+pub struct ShownClusters {
     of: Option<(Arc<Vec<ClusterBox>>, ClusterOverlay)>,
-    /// Deepest level.
-    pub deepest: u32,
-    /// Boxes that are shown.
-    pub shown: usize,
+    /// Deepest level of the tree; nothing before the first tree.
+    pub deepest: Option<u32>,
+    /// The clusters whose boxes are shown when they are.
+    pub shown: Arc<Vec<usize>>,
 }
 
-impl ClusterCounts {
-    /// Count again if the tree or what is shown of it is another.
+impl ShownClusters {
+    /// Choose again if the tree or what is to be shown of it is another.
     pub fn update(&mut self, clusters: &Arc<Vec<ClusterBox>>, overlay: &ClusterOverlay) {
         let is_current = |(held, counted): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
             Arc::ptr_eq(held, clusters) && counted.has_same_boxes(overlay)
         };
         if !self.of.as_ref().is_some_and(is_current) {
-            self.deepest = deepest_level(clusters);
-            self.shown = shown(clusters, overlay).len();
+            let is_same_tree = |(held, _): &(Arc<_>, _)| Arc::ptr_eq(held, clusters);
+            if !self.of.as_ref().is_some_and(is_same_tree) {
+                self.deepest = Some(deepest_level(clusters));
+            }
+            self.shown = Arc::new(shown(clusters, overlay));
             self.of = Some((clusters.clone(), *overlay));
         }
     }
@@ -116,15 +119,18 @@ pub fn path_to(clusters: &[ClusterBox], index: usize) -> Vec<usize> {
 }
 
 /// The smallest cluster of those shown whose box holds a point.
-pub fn containing(clusters: &[ClusterBox], point: Vec3, overlay: &ClusterOverlay) -> Option<usize> {
+pub fn containing(clusters: &[ClusterBox], shown: &[usize], point: Vec3) -> Option<usize> {
     // Coordinates of a picked point are rounded; boxes of walls are flat.
     let slack = Vec3::splat(2e-2);
     let volume = |index: &usize| {
         let size = clusters[*index].max - clusters[*index].min + slack;
         size.x * size.y * size.z
     };
-    shown(clusters, overlay)
-        .into_iter()
+    shown
+        .iter()
+        .copied()
+        // What is shown may still be of the tree before.
+        .filter(|&index| index < clusters.len())
         .filter(|&index| {
             let cluster = &clusters[index];
             point.cmpge(cluster.min - slack).all() && point.cmple(cluster.max + slack).all()
@@ -224,8 +230,9 @@ pub(super) mod tests {
     #[test]
     fn a_point_is_found_in_its_leaf() {
         let point = Vec3::new(6.0, 6.0, 1.0);
-        let leaves = overlay(ClusterCut::Level, 2, 1.0);
-        assert_eq!(containing(&tree(), point, &leaves), Some(4));
-        assert_eq!(containing(&tree(), Vec3::splat(50.0), &leaves), None);
+        let leaves = at_level(&tree(), 2);
+        assert_eq!(containing(&tree(), &leaves, point), Some(4));
+        assert_eq!(containing(&tree(), &leaves, Vec3::splat(50.0)), None);
+        assert_eq!(containing(&tree()[..2], &leaves, point), None);
     }
 }

@@ -24,6 +24,7 @@ pub mod pick;
 pub mod render;
 pub mod saver;
 pub mod session;
+pub mod stage;
 pub mod start;
 pub mod state;
 pub mod theme;

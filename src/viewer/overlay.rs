@@ -109,6 +109,43 @@ impl ClusterOverlay {
     }
 }
 
+/// Cluster boxes to be shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ClusterRequest {
+    /// Those of a level.
+    Level(u32),
+    /// The largest that are no larger than this part of the scene.
+    Size(f32),
+    /// Those that send or receive over a link.
+    Used,
+}
+
+impl ClusterRequest {
+    /// An overlay that shows them.
+    pub fn apply(self, overlay: ClusterOverlay) -> ClusterOverlay {
+        let shown = ClusterOverlay {
+            shown: true,
+            ..overlay
+        };
+        match self {
+            Self::Level(level) => ClusterOverlay {
+                cut: ClusterCut::Level,
+                level,
+                ..shown
+            },
+            Self::Size(size) => ClusterOverlay {
+                cut: ClusterCut::Size,
+                size,
+                ..shown
+            },
+            Self::Used => ClusterOverlay {
+                cut: ClusterCut::Used,
+                ..shown
+            },
+        }
+    }
+}
+
 impl Default for ClusterOverlay {
     fn default() -> Self {
         Self {

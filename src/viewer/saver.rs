@@ -9,7 +9,10 @@ use std::{
 
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
 
-use super::state::Severity;
+use super::{
+    render::{Gpu, ReadError, Target},
+    state::Severity,
+};
 use crate::{scene::write_whole, worker::Wake};
 
 /// A sentence from another thread.
@@ -36,14 +39,44 @@ impl Unfinished {
     }
 }
 
+/// A picture that the adapter is drawing.
+pub struct Drawn {
+    /// Where it is drawn.
+    pub target: Target,
+    /// By what.
+    pub gpu: Gpu,
+    /// What its radiance was multiplied by.
+    pub exposure_factor: f32,
+}
+
+/// Where a picture comes from.
+pub enum Shot {
+    /// The adapter, once it is done.
+    Drawn(Box<Drawn>),
+    /// The window.
+    Seen(RgbaImage),
+}
+
+impl Shot {
+    /// Wait for the picture: display colours, and linear radiance where there is any.
+    fn read(self) -> Result<(RgbaImage, Option<Rgb32FImage>), EncodeError> {
+        match self {
+            Self::Seen(display) => Ok((display, None)),
+            Self::Drawn(drawn) => {
+                let display = drawn.target.read_display(&drawn.gpu)?;
+                let radiance = drawn.target.read_linear(&drawn.gpu, drawn.exposure_factor);
+                Ok((display, radiance.ok()))
+            }
+        }
+    }
+}
+
 /// A picture on its way to a file.
 pub struct Saving {
     /// Where to; `.exr` takes the radiance.
     pub path: PathBuf,
-    /// Display colours.
-    pub display: RgbaImage,
-    /// Linear radiance.
-    pub radiance: Option<Rgb32FImage>,
+    /// Where from.
+    pub shot: Shot,
 }
 
 impl Saving {
@@ -67,10 +100,7 @@ impl Saving {
     }
 
     fn write(self) -> Notice {
-        let saved = encode(self.display, self.radiance, &self.path).and_then(|bytes| {
-            write_whole(&self.path, |out| out.write_all(&bytes)).map_err(EncodeError::Write)
-        });
-        match saved {
+        match self.shot.read().and_then(|shot| save(shot, &self.path)) {
             Ok(()) => {
                 let place = std::path::absolute(&self.path).unwrap_or(self.path);
                 (Severity::Note, format!("saved {}", place.display()))
@@ -83,9 +113,20 @@ impl Saving {
     }
 }
 
+fn save(
+    (display, radiance): (RgbaImage, Option<Rgb32FImage>),
+    path: &Path,
+) -> Result<(), EncodeError> {
+    let bytes = encode(display, radiance, path)?;
+    write_whole(path, |out| out.write_all(&bytes)).map_err(EncodeError::Write)
+}
+
 /// Why a picture does not become a file.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
+    /// It did not come back from the adapter.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// Radiance is asked for, and there is none.
     #[error("this graphics adapter draws no linear pictures; save a PNG instead")]
     NoRadiance,

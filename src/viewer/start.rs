@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     app::App, camera::Camera, fonts::SystemFonts, loader::SceneSource, render::Gpu,
-    view::ViewSettings,
+    view::ViewRequest,
 };
 use crate::{
     scene::{Frame, SceneOptions},
@@ -27,12 +27,12 @@ pub struct Options {
     pub scene_options: SceneOptions,
     /// What is computed.
     pub settings: SolveSettings,
+    /// Whether these settings go before those saved beside the scene.
+    pub settings_are_asked_for: bool,
     /// Limits of the run.
     pub run: RunOptions,
     /// How it is shown.
-    pub view: ViewSettings,
-    /// Exposure in EV instead of the automatic one.
-    pub exposure: Option<f32>,
+    pub view: ViewRequest,
     /// From where.
     pub camera: CameraRequest,
 }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use super::{
     camera::CameraRig,
-    clusters::{self, ClusterCounts},
+    clusters::ShownClusters,
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
+    stage::Staged,
     truth::Truth,
     view::ViewSettings,
 };
@@ -29,8 +30,12 @@ pub enum RunStatus {
     Preparing,
     /// Light is being computed.
     Running,
+    /// It was asked to rest.
+    Pausing,
     /// It rests until continued.
     Paused,
+    /// It was asked to end.
+    Stopping,
     /// It ended.
     Finished(StopReason),
     /// The solver failed with this message.
@@ -46,7 +51,7 @@ impl RunStatus {
     /// Whether there is something to go on with.
     pub fn can_continue(&self) -> bool {
         match self {
-            Self::Paused => true,
+            Self::Pausing | Self::Paused | Self::Stopping => true,
             Self::Finished(reason) => reason.can_continue(),
             _ => false,
         }
@@ -58,7 +63,9 @@ impl RunStatus {
             Self::Idle => "No scene".to_owned(),
             Self::Preparing => "Preparing".to_owned(),
             Self::Running => "Computing light".to_owned(),
+            Self::Pausing => "Pausing".to_owned(),
             Self::Paused => "Paused".to_owned(),
+            Self::Stopping => "Stopping".to_owned(),
             Self::Finished(reason) => match reason {
                 StopReason::Converged => "Done".to_owned(),
                 StopReason::StepLimit => "Done: step limit reached".to_owned(),
@@ -181,9 +188,7 @@ fn sentence(text: String) -> String {
 pub struct Selection {
     /// The point.
     pub pick: Pick,
-    /// The snapshot that the figures are of.
-    pub of: Option<Arc<Snapshot>>,
-    /// Light at the point.
+    /// Light at the point, once it was looked up.
     pub probe: Option<Probe>,
     /// Light over the object.
     pub object_light: ObjectLight,
@@ -194,8 +199,12 @@ pub struct Selection {
 /// What the panels hold open and half typed.
 #[derive(Clone, Debug)]
 pub struct PanelState {
-    /// Whether the side panels are shown.
+    /// Whether anything but the scene is shown.
     pub shown: bool,
+    /// Whether the panel of the run and its settings is shown beside the scene.
+    pub light: bool,
+    /// Whether the panel of what is looked into is shown beside the scene.
+    pub look: bool,
     /// Whether the key sheet is open.
     pub help: bool,
     /// Whether the dialog for pictures is open.
@@ -218,6 +227,8 @@ impl Default for PanelState {
     fn default() -> Self {
         Self {
             shown: true,
+            light: true,
+            look: true,
             help: false,
             picture: false,
             path: false,
@@ -255,8 +266,10 @@ pub struct State {
     pub selection: Option<Selection>,
     /// The selected cluster.
     pub cluster: Option<usize>,
-    /// Counts of the cluster tree at the level that is shown.
-    pub cluster_counts: ClusterCounts,
+    /// What is shown of the cluster tree.
+    pub shown_clusters: ShownClusters,
+    /// What is ready to be drawn.
+    pub staged: Option<Arc<Staged>>,
     /// What the solver knows of what is selected.
     pub inspections: Inspections,
     /// What frames cost.
@@ -293,9 +306,7 @@ impl State {
     /// A cluster was guessed from boxes around the picked point; once the solver has said which ones really hold it, take
     /// the one of those.
     pub fn correct_cluster(&mut self) {
-        let (Some(index), Some(inspection), Some(snapshot)) =
-            (self.cluster, self.inspections.element(), &self.run.snapshot)
-        else {
+        let (Some(index), Some(inspection)) = (self.cluster, self.inspections.element()) else {
             return;
         };
         let over = |at: &usize| {
@@ -303,8 +314,8 @@ impl State {
             path.any(|node| node == *at)
         };
         if !over(&index) {
-            let shown = clusters::shown(&snapshot.clusters, &self.view.clusters);
-            self.cluster = shown.into_iter().rfind(over).or(self.cluster);
+            let mut shown = self.shown_clusters.shown.iter().copied();
+            self.cluster = shown.rfind(over).or(self.cluster);
         }
     }
 

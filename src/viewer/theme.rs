@@ -97,6 +97,8 @@ pub fn apply(ctx: &egui::Context) {
         style.spacing.slider_width = 120.0;
         style.spacing.interact_size.y = 22.0;
         style.spacing.indent = 14.0;
+        // Scroll bars float; what they float over would be cut off.
+        style.spacing.scroll.floating_allocated_width = 6.0;
         style.visuals.striped = false;
         style.visuals.weak_text_color = Some(secondary_text(&style.visuals));
         let text = if style.visuals.dark_mode { 212 } else { 30 };

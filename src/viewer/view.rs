@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 pub use super::overlay::{
-    ClusterColor, ClusterCut, ClusterOverlay, LinkColor, LinkEnd, LinkOverlay,
+    ClusterColor, ClusterCut, ClusterOverlay, ClusterRequest, LinkColor, LinkEnd, LinkOverlay,
 };
 
 /// What the surfaces show.
@@ -241,6 +241,47 @@ impl ViewSettings {
         self.exposure
             .clamp(*Self::EXPOSURE_RANGE.start(), *Self::EXPOSURE_RANGE.end())
             .exp2()
+    }
+}
+
+/// How the light is to be shown, as far as it was asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewRequest {
+    /// What the surfaces show.
+    pub mode: Option<ViewMode>,
+    /// What all emission is multiplied by.
+    pub emission_scale: Option<f32>,
+    /// Exposure in EV, instead of the automatic one.
+    pub exposure: Option<f32>,
+    /// Tone map.
+    pub tone_map: Option<ToneMap>,
+    /// Whether logarithmic false colours were asked for.
+    pub logarithmic: bool,
+    /// Range of the false colours.
+    pub fixed_range: Option<[f32; 2]>,
+    /// Whether edges were asked for.
+    pub edges: bool,
+    /// Which cluster boxes.
+    pub clusters: Option<ClusterRequest>,
+}
+
+impl ViewRequest {
+    /// A view with what was asked for put in.
+    pub fn apply(&self, view: &ViewSettings) -> ViewSettings {
+        ViewSettings {
+            mode: self.mode.unwrap_or(view.mode),
+            emission_scale: self.emission_scale.unwrap_or(view.emission_scale),
+            exposure: self.exposure.unwrap_or(view.exposure),
+            auto_exposure: view.auto_exposure && self.exposure.is_none(),
+            tone_map: self.tone_map.unwrap_or(view.tone_map),
+            logarithmic: view.logarithmic || self.logarithmic,
+            fixed_range: self.fixed_range.or(view.fixed_range),
+            edges: view.edges || self.edges,
+            clusters: self
+                .clusters
+                .map_or(view.clusters, |asked| asked.apply(view.clusters)),
+            ..view.clone()
+        }
     }
 }
 

@@ -13,14 +13,12 @@ use super::{
     line_cache::LineCache,
     navigation,
     pick::Pick,
-    render::{Gpu, Overlay, Picture, RenderError, Renderer, Target},
+    render::{Gpu, Overlay, Picture, RenderError, Renderer, SegmentInstance, Target, Uploads},
+    saver::Drawn,
+    stage::Staged,
     state::{Severity, State},
     theme,
-    view::{ViewMode, ViewSettings},
-};
-use crate::{
-    scene::Scene,
-    solver::{DisplayMesh, VertexLight},
+    view::ViewSettings,
 };
 
 /// The adapter's half of the pane.
@@ -36,31 +34,20 @@ pub struct Viewport {
 /// Everything that a picture depends on. Arcs are held, so that an address is not used twice.
 #[derive(Clone)]
 struct PictureKey {
-    scene: Arc<Scene>,
-    mesh: Arc<DisplayMesh>,
-    light: Arc<VertexLight>,
-    errors: Option<Arc<Vec<f32>>>,
-    overlay: Overlay,
+    staged: Arc<Staged>,
+    segments: Arc<Vec<SegmentInstance>>,
     camera: Camera,
     view: ViewSettings,
-    is_unlit: bool,
-    range: [f32; 2],
     size: [u32; 2],
     background: Vec3,
 }
 
 impl PartialEq for PictureKey {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.scene, &other.scene)
-            && Arc::ptr_eq(&self.mesh, &other.mesh)
-            && Arc::ptr_eq(&self.light, &other.light)
-            && self.errors.as_ref().map(Arc::as_ptr) == other.errors.as_ref().map(Arc::as_ptr)
-            && Arc::ptr_eq(&self.overlay.boxes, &other.overlay.boxes)
-            && Arc::ptr_eq(&self.overlay.segments, &other.overlay.segments)
+        Arc::ptr_eq(&self.staged, &other.staged)
+            && Arc::ptr_eq(&self.segments, &other.segments)
             && self.camera == other.camera
             && self.view == other.view
-            && self.is_unlit == other.is_unlit
-            && self.range == other.range
             && self.size == other.size
             && self.background == other.background
     }
@@ -81,6 +68,11 @@ impl Viewport {
             drawn: None,
             lines: LineCache::default(),
         }
+    }
+
+    /// What uploads to the adapter need.
+    pub fn adapter(&self) -> (Gpu, Uploads) {
+        (self.renderer.gpu().clone(), self.renderer.uploads())
     }
 
     /// The adapter's name, for people.
@@ -105,27 +97,21 @@ impl Viewport {
             }
         };
         if self.drawn.as_ref() != Some(&key)
-            && let Some((target, _)) = &self.target
+            && let Some((target, id)) = self.target.take()
         {
-            let picture = picture(&key, pixels_per_point);
-            if let Err(error) = self.renderer.render(target, &picture) {
-                state.messages.push(Severity::Error, error.to_string());
-            }
+            self.draw(&key, &target, pixels_per_point);
+            self.target = Some((target, id));
             self.drawn = Some(key);
         }
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(texture, rect, whole, Color32::WHITE);
     }
 
-    /// A picture of what is shown, at another size.
+    /// Begin a picture of what is shown, at another size.
     ///
     /// # Errors
     /// One sentence for people.
-    pub fn picture(
-        &mut self,
-        state: &State,
-        size: [u32; 2],
-    ) -> Result<(image::RgbaImage, Option<image::Rgb32FImage>), String> {
+    pub fn picture(&mut self, state: &State, size: [u32; 2]) -> Result<Drawn, String> {
         let background = Vec3::splat(theme::PICTURE_BACKGROUND);
         let key = self
             .key(state, size, background)
@@ -134,35 +120,56 @@ impl Viewport {
         let target = Target::new(&gpu, size).map_err(|error| error.to_string())?;
         // Lines as wide, in the picture, as they are in the window.
         let pixels_per_point = size[1] as f32 / 800.0;
-        self.renderer
-            .render(&target, &picture(&key, pixels_per_point))
-            .map_err(|error| error.to_string())?;
-        let display = target
-            .read_display(&gpu)
-            .map_err(|error| error.to_string())?;
-        let radiance = target.read_linear(&gpu, key.view.exposure_factor()).ok();
-        Ok((display, radiance))
+        self.draw(&key, &target, pixels_per_point);
+        Ok(Drawn {
+            target,
+            gpu,
+            exposure_factor: key.view.exposure_factor(),
+        })
     }
 
     fn key(&mut self, state: &State, size: [u32; 2], background: Vec3) -> Option<PictureKey> {
-        let loaded = state.loaded.as_ref()?;
-        let snapshot = state.run.snapshot.as_ref()?;
-        let overlay = self.lines.overlay(state, &snapshot.clusters).clone();
+        let staged = state.staged.as_ref()?;
+        let snapshot = &staged.wanted.snapshot;
+        let segments = self.lines.segments(state, &snapshot.clusters).clone();
         Some(PictureKey {
-            scene: loaded.scene.clone(),
-            mesh: snapshot.mesh.clone(),
-            light: snapshot.light.clone(),
-            errors: (state.view.mode == ViewMode::Error)
-                .then(|| state.truth.vertex_errors(snapshot).cloned())
-                .flatten(),
-            overlay,
+            staged: staged.clone(),
+            segments,
             camera: state.rig.current,
-            view: state.view.clone(),
-            is_unlit: !snapshot.is_lit(),
-            range: state.false_color_range,
+            view: ViewSettings {
+                // Another mode shows once its light is on the adapter.
+                mode: staged.wanted.mode,
+                ..state.view.clone()
+            },
             size,
             background,
         })
+    }
+
+    /// Draw a picture into a target.
+    fn draw(&mut self, key: &PictureKey, target: &Target, pixels_per_point: f32) {
+        let Some(uploads) = &key.staged.uploads else {
+            return;
+        };
+        let wanted = &key.staged.wanted;
+        let overlay = Overlay {
+            boxes: Arc::default(),
+            segments: key.segments.clone(),
+        };
+        let picture = Picture {
+            scene: &wanted.scene,
+            mesh: &wanted.snapshot.mesh,
+            light: &wanted.snapshot.light,
+            errors: wanted.errors.as_ref(),
+            camera: &key.camera,
+            view: &key.view,
+            is_unlit: !key.staged.is_lit,
+            range: wanted.range,
+            overlay: &overlay,
+            background: key.background,
+            pixels_per_point,
+        };
+        self.renderer.draw(target, &picture, uploads);
     }
 
     /// The texture of a target of a size.
@@ -191,22 +198,6 @@ impl Viewport {
         self.target = Some((target, id));
         self.drawn = None;
         Ok(id)
-    }
-}
-
-fn picture(key: &PictureKey, pixels_per_point: f32) -> Picture<'_> {
-    Picture {
-        scene: &key.scene,
-        mesh: &key.mesh,
-        light: &key.light,
-        errors: key.errors.as_ref(),
-        camera: &key.camera,
-        view: &key.view,
-        is_unlit: key.is_unlit,
-        range: key.range,
-        overlay: &key.overlay,
-        background: key.background,
-        pixels_per_point,
     }
 }
 

@@ -2,34 +2,98 @@
 //!
 //! The solve is either at home (in [`Run::stepper`]) or away in the pool, never both, so that nothing is shared and
 //! nothing is locked. A command that comes while it is away cancels the step and is carried out on its return; a
-//! question waits for the return.
+//! question waits for the return. A solve that nobody wants any more is waited for a moment only: then it is left
+//! behind with its threads, and a new run gets new ones.
 
 use std::{
     sync::{
         Arc,
         mpsc::{Receiver, Sender},
     },
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use super::{
-    Effect, Event, Generation, MakeStepper, RunOptions, StopReason,
-    message::{Command, Message},
+    Effect, Event, Generation, MakeStepper, StopReason,
+    message::{Command, Message, Start},
     outbox::Outbox,
+    priority::give_way,
     run::{Aim, Run},
     visit::{Outcome, Returned},
 };
-use crate::{
-    scene::Scene,
-    solver::{Cancel, SolveSettings},
-};
+use crate::solver::{Cancel, SolveSettings};
 
-/// The solver threads, kept while their number stays.
+/// How long a cancelled solve that nobody wants any more is waited for. Shorter, and two solves share the cores for no
+/// reason; longer, and the next scene begins noticeably late.
+const GRACE: Duration = Duration::from_millis(60);
+
+/// Solves left behind at once. More, and memory and cores are spent on what nobody sees: the next run then waits.
+const MOST_LEFT: usize = 2;
+
+/// Solver threads, kept while their number stays.
 struct Pool {
     threads: usize,
     pool: ThreadPool,
+}
+
+/// The solver threads: those that share the cores, and those that give way. Idle ones cost nothing.
+#[derive(Default)]
+struct Pools {
+    sharing: Option<Pool>,
+    giving_way: Option<Pool>,
+}
+
+impl Pools {
+    /// The pool of that many threads, made anew only when the number changes.
+    fn pool_of(
+        &mut self,
+        threads: usize,
+        gives_way: bool,
+    ) -> Result<&ThreadPool, ThreadPoolBuildError> {
+        let held = if gives_way {
+            &mut self.giving_way
+        } else {
+            &mut self.sharing
+        };
+        let fitting = held.take().filter(|held| held.threads == threads);
+        let pool = match fitting {
+            Some(pool) => pool,
+            None => Pool {
+                threads,
+                pool: ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .thread_name(|index| format!("solver-{index}"))
+                    .start_handler(move |_| {
+                        if gives_way {
+                            give_way();
+                        }
+                    })
+                    .build()?,
+            },
+        };
+        Ok(&held.insert(pool).pool)
+    }
+
+    /// Any of them.
+    fn any(&self) -> Option<&ThreadPool> {
+        let held = self.giving_way.as_ref().or(self.sharing.as_ref());
+        held.map(|held| &held.pool)
+    }
+}
+
+/// A solve in the pool.
+struct Away {
+    /// The run that it belongs to.
+    generation: Generation,
+    cancel: Cancel,
+    /// Whether it is being prepared.
+    prepares: bool,
+    /// When its run was replaced by another.
+    unwanted_since: Option<Instant>,
+    /// Raised when nobody waits for it any more.
+    left: Cancel,
 }
 
 /// The state of the worker thread.
@@ -38,12 +102,12 @@ pub(super) struct Controller {
     inbox: Sender<Message>,
     outbox: Outbox,
     make: MakeStepper,
-    pool: Option<Pool>,
+    pools: Pools,
     run: Option<Run>,
-    /// Set while a solve is away in the pool, even one of an older run.
-    away: Option<Cancel>,
-    /// Whether what is away is being prepared.
-    prepares: bool,
+    /// The solve in the pool, even one of an older run.
+    away: Option<Away>,
+    /// How many solves were left behind and have not ended.
+    left_count: usize,
 }
 
 impl Controller {
@@ -59,14 +123,14 @@ impl Controller {
             inbox,
             outbox,
             make,
-            pool: None,
+            pools: Pools::default(),
             run: None,
             away: None,
-            prepares: false,
+            left_count: 0,
         }
     }
 
-    /// Serve until told to shut down, then wait for the solve to come home.
+    /// Serve until told to shut down, then wait a moment for the solve to come home.
     pub(super) fn run(mut self) {
         loop {
             self.dispatch();
@@ -74,25 +138,61 @@ impl Controller {
                 Some(Message::Command(Command::Shutdown)) => break,
                 Some(Message::Command(command)) => self.obey(command),
                 Some(Message::Returned(returned)) => self.welcome(returned),
-                None => self.aim_at(Aim::End(StopReason::TimeLimit)),
+                None => self.note_time(),
             }
         }
         self.cancel_step();
-        while self.away.is_some() {
-            if let Ok(Message::Returned(_)) = self.messages.recv() {
-                self.away = None;
+        self.run = None;
+        let end = Instant::now() + GRACE;
+        while let Some(away) = &self.away {
+            let left = end.saturating_duration_since(Instant::now());
+            match self.messages.recv_timeout(left) {
+                Ok(Message::Returned(returned)) if returned.generation == away.generation => {
+                    self.away = None;
+                }
+                Ok(_) => {}
+                Err(_) => self.leave_behind(),
             }
         }
     }
 
-    /// The next message, or `None` when the time limit passes first.
+    /// The next message, or `None` when the time limit, or patience with a solve of an older run, ends first.
     fn wait(&self) -> Option<Message> {
-        let Some(deadline) = self.run.as_ref().and_then(Run::deadline) else {
+        let limit = self.run.as_ref().and_then(Run::deadline);
+        let Some(deadline) = limit.into_iter().chain(self.patience_ends()).min() else {
             // This struct holds a sender, so the channel cannot close.
             return self.messages.recv().ok();
         };
         let left = deadline.saturating_duration_since(Instant::now());
         self.messages.recv_timeout(left).ok()
+    }
+
+    /// A deadline passed: see which.
+    fn note_time(&mut self) {
+        let has_passed =
+            |deadline: Option<Instant>| deadline.is_some_and(|at| at <= Instant::now());
+        if has_passed(self.patience_ends()) {
+            self.leave_behind();
+        }
+        if has_passed(self.run.as_ref().and_then(Run::deadline)) {
+            self.aim_at(Aim::End(StopReason::TimeLimit));
+        }
+    }
+
+    /// When a solve of an older run is no longer waited for.
+    fn patience_ends(&self) -> Option<Instant> {
+        let away = self.away.as_ref()?;
+        (self.left_count < MOST_LEFT).then_some(())?;
+        Some(away.unwanted_since? + GRACE)
+    }
+
+    /// Wait for the solve in the pool no longer; it has been cancelled, and ends there with its threads.
+    fn leave_behind(&mut self) {
+        if let Some(away) = self.away.take() {
+            away.left.cancel();
+            self.left_count += 1;
+            self.pools = Pools::default();
+        }
     }
 
     /// Send the solve to the pool if it is at home and there is a question, or it is meant to run.
@@ -103,7 +203,8 @@ impl Controller {
         let Some(run) = self.run.as_mut().filter(|run| run.wants_visit()) else {
             return;
         };
-        let pool = match pool_of(&mut self.pool, run.options.threads) {
+        let gives_way = run.options.gives_way && run.stepper.is_some();
+        let pool = match self.pools.pool_of(run.options.threads, gives_way) {
             Ok(pool) => pool,
             Err(error) => {
                 run.turn_to(Aim::Failed);
@@ -112,26 +213,40 @@ impl Controller {
                 return;
             }
         };
-        let cancel = Cancel::default();
-        self.away = Some(cancel.clone());
-        self.prepares = run.stepper.is_none();
+        let (cancel, left) = (Cancel::default(), Cancel::default());
+        self.away = Some(Away {
+            generation: run.generation,
+            cancel: cancel.clone(),
+            prepares: run.stepper.is_none(),
+            unwanted_since: None,
+            left: left.clone(),
+        });
         let visit = run.visit(&self.make, cancel);
         let inbox = self.inbox.clone();
         pool.spawn(move || {
+            let mut returned = visit.pay();
+            if left.is_cancelled() {
+                returned.trip = Ok(None);
+            }
             // Nobody waits once the worker has ended.
-            let _ = inbox.send(Message::Returned(visit.pay()));
+            let _ = inbox.send(Message::Returned(returned));
         });
     }
 
     /// Take the solve back from the pool and say what it brought.
     fn welcome(&mut self, returned: Returned) {
+        let is_expected = |away: &Away| away.generation == returned.generation;
+        if !self.away.as_ref().is_some_and(is_expected) {
+            self.left_count = self.left_count.saturating_sub(1);
+            return;
+        }
         self.away = None;
-        self.prepares = false;
         let Some(run) = self
             .run
             .as_mut()
             .filter(|run| run.generation == returned.generation)
         else {
+            self.drop_in_pool(returned);
             return;
         };
         let generation = run.generation;
@@ -177,18 +292,19 @@ impl Controller {
 
     fn obey(&mut self, command: Command) {
         match command {
-            Command::Start {
-                generation,
-                scene,
-                settings,
-                options,
-            } => self.start(generation, scene, settings, options),
+            Command::Start(start) => self.start(start),
             Command::Restart {
                 generation,
                 settings,
             } => {
-                if let Some(run) = self.run.take() {
-                    self.start(generation, run.scene, settings, run.options);
+                if let Some(run) = &self.run {
+                    self.start(Start {
+                        generation,
+                        scene: run.scene.clone(),
+                        rays: run.rays.clone(),
+                        settings,
+                        options: run.options.clone(),
+                    });
                 }
             }
             Command::Pause => {
@@ -225,16 +341,24 @@ impl Controller {
         }
     }
 
-    fn start(
-        &mut self,
-        generation: Generation,
-        scene: Arc<Scene>,
-        settings: SolveSettings,
-        options: RunOptions,
-    ) {
+    fn start(&mut self, start: Start) {
+        let generation = start.generation;
         self.cancel_step();
-        self.run = Some(Run::new(generation, scene, settings, options));
+        if let Some(away) = &mut self.away {
+            away.unwanted_since.get_or_insert_with(Instant::now);
+        }
+        if let Some(old) = self.run.replace(Run::new(start)) {
+            self.drop_in_pool(old);
+        }
         self.outbox.send(generation, Event::Started);
+    }
+
+    /// Let go of something large where it keeps no command waiting.
+    fn drop_in_pool(&self, large: impl Send + 'static) {
+        match self.pools.any() {
+            Some(pool) => pool.spawn(move || drop(large)),
+            None => drop(large),
+        }
     }
 
     fn change_settings(&mut self, settings: SolveSettings, effect: Effect) {
@@ -261,9 +385,9 @@ impl Controller {
             }
             run.turn_to(aim);
         }
-        // A run that ends keeps what it has: without the first picture that would be nothing.
-        let keeps_nothing = self.prepares && matches!(aim, Aim::End(_));
-        if !keeps_nothing {
+        // A run that reaches a limit keeps what it has: without the first picture that would be nothing.
+        let prepares = self.away.as_ref().is_some_and(|away| away.prepares);
+        if !(prepares && aim == Aim::End(StopReason::TimeLimit)) {
             self.cancel_step();
         }
         if self.away.is_none() {
@@ -292,24 +416,8 @@ impl Controller {
     }
 
     fn cancel_step(&self) {
-        if let Some(cancel) = &self.away {
-            cancel.cancel();
+        if let Some(away) = &self.away {
+            away.cancel.cancel();
         }
     }
-}
-
-/// The pool of that many threads, made anew only when the number changes.
-fn pool_of(held: &mut Option<Pool>, threads: usize) -> Result<&ThreadPool, ThreadPoolBuildError> {
-    let fitting = held.take().filter(|held| held.threads == threads);
-    let pool = match fitting {
-        Some(pool) => pool,
-        None => Pool {
-            threads,
-            pool: ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .thread_name(|index| format!("solver-{index}"))
-                .build()?,
-        },
-    };
-    Ok(&held.insert(pool).pool)
 }

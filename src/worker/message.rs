@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::{Effect, visit::Returned};
 use crate::{
+    geometry::RayTree,
     scene::Scene,
     solver::{Inspection, SolveSettings, StepReport, Subject},
 };
@@ -35,6 +36,9 @@ pub struct RunOptions {
     pub time_limit: Option<Duration>,
     /// Bytes that the solver may hold.
     pub memory_limit: Option<u64>,
+    /// Whether steps wait for other threads of the program where cores are few. The preparation does not: until it is
+    /// done there is nothing to look at.
+    pub gives_way: bool,
 }
 
 /// Why a run ended.
@@ -89,19 +93,24 @@ pub enum Event {
     Failed(String),
 }
 
+/// A run to begin.
+pub(super) struct Start {
+    /// The new run.
+    pub generation: Generation,
+    /// What to light.
+    pub scene: Arc<Scene>,
+    /// Its ray tree, where there is one already.
+    pub rays: Option<Arc<RayTree>>,
+    /// What to compute.
+    pub settings: SolveSettings,
+    /// How to run.
+    pub options: RunOptions,
+}
+
 /// What the owner asks of the worker.
 pub(super) enum Command {
     /// Light a scene from the beginning.
-    Start {
-        /// The new run.
-        generation: Generation,
-        /// What to light.
-        scene: Arc<Scene>,
-        /// What to compute.
-        settings: SolveSettings,
-        /// How to run.
-        options: RunOptions,
-    },
+    Start(Start),
     /// Light the same scene from the beginning.
     Restart {
         /// The new run.

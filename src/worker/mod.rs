@@ -3,12 +3,15 @@
 //! [`WorkerHandle`] owns a named thread that only waits, so that every command is answered at once. It hands the solve
 //! back and forth between itself and a pool of solver threads, one step at a time; dropping the handle cancels the step
 //! under way and joins. Every run has a [`Generation`]; the handle shows nothing of an older one.
+//! Nothing waits long for a solve that has been cancelled: what has not come home a moment later is left behind, with
+//! its threads, and ends there by itself.
 //! The window and the headless commands drain the same handle; neither needs to know how a step is made.
 
 mod controller;
 mod effect;
 mod message;
 mod outbox;
+mod priority;
 mod run;
 mod slot;
 mod stepper;
@@ -32,11 +35,12 @@ pub use stepper::{Job, MakeStepper, Stepper};
 pub use truth::{MeasuredStep, SAMPLE_GOAL, TruthHandle, TruthProgress, VertexErrors};
 
 use crate::{
+    geometry::RayTree,
     scene::Scene,
-    solver::{Cancel, Snapshot, SolveSettings, Solver, Subject},
+    solver::{Cancel, Snapshot, SolveSettings, Subject},
 };
 use controller::Controller;
-use message::{Command, Message};
+use message::{Command, Message, Start};
 use outbox::Outbox;
 
 /// Called from the worker whenever there is something new to see, such as a request to repaint.
@@ -48,7 +52,8 @@ pub type Watch = Arc<dyn Fn(Generation, &Arc<Snapshot>) + Send + Sync>;
 /// Where owner and worker keep the one who watches.
 type WatchCell = Arc<Mutex<Option<Watch>>>;
 
-/// The owner's end of the worker. Dropping it cancels the step under way and joins the thread.
+/// The owner's end of the worker. Dropping it cancels the step under way and joins the thread, which waits for the step
+/// a moment only.
 pub struct WorkerHandle {
     inbox: Sender<Message>,
     events: Receiver<(Generation, Event)>,
@@ -60,17 +65,14 @@ pub struct WorkerHandle {
 }
 
 impl WorkerHandle {
-    /// A worker without a run, which lights scenes with the [`Solver`].
+    /// A worker without a run, which lights scenes with the [`Solver`](crate::solver::Solver).
     ///
     /// # Errors
     /// When the system refuses a thread.
     pub fn spawn(wake: Wake) -> io::Result<Self> {
         Self::with_steppers(
             wake,
-            Arc::new(|job: Job, cancel: &Cancel| {
-                let solver = Solver::new(job.scene, job.settings, job.memory_limit, cancel)?;
-                Some(Box::new(solver) as _)
-            }),
+            Arc::new(|job: Job, cancel: &Cancel| Some(Box::new(job.solver(cancel)?) as _)),
         )
     }
 
@@ -106,14 +108,36 @@ impl WorkerHandle {
         settings: SolveSettings,
         options: RunOptions,
     ) -> Generation {
+        self.begin(scene, None, settings, options)
+    }
+
+    /// As [`Self::start`], with the scene's ray tree, which takes long to build where the scene is large.
+    pub fn start_with_rays(
+        &mut self,
+        scene: Arc<Scene>,
+        rays: Arc<RayTree>,
+        settings: SolveSettings,
+        options: RunOptions,
+    ) -> Generation {
+        self.begin(scene, Some(rays), settings, options)
+    }
+
+    fn begin(
+        &mut self,
+        scene: Arc<Scene>,
+        rays: Option<Arc<RayTree>>,
+        settings: SolveSettings,
+        options: RunOptions,
+    ) -> Generation {
         self.generation = self.generation.next();
         self.settings = settings.clone();
-        self.send(Command::Start {
+        self.send(Command::Start(Start {
             generation: self.generation,
             scene,
+            rays,
             settings,
             options,
-        });
+        }));
         self.generation
     }
 

@@ -7,9 +7,11 @@ use std::{
 
 use super::{
     Generation, Job, MakeStepper, RunOptions, Stepper, StopReason,
+    message::Start,
     visit::{Errand, Visit},
 };
 use crate::{
+    geometry::RayTree,
     scene::Scene,
     solver::{Cancel, SolveSettings, StepReport, Subject},
 };
@@ -33,6 +35,8 @@ pub(super) struct Run {
     pub generation: Generation,
     /// What is lit.
     pub scene: Arc<Scene>,
+    /// Its ray tree, where there is one already.
+    pub rays: Option<Arc<RayTree>>,
     /// What is computed.
     pub settings: SolveSettings,
     /// Whether the solve has not heard of the settings yet.
@@ -59,18 +63,14 @@ pub(super) struct Run {
 
 impl Run {
     /// A run that begins.
-    pub(super) fn new(
-        generation: Generation,
-        scene: Arc<Scene>,
-        settings: SolveSettings,
-        options: RunOptions,
-    ) -> Self {
+    pub(super) fn new(start: Start) -> Self {
         Self {
-            generation,
-            scene,
-            settings,
+            generation: start.generation,
+            scene: start.scene,
+            rays: start.rays,
+            settings: start.settings,
             settings_changed: false,
-            options,
+            options: start.options,
             stepper: None,
             subjects: Vec::new(),
             is_asked: false,
@@ -115,6 +115,7 @@ impl Run {
                 self.settings_changed = false;
                 let job = Job {
                     scene: self.scene.clone(),
+                    rays: self.rays.clone(),
                     settings: self.settings.clone(),
                     memory_limit: self.options.memory_limit,
                 };

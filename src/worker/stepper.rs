@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
+    geometry::RayTree,
     scene::Scene,
     solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
 };
@@ -26,10 +27,24 @@ pub trait Stepper: Send {
 pub struct Job {
     /// What to light.
     pub scene: Arc<Scene>,
+    /// Its ray tree, where there is one already.
+    pub rays: Option<Arc<RayTree>>,
     /// What to compute.
     pub settings: SolveSettings,
     /// Bytes that it may hold.
     pub memory_limit: Option<u64>,
+}
+
+impl Job {
+    /// Prepare the solver for it, unless cancelled.
+    pub fn solver(self, cancel: &Cancel) -> Option<Solver> {
+        let rays = match self.rays {
+            Some(rays) => rays,
+            None if cancel.is_cancelled() => return None,
+            None => Arc::new(RayTree::new(&self.scene)),
+        };
+        Solver::with_rays(self.scene, rays, self.settings, self.memory_limit, cancel)
+    }
 }
 
 /// Prepares a solve, or gives up when cancelled; called on a solver thread.

@@ -242,7 +242,7 @@ fn at(flags: &SettingFlags, method: Method, oracle: Oracle, epsilon: f32) -> Sol
     }
     let distance = |preset: &Preset| {
         let of_preset = SettingFlags {
-            preset: *preset,
+            preset: Some(*preset),
             epsilon: None,
             ..flags.clone()
         };
@@ -251,9 +251,9 @@ fn at(flags: &SettingFlags, method: Method, oracle: Oracle, epsilon: f32) -> Sol
     let nearest = [Preset::Draft, Preset::Normal, Preset::Final]
         .into_iter()
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .unwrap_or(flags.preset);
+        .unwrap_or(flags.preset.unwrap_or_default());
     let preset = SettingFlags {
-        preset: nearest,
+        preset: Some(nearest),
         epsilon: None,
         ..flags.clone()
     }

@@ -90,6 +90,7 @@ impl<'a> Session<'a> {
             threads: limits.threads.map_or(0, usize::from),
             time_limit: Some(self.time_limit()),
             memory_limit: limits.memory_limit.map(|mebibytes| mebibytes << 20),
+            gives_way: false,
         }
     }
 

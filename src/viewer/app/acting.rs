@@ -10,6 +10,7 @@ use super::{
         pick, saver,
         session::Recent,
         state::{RunStatus, Selection, Severity},
+        view::ViewMode,
     },
     App,
 };
@@ -48,6 +49,11 @@ impl App {
                 self.reload();
             }
             Action::TraceReference => self.trace_reference(),
+            Action::Mode(ViewMode::Error) if !self.state.truth.exists() => {
+                // The view of errors is nothing without a reference.
+                self.trace_reference();
+                self.change_view(&action);
+            }
             Action::ForgetRuns => self.state.truth.forget_earlier(),
             Action::FrameSelected => self.frame_selected(),
             Action::SelectCluster(index) => self.state.cluster = Some(index),
@@ -100,8 +106,9 @@ impl App {
             }
             Action::ToggleLinks => state.view.links.shown = !state.view.links.shown,
             Action::ClusterLevelBy(step) => {
-                let deepest = state.cluster_counts.deepest;
-                state.view.clusters.go_down(*step, deepest);
+                if let Some(deepest) = state.shown_clusters.deepest {
+                    state.view.clusters.go_down(*step, deepest);
+                }
                 state.view.clusters.shown = true;
             }
             Action::FrameAll => state.frame_all(),
@@ -123,6 +130,8 @@ impl App {
 
     fn pause_or_continue(&mut self) {
         if self.state.run.status.is_busy() {
+            // What is under way may take a moment to end.
+            self.state.run.status = RunStatus::Pausing;
             self.worker.pause();
         } else if self.state.run.status.can_continue() {
             self.worker.resume();
@@ -131,7 +140,12 @@ impl App {
 
     /// Stop what runs; with nothing running, select nothing.
     fn stop(&mut self) {
-        if self.state.run.status.is_busy() || self.state.run.status == RunStatus::Paused {
+        let status = &mut self.state.run.status;
+        if self.state.loading.take().is_some() {
+            let text = "reading was given up";
+            self.state.messages.push(Severity::Note, text);
+        } else if status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused) {
+            *status = RunStatus::Stopping;
             self.worker.stop();
         } else {
             self.clear_selection();
@@ -193,21 +207,24 @@ impl App {
         match picked {
             Picked::Nothing => self.clear_selection(),
             Picked::Surface(pick) => {
+                let object = self.state.loaded.as_ref().and_then(|loaded| {
+                    loaded.scene.objects.iter().position(|object| {
+                        object.start <= pick.triangle && pick.triangle < object.end
+                    })
+                });
                 self.state.selection = Some(Selection {
                     pick,
-                    of: None,
                     probe: None,
                     object_light: Default::default(),
-                    object: None,
+                    object,
                 });
                 if let Some(snapshot) = &self.state.run.snapshot
                     && self.state.view.clusters.shown
                 {
-                    let shown = &self.state.view.clusters;
+                    let shown = &self.state.shown_clusters.shown;
                     self.state.cluster =
-                        clusters::containing(&snapshot.clusters, pick.point, shown);
+                        clusters::containing(&snapshot.clusters, shown, pick.point);
                 }
-                self.look_up();
             }
         }
     }

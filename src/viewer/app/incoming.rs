@@ -6,8 +6,9 @@ use super::{
     super::{
         inspection, light_range,
         loader::{Loader, SceneSource},
-        pick,
+        stage::Wanted,
         state::Severity,
+        view::ViewMode,
     },
     App,
 };
@@ -40,6 +41,8 @@ impl App {
             }
         }
         self.drain_worker();
+        self.take_staged();
+        self.want();
     }
 
     /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by its haste.
@@ -75,7 +78,8 @@ impl App {
         let newer = self.worker.latest().filter(|latest| !is_known(latest));
         let has_light = newer.is_some();
         if has_light {
-            self.state.run.snapshot = newer;
+            let replaced = std::mem::replace(&mut self.state.run.snapshot, newer);
+            self.stage.drop_later(replaced);
         }
         let has_errors = self
             .state
@@ -112,35 +116,51 @@ impl App {
                 .vertex_errors(snapshot)
                 .map(|errors| errors.as_slice()),
         );
-        self.state
-            .cluster_counts
-            .update(&snapshot.clusters, &self.state.view.clusters);
-        self.look_up();
     }
 
-    /// Look up the light at the picked point.
-    pub(super) fn look_up(&mut self) {
-        let (Some(selection), Some(loaded), Some(snapshot)) = (
-            &mut self.state.selection,
-            &self.state.loaded,
-            &self.state.run.snapshot,
-        ) else {
+    /// Ask for what the state shows to be made ready, if it is not.
+    pub(super) fn want(&mut self) {
+        let state = &self.state;
+        let (Some(loaded), Some(snapshot)) = (&state.loaded, &state.run.snapshot) else {
             return;
         };
-        let is_current = |held: &Arc<_>| Arc::ptr_eq(held, snapshot);
-        if selection.of.as_ref().is_some_and(is_current) {
+        let picked = state.selection.as_ref().map(|selection| {
+            let object = selection.object.map(|index| &loaded.scene.objects[index]);
+            let triangles = object.map(|object| [object.start, object.end]);
+            (selection.pick, triangles)
+        });
+        let mode = state.view.mode;
+        self.stage.want(Wanted {
+            scene: loaded.scene.clone(),
+            snapshot: snapshot.clone(),
+            errors: (mode == ViewMode::Error)
+                .then(|| state.truth.vertex_errors(snapshot).cloned())
+                .flatten(),
+            mode,
+            range: state.false_color_range,
+            edges: state.view.edges,
+            clusters: state.view.clusters,
+            picked,
+        });
+    }
+
+    /// Show what has been made ready.
+    fn take_staged(&mut self) {
+        let Some(staged) = self.stage.poll() else {
             return;
+        };
+        if let Some(error) = &staged.error {
+            self.state.messages.push(Severity::Error, error.to_string());
         }
-        let triangle = selection.pick.triangle;
-        selection.of = Some(snapshot.clone());
-        selection.probe = pick::probe(snapshot, &selection.pick);
-        selection.object = loaded
-            .scene
-            .objects
-            .iter()
-            .position(|object| object.start <= triangle && triangle < object.end);
-        if let Some(object) = selection.object.map(|index| &loaded.scene.objects[index]) {
-            selection.object_light = pick::object_light(snapshot, object.start, object.end);
+        if let (Some(selection), Some((pick, _))) =
+            (&mut self.state.selection, &staged.wanted.picked)
+            && selection.pick == *pick
+        {
+            selection.probe = staged.probe;
+            selection.object_light = staged.object_light;
         }
+        self.state.shown_clusters = staged.clusters.clone();
+        let replaced = self.state.staged.replace(Arc::new(staged));
+        self.stage.drop_later(replaced);
     }
 }

@@ -35,8 +35,7 @@ impl App {
             if let Some(display) = image::RgbaImage::from_raw(width, height, bytes) {
                 let saving = saver::Saving {
                     path,
-                    display,
-                    radiance: None,
+                    shot: saver::Shot::Seen(display),
                 };
                 saving.start(sender, &pictures, wake);
             }
@@ -50,11 +49,10 @@ impl App {
             return;
         };
         match viewport.picture(&self.state, size) {
-            Ok((display, radiance)) => {
+            Ok(drawn) => {
                 let saving = saver::Saving {
                     path,
-                    display,
-                    radiance,
+                    shot: saver::Shot::Drawn(Box::new(drawn)),
                 };
                 saving.start(self.notices.0.clone(), &self.pictures, self.wake.clone());
             }

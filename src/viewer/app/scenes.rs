@@ -50,12 +50,13 @@ impl App {
         self.state.selection = None;
         self.state.cluster = None;
         self.state.inspections.close();
-        self.state.run.snapshot = None;
+        self.forget_picture();
         self.state.run.last_effect = None;
         self.worker.watch(None);
         self.state.truth = Truth::default();
-        self.worker.start(
+        self.worker.start_with_rays(
             loaded.scene.clone(),
+            loaded.rays.clone(),
             self.state.settings.clone(),
             self.state.options.clone(),
         );
@@ -64,6 +65,17 @@ impl App {
         if self.state.view.mode == ViewMode::Error {
             self.trace_reference();
         }
+    }
+
+    /// Nothing of the scene before is to be shown.
+    fn forget_picture(&mut self) {
+        self.stage.forget();
+        self.stage.drop_later((
+            self.state.run.snapshot.take(),
+            self.state.staged.take(),
+            self.state.loaded.take(),
+        ));
+        self.state.shown_clusters = Default::default();
     }
 
     /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
@@ -81,7 +93,11 @@ impl App {
         match session::load(&loaded.source, frame) {
             Some(Ok(saved)) => {
                 camera = saved.camera.unwrap_or(camera);
-                if self.first.is_none() {
+                let first = self.first.as_ref();
+                if first.is_some_and(|first| first.settings_are_asked_for) {
+                    let text = "the settings saved beside the scene were not used: the command line has its own";
+                    self.state.messages.push(Severity::Note, text);
+                } else {
                     self.state.settings = saved.settings;
                 }
                 self.state.view = saved.view;
@@ -98,10 +114,7 @@ impl App {
                     "the camera of the command line is too far from the scene and was not used";
                 self.state.messages.push(Severity::Warning, text);
             }
-            if let Some(exposure) = first.exposure {
-                self.state.view.exposure = exposure;
-                self.state.view.auto_exposure = false;
-            }
+            self.state.view = first.view.apply(&self.state.view);
         }
         self.state.rig.jump(camera);
     }

@@ -26,7 +26,11 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
         ui.weak("There are no clusters yet.");
         return;
     }
-    cut_ui(ui, overlay, state.cluster_counts.deepest);
+    cut_ui(
+        ui,
+        overlay,
+        state.shown_clusters.deepest.unwrap_or(overlay.level),
+    );
     let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
     let label = ui.label("Colour");
     row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);
@@ -74,7 +78,7 @@ fn cut_ui(ui: &mut egui::Ui, overlay: &mut ClusterOverlay, deepest: u32) {
 }
 
 fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
-    let shown = state.cluster_counts.shown;
+    let shown = state.shown_clusters.shown.len();
     legend::scale_ui(ui, "little", "much");
     ui.weak(format!(
         "{} boxes of {} clusters.",

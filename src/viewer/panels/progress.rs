@@ -48,7 +48,7 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
             button(
                 "Pause",
                 true,
-                "Rest after the present sweep (Space)",
+                "Rest; Continue goes on from there (Space)",
                 Action::PauseContinue,
             );
         } else {
@@ -60,7 +60,7 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
                 Action::PauseContinue,
             );
         }
-        let can_stop = status.is_busy() || *status == RunStatus::Paused;
+        let can_stop = status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused);
         button(
             "Stop",
             can_stop,

@@ -9,6 +9,16 @@ use crate::viewer::{action::Action, state::State};
 
 /// Show the light's panel on the left and the look's on the right; wishes go into `actions`.
 pub fn side_panels(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
+    if state.panels.light {
+        light_panel(ui, state, actions);
+    }
+    if state.panels.look {
+        look_panel(ui, state, actions);
+    }
+}
+
+/// The run and its settings.
+fn light_panel(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     egui::Panel::left("light")
         .resizable(true)
         .default_size(320.0)
@@ -27,6 +37,10 @@ pub fn side_panels(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
                     });
                 });
         });
+}
+
+/// What is looked into.
+fn look_panel(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     egui::Panel::right("look")
         .resizable(true)
         .default_size(300.0)

@@ -18,7 +18,7 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
         let color = match &state.run.status {
             RunStatus::Failed(_) => theme::BAD,
             RunStatus::Finished(_) => theme::GOOD,
-            RunStatus::Paused => theme::WARNING,
+            RunStatus::Pausing | RunStatus::Paused => theme::WARNING,
             _ => ui.visuals().text_color(),
         };
         ui.colored_label(color, state.run.status.label());
@@ -48,6 +48,7 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
         Severity::Error => 2,
     };
     let Some(worst) = unseen.iter().max_by_key(rank) else {
+        hint_ui(ui);
         return;
     };
     let color = match worst.severity {
@@ -65,6 +66,26 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
     let button = egui::Button::new(RichText::new(text).color(color)).frame(false);
     if ui.add(button).on_hover_text("Show all messages").clicked() {
         state.panels.show_messages = true;
+        state.panels.look = true;
         state.panels.shown = true;
+    }
+}
+
+/// What to do with mouse and keys, as far as there is room for it.
+fn hint_ui(ui: &mut egui::Ui) {
+    const HINTS: [&str; 2] = [
+        "Drag orbits, wheel zooms, click picks; B boxes, Ctrl+F12 picture, F1 all keys",
+        "F1 shows all keys",
+    ];
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    for hint in HINTS {
+        let width = |painter: &egui::Painter| {
+            let text = painter.layout_no_wrap(hint.to_owned(), font.clone(), egui::Color32::GRAY);
+            text.size().x
+        };
+        if width(ui.painter()) < ui.available_width() {
+            ui.weak(hint);
+            return;
+        }
     }
 }

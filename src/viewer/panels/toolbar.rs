@@ -34,6 +34,12 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
             ui.toggle_value(&mut view.texture_detail, "Textures")
                 .on_hover_text("Textures in detail, lit by the computed light");
         }
+        ui.separator();
+        let panels = &mut state.panels;
+        ui.toggle_value(&mut panels.light, "Settings")
+            .on_hover_text("The panel of the run and its settings; Tab hides all but the scene");
+        ui.toggle_value(&mut panels.look, "Details")
+            .on_hover_text("The panel of what is picked, of clusters, links and figures; Tab hides all but the scene");
     });
 }
 

@@ -17,7 +17,8 @@ const MAX_SIDE: u32 = 2048;
 /// A run of indices with the number of its group.
 pub(super) type DetailRange = (Range<u32>, usize);
 
-/// The groups of a scene's materials.
+/// The groups of a scene's materials. Cheap to clone.
+#[derive(Clone)]
 pub(super) struct DetailSet {
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,

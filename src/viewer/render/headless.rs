@@ -11,7 +11,7 @@ use crate::{
     solver::Snapshot,
     viewer::{
         camera::Camera,
-        cluster_lines, light_range,
+        cluster_lines, clusters, light_range,
         saver::{self, EncodeError},
         theme,
         view::ViewSettings,
@@ -101,7 +101,11 @@ pub fn picture(
         view.exposure = light_range::auto_exposure(snapshot).unwrap_or(view.exposure);
     }
     let overlay = Overlay {
-        boxes: Arc::new(cluster_lines::boxes(&snapshot.clusters, &view.clusters)),
+        boxes: Arc::new(cluster_lines::boxes(
+            &snapshot.clusters,
+            &clusters::shown(&snapshot.clusters, &view.clusters),
+            &view.clusters,
+        )),
         segments: Arc::default(),
     };
     let drawn = Picture {

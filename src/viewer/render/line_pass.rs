@@ -2,18 +2,17 @@
 
 use std::sync::Arc;
 
-use super::{BoxInstance, DEPTH_FORMAT, Gpu, Overlay, SegmentInstance};
+use super::{BoxInstance, DEPTH_FORMAT, Gpu, SegmentInstance};
 
 /// Vertices of a box: two ends for each of twelve edges.
 const BOX_VERTICES: u32 = 24;
 /// Vertices of a segment: two triangles of the ribbon, one of the arrowhead.
 const SEGMENT_VERTICES: u32 = 9;
 
-/// Pipelines and instance buffers.
+/// Pipelines, and the buffer of the segments.
 pub(super) struct LinePass {
     box_pipeline: wgpu::RenderPipeline,
     segment_pipeline: wgpu::RenderPipeline,
-    boxes: Instances<BoxInstance>,
     segments: Instances<SegmentInstance>,
 }
 
@@ -67,28 +66,27 @@ impl LinePass {
         Self {
             box_pipeline,
             segment_pipeline,
-            boxes: Instances::default(),
             segments: Instances::default(),
         }
     }
 
-    /// Upload what changed.
-    pub(super) fn prepare(&mut self, gpu: &Gpu, overlay: &Overlay) {
-        self.boxes.prepare(gpu, "boxes", &overlay.boxes);
-        self.segments.prepare(gpu, "segments", &overlay.segments);
+    /// Upload the segments, which are few, where they changed.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, segments: &Arc<Vec<SegmentInstance>>) {
+        self.segments.prepare(gpu, "segments", segments);
     }
 
     /// Draw; group 0 is set.
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, boxes: &Instances<BoxInstance>) {
         pass.set_pipeline(&self.box_pipeline);
-        self.boxes.draw(pass, BOX_VERTICES);
+        boxes.draw(pass, BOX_VERTICES);
         pass.set_pipeline(&self.segment_pipeline);
         self.segments.draw(pass, SEGMENT_VERTICES);
     }
 }
 
 /// Instances as they were last uploaded.
-struct Instances<T> {
+#[derive(Clone)]
+pub(super) struct Instances<T> {
     uploaded: Arc<Vec<T>>,
     buffer: Option<wgpu::Buffer>,
     count: u32,
@@ -105,7 +103,8 @@ impl<T> Default for Instances<T> {
 }
 
 impl<T: bytemuck::NoUninit> Instances<T> {
-    fn prepare(&mut self, gpu: &Gpu, label: &str, instances: &Arc<Vec<T>>) {
+    /// Upload others.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, label: &str, instances: &Arc<Vec<T>>) {
         if Arc::ptr_eq(&self.uploaded, instances) {
             return;
         }

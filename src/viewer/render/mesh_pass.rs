@@ -1,105 +1,18 @@
 //! The lit surfaces: one vertex buffer a quantity, so that a step uploads the light and nothing else.
 
-use std::sync::Arc;
+use super::{DEPTH_FORMAT, Gpu, detail::DetailSet, uploads::Uploads};
+use crate::viewer::view::{ViewMode, ViewSettings};
 
-use super::{
-    DEPTH_FORMAT, Gpu, Picture, RenderError,
-    detail::{DetailRange, DetailSet},
-};
-use crate::{
-    solver::{DisplayMesh, VertexLight},
-    viewer::view::{ViewMode, ViewSettings},
-};
-
-/// Pipelines, the mesh on the adapter, and what it was made from.
+/// Pipelines of the surfaces.
 pub(super) struct MeshPass {
     front_pipeline: wgpu::RenderPipeline,
     back_pipeline: wgpu::RenderPipeline,
     edge_pipeline: wgpu::RenderPipeline,
-    details: DetailSet,
-    mesh: Option<MeshBuffers>,
-}
-
-/// The light that a mode shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Channel {
-    Irradiance,
-    Direct,
-    Uncertainty,
-}
-
-impl Channel {
-    fn of(mode: ViewMode) -> Self {
-        match mode {
-            ViewMode::DirectOnly => Self::Direct,
-            ViewMode::Uncertainty => Self::Uncertainty,
-            _ => Self::Irradiance,
-        }
-    }
-}
-
-/// What the buffer of light was filled from.
-#[derive(Clone)]
-enum LightSource {
-    Light(Arc<VertexLight>, Channel),
-    Errors(Arc<Vec<f32>>),
-}
-
-impl LightSource {
-    fn of(picture: &Picture<'_>) -> Self {
-        match (picture.view.mode, picture.errors) {
-            (ViewMode::Error, Some(errors)) => Self::Errors(errors.clone()),
-            (mode, _) => Self::Light(picture.light.clone(), Channel::of(mode)),
-        }
-    }
-
-    fn is_same(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Light(a, shown), Self::Light(b, wanted)) => Arc::ptr_eq(a, b) && shown == wanted,
-            (Self::Errors(a), Self::Errors(b)) => Arc::ptr_eq(a, b),
-            _ => false,
-        }
-    }
-
-    fn upload(&self, gpu: &Gpu, buffer: &wgpu::Buffer) {
-        let gray = |values: &[f32]| -> Vec<[f32; 3]> { values.iter().map(|x| [*x; 3]).collect() };
-        let grays;
-        let bytes: &[u8] = match self {
-            Self::Light(light, Channel::Irradiance) => bytemuck::cast_slice(&light.irradiance),
-            Self::Light(light, Channel::Direct) => bytemuck::cast_slice(&light.direct),
-            Self::Light(light, Channel::Uncertainty) => {
-                grays = gray(&light.uncertainty);
-                bytemuck::cast_slice(&grays)
-            }
-            Self::Errors(errors) => {
-                grays = gray(errors);
-                bytemuck::cast_slice(&grays)
-            }
-        };
-        let fitting = bytes.len().min(buffer.size() as usize);
-        gpu.queue.write_buffer(buffer, 0, &bytes[..fitting]);
-    }
-}
-
-struct MeshBuffers {
-    source: Arc<DisplayMesh>,
-    light_source: Option<LightSource>,
-    positions: wgpu::Buffer,
-    normals: wgpu::Buffer,
-    texcoords: Option<wgpu::Buffer>,
-    reflectance: wgpu::Buffer,
-    emission: wgpu::Buffer,
-    light: wgpu::Buffer,
-    indices: wgpu::Buffer,
-    ranges: Vec<DetailRange>,
-    /// Made when edges are first shown.
-    edges: Option<(wgpu::Buffer, u32)>,
 }
 
 impl MeshPass {
     /// Build the pipelines.
-    pub(super) fn new(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout) -> Self {
-        let details = DetailSet::new(gpu);
+    pub(super) fn new(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, details: &DetailSet) -> Self {
         let module = gpu
             .device
             .create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -120,36 +33,20 @@ impl MeshPass {
             front_pipeline: build(Kind::Front),
             back_pipeline: build(Kind::Back),
             edge_pipeline: build(Kind::Edge),
-            details,
-            mesh: None,
         }
     }
 
-    /// Upload what changed since the last picture.
-    pub(super) fn prepare(&mut self, gpu: &Gpu, picture: &Picture<'_>) -> Result<(), RenderError> {
-        self.details.prepare(gpu, picture.scene);
-        let is_current = |held: &MeshBuffers| Arc::ptr_eq(&held.source, picture.mesh);
-        if !self.mesh.as_ref().is_some_and(is_current) {
-            // The old mesh goes first: two large ones may not fit.
-            self.mesh = None;
-            if picture.mesh.indices.is_empty() {
-                return Ok(());
-            }
-            check_size(gpu, picture.mesh)?;
-            self.mesh = Some(MeshBuffers::new(gpu, picture, &self.details));
-        }
-        if let Some(mesh) = &mut self.mesh {
-            mesh.prepare_light(gpu, LightSource::of(picture));
-            if shows_edges(picture.view) {
-                mesh.prepare_edges(gpu);
-            }
-        }
-        Ok(())
-    }
-
-    /// Draw; group 0 is set.
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, view: &ViewSettings) {
-        let Some(mesh) = &self.mesh else { return };
+    /// Draw what was uploaded; group 0 is set.
+    pub(super) fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        uploads: &Uploads,
+        view: &ViewSettings,
+    ) {
+        let (Some(mesh), Some(light)) = (uploads.mesh(), uploads.light()) else {
+            return;
+        };
+        let details = uploads.details();
         let buffers = [
             &mesh.positions,
             &mesh.normals,
@@ -157,7 +54,7 @@ impl MeshPass {
             mesh.texcoords.as_ref().unwrap_or(&mesh.positions),
             &mesh.reflectance,
             &mesh.emission,
-            &mesh.light,
+            light,
         ];
         for (slot, buffer) in buffers.into_iter().enumerate() {
             pass.set_vertex_buffer(slot as u32, buffer.slice(..));
@@ -165,98 +62,27 @@ impl MeshPass {
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_pipeline(&self.front_pipeline);
         for (range, detail) in &mesh.ranges {
-            pass.set_bind_group(1, self.details.bind_group(*detail), &[]);
+            pass.set_bind_group(1, details.bind_group(*detail), &[]);
             pass.draw_indexed(range.clone(), 0, 0..1);
         }
         if view.backs || view.mode == ViewMode::FaceOrientation {
             pass.set_pipeline(&self.back_pipeline);
-            pass.set_bind_group(1, self.details.bind_group(0), &[]);
+            pass.set_bind_group(1, details.bind_group(0), &[]);
             let whole = mesh.ranges.last().map_or(0, |(range, _)| range.end);
             pass.draw_indexed(0..whole, 0, 0..1);
         }
-        if let (true, Some((edges, count))) = (shows_edges(view), &mesh.edges) {
+        if let (true, Some((edges, count))) = (shows_edges(view.mode, view.edges), &mesh.edges) {
             pass.set_pipeline(&self.edge_pipeline);
-            pass.set_bind_group(1, self.details.bind_group(0), &[]);
+            pass.set_bind_group(1, details.bind_group(0), &[]);
             pass.set_index_buffer(edges.slice(..), wgpu::IndexFormat::Uint32);
             pass.draw_indexed(0..*count, 0, 0..1);
         }
     }
 }
 
-fn shows_edges(view: &ViewSettings) -> bool {
-    view.edges || view.mode == ViewMode::Elements
-}
-
-/// Whether the largest buffers fit: twelve bytes a vertex, twelve a triangle.
-fn check_size(gpu: &Gpu, mesh: &DisplayMesh) -> Result<(), RenderError> {
-    const MIB: u64 = 1 << 20;
-    let needed = 12 * mesh.positions.len().max(mesh.indices.len()) as u64;
-    let limit = gpu.max_buffer_size;
-    if needed > limit {
-        return Err(RenderError::MeshTooLarge {
-            needed_mib: needed.div_ceil(MIB),
-            limit_mib: limit / MIB,
-        });
-    }
-    Ok(())
-}
-
-impl MeshBuffers {
-    fn new(gpu: &Gpu, picture: &Picture<'_>, details: &DetailSet) -> Self {
-        let mesh = picture.mesh;
-        let vertices = |label, bytes: &[u8]| gpu.buffer(label, bytes, wgpu::BufferUsages::VERTEX);
-        let (indices, ranges) = details.sort_by_detail(picture.scene, mesh);
-        Self {
-            source: mesh.clone(),
-            light_source: None,
-            positions: vertices("positions", bytemuck::cast_slice(&mesh.positions)),
-            normals: vertices("normals", bytemuck::cast_slice(&mesh.normals)),
-            texcoords: (mesh.texcoords.len() == mesh.positions.len())
-                .then(|| vertices("texture coordinates", bytemuck::cast_slice(&mesh.texcoords))),
-            reflectance: vertices("reflectance", bytemuck::cast_slice(&mesh.reflectance)),
-            emission: vertices("emission", bytemuck::cast_slice(&mesh.emission)),
-            light: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("light"),
-                size: 12 * mesh.positions.len() as u64,
-                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
-            indices: gpu.buffer(
-                "indices",
-                bytemuck::cast_slice(&indices),
-                wgpu::BufferUsages::INDEX,
-            ),
-            ranges,
-            edges: None,
-        }
-    }
-
-    fn prepare_light(&mut self, gpu: &Gpu, source: LightSource) {
-        let is_current = |held: &LightSource| held.is_same(&source);
-        if !self.light_source.as_ref().is_some_and(is_current) {
-            source.upload(gpu, &self.light);
-            self.light_source = Some(source);
-        }
-    }
-
-    fn prepare_edges(&mut self, gpu: &Gpu) {
-        if self.edges.is_some() {
-            return;
-        }
-        // An edge that two triangles share runs forth in one and back in the other: it is drawn twice, which costs
-        // less than finding out.
-        let limit = gpu.max_buffer_size as usize / (6 * size_of::<u32>());
-        let edges: Vec<u32> = self
-            .source
-            .indices
-            .iter()
-            .take(limit)
-            .flat_map(|&[a, b, c]| [a, b, b, c, c, a])
-            .collect();
-        let bytes = bytemuck::cast_slice(&edges);
-        let usage = wgpu::BufferUsages::INDEX;
-        self.edges = Some((gpu.buffer("edges", bytes, usage), edges.len() as u32));
-    }
+/// Whether edges are drawn over the light, or in its place.
+pub(super) fn shows_edges(mode: ViewMode, edges: bool) -> bool {
+    edges || mode == ViewMode::Elements
 }
 
 /// What a pipeline draws.

@@ -11,6 +11,7 @@ mod readback;
 mod target;
 mod tonemap_pass;
 mod uniforms;
+mod uploads;
 
 use std::sync::{Arc, OnceLock};
 
@@ -18,12 +19,14 @@ use glam::Vec3;
 
 pub use readback::ReadError;
 pub use target::Target;
+pub use uploads::{Source, Uploads};
 
 use super::{camera::Camera, view::ViewSettings};
 use crate::{
     scene::Scene,
     solver::{DisplayMesh, VertexLight},
 };
+use detail::DetailSet;
 use line_pass::LinePass;
 use mesh_pass::MeshPass;
 use tonemap_pass::TonemapPass;
@@ -195,6 +198,21 @@ pub struct Picture<'a> {
     pub pixels_per_point: f32,
 }
 
+impl<'a> Picture<'a> {
+    /// What is uploaded for it.
+    fn source(&self) -> Source<'a> {
+        Source {
+            scene: self.scene,
+            mesh: self.mesh,
+            light: self.light,
+            errors: self.errors,
+            mode: self.view.mode,
+            edges: self.view.edges,
+            boxes: &self.overlay.boxes,
+        }
+    }
+}
+
 /// Draws pictures with one device.
 pub struct Renderer {
     gpu: Gpu,
@@ -202,16 +220,19 @@ pub struct Renderer {
     mesh_pass: MeshPass,
     line_pass: LinePass,
     tonemap_pass: TonemapPass,
+    uploads: Uploads,
 }
 
 impl Renderer {
     /// Build the pipelines.
     pub fn new(gpu: Gpu) -> Self {
         let uniforms = ViewUniforms::new(&gpu.device);
+        let details = DetailSet::new(&gpu);
         Self {
-            mesh_pass: MeshPass::new(&gpu, uniforms.layout()),
+            mesh_pass: MeshPass::new(&gpu, uniforms.layout(), &details),
             line_pass: LinePass::new(&gpu, uniforms.layout()),
             tonemap_pass: TonemapPass::new(&gpu, uniforms.layout()),
+            uploads: Uploads::new(details),
             uniforms,
             gpu,
         }
@@ -222,14 +243,28 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Draw a picture into a target.
+    /// What this renderer has uploaded, to begin with on another thread.
+    pub fn uploads(&self) -> Uploads {
+        self.uploads.clone()
+    }
+
+    /// Upload a picture and draw it into a target.
     ///
     /// # Errors
     /// [`RenderError::MeshTooLarge`]; the target then holds the background.
     pub fn render(&mut self, target: &Target, picture: &Picture<'_>) -> Result<(), RenderError> {
-        // Bring the buffers up to date.
-        let upload = self.mesh_pass.prepare(&self.gpu, picture);
-        self.line_pass.prepare(&self.gpu, picture.overlay);
+        // Taken out, so that nothing is held twice while the next is made.
+        let empty = Uploads::new(self.uploads.details().clone());
+        let mut uploads = std::mem::replace(&mut self.uploads, empty);
+        let result = uploads.renew(&self.gpu, &picture.source());
+        self.draw(target, picture, &uploads);
+        self.uploads = uploads;
+        result
+    }
+
+    /// Draw a picture of what was uploaded for it.
+    pub fn draw(&mut self, target: &Target, picture: &Picture<'_>, uploads: &Uploads) {
+        self.line_pass.prepare(&self.gpu, &picture.overlay.segments);
         self.uniforms.write(&self.gpu.queue, target.size(), picture);
         // Draw surfaces and lines into the linear picture.
         let mut encoder = self
@@ -241,10 +276,8 @@ impl Renderer {
         {
             let mut pass = target.begin_linear(&mut encoder, picture.background);
             pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
-            if upload.is_ok() {
-                self.mesh_pass.draw(&mut pass, picture.view);
-            }
-            self.line_pass.draw(&mut pass);
+            self.mesh_pass.draw(&mut pass, uploads, picture.view);
+            self.line_pass.draw(&mut pass, uploads.boxes());
         }
         // Turn it into display colours.
         {
@@ -253,6 +286,5 @@ impl Renderer {
             self.tonemap_pass.draw(&self.gpu, &mut pass, target);
         }
         self.gpu.queue.submit([encoder.finish()]);
-        upload
     }
 }

@@ -15,7 +15,7 @@ use crate::{
     reference::{PathSettings, PathTracer, ReferencePoint},
     scene::Scene,
     solver::Snapshot,
-    worker::Wake,
+    worker::{Wake, priority::give_way},
 };
 
 /// Samples of a pass at each point. Fewer pay more for comparing than for tracing, more let the first error wait.
@@ -274,6 +274,7 @@ fn pool(pools: &mut [Option<ThreadPool>; 2], is_narrow: bool) -> Option<&ThreadP
         *held = ThreadPoolBuilder::new()
             .num_threads(usize::from(is_narrow))
             .thread_name(|index| format!("reference {index}"))
+            .start_handler(|_| give_way())
             .build()
             .ok();
     }

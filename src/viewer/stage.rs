@@ -1,0 +1,236 @@
+//! What takes too long for a frame of a large scene, done on a thread of its own: handing mesh, light and boxes to the
+//! adapter, choosing and colouring the boxes, looking up the light at the picked point, letting go of what was replaced.
+//!
+//! The window says what it wants to show and goes on with what is there. Only the newest wish is fulfilled.
+
+use std::{
+    any::Any,
+    io,
+    sync::{
+        Arc,
+        mpsc::{self, Receiver, Sender},
+    },
+    thread,
+};
+
+use super::{
+    cluster_lines,
+    clusters::ShownClusters,
+    pick::{self, ObjectLight, Pick, Probe},
+    render::{BoxInstance, Gpu, RenderError, Source, Uploads},
+    view::{ClusterOverlay, ViewMode},
+};
+use crate::{
+    scene::{Scene, TriangleId},
+    solver::{ClusterBox, Snapshot},
+    worker::Wake,
+};
+
+/// What the window wants to show. Arcs are held, so that an address is not used twice.
+#[derive(Clone)]
+pub struct Wanted {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Its mesh, light and clusters.
+    pub snapshot: Arc<Snapshot>,
+    /// Measured errors at its vertices, where they are shown.
+    pub errors: Option<Arc<Vec<f32>>>,
+    /// What the surfaces show.
+    pub mode: ViewMode,
+    /// Ends of the false colours of that mode.
+    pub range: [f32; 2],
+    /// Whether edges are drawn.
+    pub edges: bool,
+    /// Which boxes are drawn.
+    pub clusters: ClusterOverlay,
+    /// The picked point, and the triangles of the object that it lies on.
+    pub picked: Option<(Pick, Option<[TriangleId; 2]>)>,
+}
+
+impl PartialEq for Wanted {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.scene, &other.scene)
+            && Arc::ptr_eq(&self.snapshot, &other.snapshot)
+            && self.errors.as_ref().map(Arc::as_ptr) == other.errors.as_ref().map(Arc::as_ptr)
+            && self.mode == other.mode
+            && self.range == other.range
+            && self.edges == other.edges
+            && self.clusters == other.clusters
+            && self.picked == other.picked
+    }
+}
+
+/// What is ready to be shown.
+pub struct Staged {
+    /// What was wanted.
+    pub wanted: Wanted,
+    /// What the adapter holds of it; nothing without an adapter.
+    pub uploads: Option<Uploads>,
+    /// Why there is no mesh among it.
+    pub error: Option<RenderError>,
+    /// Whether there is light.
+    pub is_lit: bool,
+    /// The clusters that boxes are drawn of.
+    pub clusters: ShownClusters,
+    /// Light at the picked point.
+    pub probe: Option<Probe>,
+    /// Light over its object.
+    pub object_light: ObjectLight,
+}
+
+/// What the thread is told.
+enum Order {
+    Show(Box<Wanted>),
+    Drop(Box<dyn Any + Send>),
+}
+
+/// The window's end of the thread, which ends with it.
+pub struct Stage {
+    orders: Sender<Order>,
+    staged: Receiver<Staged>,
+    asked: Option<Wanted>,
+}
+
+impl Stage {
+    /// Start the thread, with what it uploads to and from where it goes on.
+    ///
+    /// # Errors
+    /// When the system refuses a thread.
+    pub fn spawn(adapter: Option<(Gpu, Uploads)>, wake: Wake) -> io::Result<Self> {
+        let (orders, inbox) = mpsc::channel();
+        let (outbox, staged) = mpsc::channel();
+        let mut hand = StageHand {
+            adapter,
+            clusters: ShownClusters::default(),
+            boxes: Boxes::default(),
+        };
+        thread::Builder::new()
+            .name("stage".to_owned())
+            .spawn(move || {
+                while let Some(wanted) = newest(&inbox) {
+                    if outbox.send(hand.stage(*wanted)).is_err() {
+                        break;
+                    }
+                    wake();
+                }
+            })?;
+        Ok(Self {
+            orders,
+            staged,
+            asked: None,
+        })
+    }
+
+    /// Ask for what is to be shown, unless it was asked for already.
+    pub fn want(&mut self, wanted: Wanted) {
+        if self.asked.as_ref() != Some(&wanted) {
+            let replaced = self.asked.replace(wanted.clone());
+            self.order(Order::Show(Box::new(wanted)));
+            self.drop_later(replaced);
+        }
+    }
+
+    /// Forget what was asked for: what comes of it is not shown.
+    pub fn forget(&mut self) {
+        let asked = self.asked.take();
+        self.drop_later(asked);
+    }
+
+    /// What has become ready, if it is still wanted or on the way to it.
+    pub fn poll(&mut self) -> Option<Staged> {
+        let newest = self.staged.try_iter().last()?;
+        let is_of_run = |asked: &Wanted| Arc::ptr_eq(&asked.scene, &newest.wanted.scene);
+        self.asked.as_ref().is_some_and(is_of_run).then_some(newest)
+    }
+
+    /// Let go of something large where no frame waits for it.
+    pub fn drop_later(&self, large: impl Send + 'static) {
+        self.order(Order::Drop(Box::new(large)));
+    }
+
+    fn order(&self, order: Order) {
+        // After a panic of the thread, which has been printed, the last picture stays.
+        let _ = self.orders.send(order);
+    }
+}
+
+/// The newest wish; those before it and what is to be dropped go. `None` when the window is gone.
+fn newest(inbox: &Receiver<Order>) -> Option<Box<Wanted>> {
+    let mut newest = None;
+    loop {
+        let order = match &newest {
+            None => inbox.recv().ok()?,
+            Some(_) => match inbox.try_recv() {
+                Ok(order) => order,
+                Err(_) => return newest,
+            },
+        };
+        match order {
+            Order::Show(wanted) => newest = Some(wanted),
+            Order::Drop(large) => drop(large),
+        }
+    }
+}
+
+/// Box instances, and what they were made from.
+#[derive(Default)]
+struct Boxes {
+    of: Option<(Arc<Vec<ClusterBox>>, ClusterOverlay)>,
+    instances: Arc<Vec<BoxInstance>>,
+}
+
+/// The thread's state.
+struct StageHand {
+    adapter: Option<(Gpu, Uploads)>,
+    clusters: ShownClusters,
+    boxes: Boxes,
+}
+
+impl StageHand {
+    fn stage(&mut self, wanted: Wanted) -> Staged {
+        let tree = &wanted.snapshot.clusters;
+        self.clusters.update(tree, &wanted.clusters);
+        let overlay = wanted.clusters;
+        let is_current = |(held, drawn): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
+            Arc::ptr_eq(held, tree) && *drawn == overlay
+        };
+        if !self.boxes.of.as_ref().is_some_and(is_current) {
+            let instances = cluster_lines::boxes(tree, &self.clusters.shown, &overlay);
+            self.boxes = Boxes {
+                of: Some((tree.clone(), overlay)),
+                instances: Arc::new(instances),
+            };
+        }
+        let error = self.upload(&wanted);
+        let picked = wanted.picked.as_ref();
+        Staged {
+            uploads: self.adapter.as_ref().map(|(_, uploads)| uploads.clone()),
+            error,
+            is_lit: wanted.snapshot.is_lit(),
+            clusters: self.clusters.clone(),
+            probe: picked.and_then(|(pick, _)| pick::probe(&wanted.snapshot, pick)),
+            object_light: picked
+                .and_then(|(_, object)| *object)
+                .map(|[start, end]| pick::object_light(&wanted.snapshot, start, end))
+                .unwrap_or_default(),
+            wanted,
+        }
+    }
+
+    fn upload(&mut self, wanted: &Wanted) -> Option<RenderError> {
+        let (gpu, uploads) = self.adapter.as_mut()?;
+        let source = Source {
+            scene: &wanted.scene,
+            mesh: &wanted.snapshot.mesh,
+            light: &wanted.snapshot.light,
+            errors: wanted.errors.as_ref(),
+            mode: wanted.mode,
+            edges: wanted.edges,
+            boxes: &self.boxes.instances,
+        };
+        let error = uploads.renew(gpu, &source).err();
+        // Copied from here, and not with the next frame.
+        gpu.queue.submit([]);
+        error
+    }
+}

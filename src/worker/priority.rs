@@ -1,0 +1,15 @@
+//! Which threads go first where there are more of them than cores.
+
+/// Let the calling thread wait for others of the program, such as those that draw, where the system knows such a thing.
+#[cfg(all(target_os = "linux", feature = "viewer"))]
+pub(super) fn give_way() {
+    /// At 5 a thread gets a third of what another gets that wants the same core. Less, and frames come half as often where
+    /// a processor plays graphics adapter; more, and other programs starve the light.
+    const NICENESS: i32 = 5;
+    // Where it is refused, threads share.
+    let _ = rustix::process::setpriority_process(None, NICENESS);
+}
+
+/// Let the calling thread wait for others of the program, where the system knows such a thing: this one is not asked.
+#[cfg(not(all(target_os = "linux", feature = "viewer")))]
+pub(super) fn give_way() {}
