@@ -458,7 +458,7 @@ fn the_stability_suite_tells_what_holds_and_refuses_unknown_cases() {
     );
     let output = report(
         folder.path(),
-        &["--suite", "stability", "--cases", "nothing"],
+        &["--suite", "stability", "--cases", "unheard-of"],
     );
     assert_eq!(output.status.code(), Some(2), "{}", error_of(&output));
 }

@@ -1,7 +1,5 @@
 //! The stability suite without its slow cases: every group, each case by the same code as `vecrad report`.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use vecrad::{
     metrics::stability::{Case, Group, Outcome, stability_cases, stability_markdown},
     solver::Cancel,
