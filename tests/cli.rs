@@ -420,3 +420,45 @@ fn the_scaling_suite_fits_an_exponent_to_the_sizes_asked_for() {
         assert!(folder.path().join("out").join(name).exists(), "{name}");
     }
 }
+
+#[test]
+fn the_stability_suite_tells_what_holds_and_refuses_unknown_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = report(
+        folder.path(),
+        &["--suite", "stability", "--cases", "single triangle,black"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/stability.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!((&json["holds"], &json["fails"]), (&2.into(), &0.into()));
+    let table = fs::read_to_string(folder.path().join("out/stability.md")).unwrap();
+    assert!(
+        table.contains("| a single triangle | largest irradiance | 0 | 0 |"),
+        "{table}"
+    );
+    assert!(folder.path().join("out/stability.csv").exists());
+    // A case that has no time does not hold.
+    let output = report(
+        folder.path(),
+        &[
+            "--suite",
+            "stability",
+            "--cases",
+            "needles",
+            "--time-limit",
+            "0",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(1), "{}", error_of(&output));
+    let sentence = error_of(&output);
+    assert!(
+        sentence.contains("1 of 1 cases failed: needles"),
+        "{sentence}"
+    );
+    let output = report(
+        folder.path(),
+        &["--suite", "stability", "--cases", "unheard-of"],
+    );
+    assert_eq!(output.status.code(), Some(2), "{}", error_of(&output));
+}

@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn agrees_with_the_closed_form_of_a_rectangle() {
         // Howell B-3 with a = b = c: 2 · (1/√2) atan(1/√2) / 2π for a square whose corner is straight above.
-        let expected = (0.5_f32.sqrt() * 0.5_f32.sqrt().atan()) / std::f32::consts::PI;
+        let expected = (0.5_f32.sqrt() * 0.5_f32.sqrt().atan()) / PI;
         let corners = [
             Vec3::new(0.0, 0.0, 1.0),
             Vec3::new(0.0, 1.0, 1.0),

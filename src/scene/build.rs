@@ -642,7 +642,7 @@ mod tests {
             ("a", [0, 0, 1]),
             ("b", [0, 1, 2]),
             ("c", [1, 1, 2]),
-            ("d", [0, 1, 2]),
+            ("d", [0, 2, 1]),
         ] {
             builder.objects.push((name.to_owned(), builder.faces.len()));
             builder.push_triangle(corners, MaterialId(0));

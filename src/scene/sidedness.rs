@@ -254,7 +254,33 @@ mod tests {
     const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
     fn flags(corners: &[[u32; 3]]) -> Vec<bool> {
-        two_sided(&Shells::of(&triangles(corners)), Sides::Auto)
+        let triangles = triangles(corners);
+        two_sided(&Shells::of(&triangles), &triangles, Sides::Auto)
+    }
+
+    #[test]
+    fn twins_are_each_others_backs_and_doubles_are_found() {
+        // A sheet of two triangles, each with a twin, beside one without.
+        let corners = [
+            [0, 1, 2],
+            [1, 0, 2],
+            [2, 1, 3],
+            [1, 2, 3],
+            [1, 3, 4],
+            [2, 0, 1],
+        ];
+        let coincident = Coincident::of(&corners);
+        let found: Vec<bool> = (0..6).map(|i| coincident.is_double(i)).collect();
+        assert_eq!(found, [false, false, false, false, false, true]);
+        let list = triangles(&corners);
+        for sides in [Sides::Auto, Sides::Two] {
+            let flags = two_sided(&Shells::of(&list), &list, sides);
+            assert_eq!(
+                flags,
+                [false, false, false, false, true, false],
+                "{sides:?}"
+            );
+        }
     }
 
     #[test]

