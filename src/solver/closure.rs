@@ -6,10 +6,10 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Cancel, Solver};
+use super::{Cancel, Solver, groups};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
-    hierarchy::{Cluster, Hierarchy},
+    hierarchy::Hierarchy,
 };
 
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
@@ -27,7 +27,7 @@ const CELLS_PER_RAY: usize = 2;
 
 /// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
 /// `GROUP_RAYS` find closed may yet see a few holes, and where walls are white these few decide.
-const SECOND_RAYS: usize = 200_000;
+const SECOND_RAYS: usize = 100_000;
 
 /// Rays of the second look per group at most.
 const MOST_SECOND_RAYS: usize = 1024;
@@ -126,6 +126,11 @@ impl Closures {
             element = hierarchy.mesh.elements[element].parent as usize;
         }
         element
+    }
+
+    /// Whether nothing was probed yet.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     /// The closure of a cell.
@@ -266,9 +271,9 @@ pub(super) fn closures(
 }
 
 /// The leaf elements of a cluster, in the order of its patches.
-fn cells(hierarchy: &Hierarchy, cluster: &Cluster) -> Vec<usize> {
+fn cells(hierarchy: &Hierarchy, cluster: usize) -> Vec<usize> {
     let mut cells = Vec::new();
-    let mut pending: Vec<usize> = cluster.patches().rev().collect();
+    let mut pending: Vec<usize> = hierarchy.clusters[cluster].patches().rev().collect();
     while let Some(index) = pending.pop() {
         let element = &hierarchy.mesh.elements[index];
         if element.is_leaf() {
@@ -279,22 +284,6 @@ fn cells(hierarchy: &Hierarchy, cluster: &Cluster) -> Vec<usize> {
         }
     }
     cells
-}
-
-/// The largest clusters with few enough patches, in the order of the patches.
-fn groups(hierarchy: &Hierarchy, most_patches: u32) -> Vec<&Cluster> {
-    let is_small =
-        |cluster: &Cluster| cluster.is_leaf() || cluster.end - cluster.start <= most_patches;
-    let parent = |cluster: &Cluster| hierarchy.clusters.get(cluster.parent as usize);
-    let mut groups: Vec<&Cluster> = hierarchy
-        .clusters
-        .iter()
-        .filter(|cluster| {
-            is_small(cluster) && parent(cluster).is_none_or(|parent| !is_small(parent))
-        })
-        .collect();
-    groups.sort_unstable_by_key(|cluster| cluster.start);
-    groups
 }
 
 /// How many of some cosine-weighted rays from an element meet a lit side; `first` numbers them within the element.

@@ -9,7 +9,8 @@ use std::f32::consts::PI;
 use glam::{Vec3, Vec4};
 
 use super::{
-    InspectedLink, Inspection, PathNode, Place, Solver, Subject, reconstruct::chain_irradiance,
+    InspectedLink, Inspection, PathNode, Place, Solver, Subject,
+    reconstruct::{link_irradiance, own_irradiance},
 };
 use crate::{
     geometry::barycentric_in_plane,
@@ -116,9 +117,13 @@ impl Solver {
                 let share = match self.hierarchy.kind(node) {
                     Kind::Cluster(index) => mean_irradiance(kernel, index, receiver, link),
                     Kind::Element(leaf) => {
-                        let point = self.hierarchy.mesh.elements[leaf].centroid;
-                        let normal = self.hierarchy.patch_of(leaf).normal;
-                        chain_irradiance(kernel, receiver.index(), link, point, normal)
+                        if link.source == receiver {
+                            own_irradiance(kernel, receiver.index(), link)
+                        } else {
+                            let point = self.hierarchy.mesh.elements[leaf].centroid;
+                            let normal = self.hierarchy.patch_of(leaf).normal;
+                            link_irradiance(kernel, link, point, normal)
+                        }
                     }
                 };
                 found.push(InspectedLink {
@@ -136,6 +141,9 @@ impl Solver {
 
     /// By what the light of a leaf is scaled so that its form factors add to the closure.
     fn closure_factor(&self, leaf: usize, row_sum: f32) -> f32 {
+        if self.leaves.is_empty() {
+            return 1.0;
+        }
         let elements = &self.hierarchy.mesh.elements;
         let cell_of = |element| self.closures.cell(&self.hierarchy, element);
         let cell = cell_of(leaf);
@@ -221,7 +229,7 @@ fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Li
     let cluster = &hierarchy.clusters[index];
     if link.source == receiver {
         // Light within a cluster comes from everywhere alike.
-        return chain_irradiance(kernel, receiver.index(), link, cluster.centroid, Vec3::ZERO);
+        return own_irradiance(kernel, receiver.index(), link);
     }
     let incident = kernel.vector_irradiance(link.source, cluster.centroid);
     let moments = &kernel.tables.clusters[index];

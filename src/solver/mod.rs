@@ -33,7 +33,7 @@ pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
 use crate::{
     geometry::RayTree,
-    hierarchy::{Hierarchy, Reading, Tables},
+    hierarchy::{Cluster, Hierarchy, Reading, Tables},
     scene::Scene,
     transport::{
         Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
@@ -162,18 +162,26 @@ impl Solver {
         Some(solver)
     }
 
-    /// Probe closures and sample direct light on the first mesh, so that there is something to see before the first link.
+    /// Sample direct light on the first mesh, so that there is something to see before the first link.
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(1.0);
         adapt::divide_coarse(&mut self.hierarchy, limits);
-        let (closures, shot) = closure::closures(&self.hierarchy, &self.rays, limits.seed, cancel)?;
-        self.closures = closures;
-        self.ray_count += shot;
         if let Some(field) = &mut self.direct {
             let (count, seed) = (limits.shadow_samples, limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
         self.extend_to_new_elements();
+        Some(())
+    }
+
+    /// Probe closures, on the first mesh.
+    fn probe_closures(&mut self, cancel: &Cancel) -> Option<()> {
+        if self.closures.is_empty() {
+            let seed = self.settings.seed;
+            let (closures, shot) = closure::closures(&self.hierarchy, &self.rays, seed, cancel)?;
+            self.closures = closures;
+            self.ray_count += shot;
+        }
         Some(())
     }
 
@@ -188,6 +196,7 @@ impl Solver {
             THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
         report.epsilon = self.settings.epsilon * fineness;
         self.is_full = false;
+        self.probe_closures(cancel)?;
         self.adapt_to_direct(fineness, cancel)?;
         cancel.proceed()?;
         self.pull();
@@ -422,4 +431,19 @@ fn displayable(color: Vec4) -> Vec3 {
     color
         .truncate()
         .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
+}
+
+/// The largest clusters with few enough patches, in the order of the patches.
+fn groups(hierarchy: &Hierarchy, most_patches: u32) -> Vec<usize> {
+    let clusters = &hierarchy.clusters;
+    let is_small =
+        |cluster: &Cluster| cluster.is_leaf() || cluster.end - cluster.start <= most_patches;
+    let mut groups: Vec<usize> = (0..clusters.len())
+        .filter(|&index| {
+            let parent = clusters.get(clusters[index].parent as usize);
+            is_small(&clusters[index]) && parent.is_none_or(|parent| !is_small(parent))
+        })
+        .collect();
+    groups.sort_unstable_by_key(|&index| clusters[index].start);
+    groups
 }

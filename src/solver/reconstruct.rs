@@ -10,15 +10,23 @@ use rayon::prelude::*;
 use super::{
     Cancel,
     closure::{Closure, Closures},
+    groups,
 };
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
-    transport::{Kernel, Link, LinkStore, self_irradiance},
+    transport::{Kernel, Link, LinkStore, Sight, self_irradiance},
 };
 
 /// Corners are moved this share of the way to the centroid before light is evaluated there: exactly on an edge, a
 /// neighbour at an angle would be seen edge-on, or from within the object that stands on it.
 pub(super) const INSET: f32 = 0.02;
+
+/// Patches of the clusters whose leaves are visited by one task.
+const TASK_PATCHES: u32 = 256;
+
+/// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
+/// seams show between groups; larger, and the same is worked out again and again.
+const SIGHT_DISTANCE: f32 = 16.0;
 
 /// What a leaf found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,29 +48,20 @@ pub(super) fn gather_leaves(
     closures: &Closures,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
-    let hierarchy = kernel.hierarchy;
-    let leaf_clusters: Vec<usize> = (0..hierarchy.clusters.len())
-        .filter(|&index| hierarchy.clusters[index].is_leaf())
-        .collect();
-    let found: Vec<Vec<LeafLight>> = leaf_clusters
-        .par_iter()
-        .with_min_len(8)
-        .map(|&cluster| {
-            let mut found = Vec::new();
-            if cancel.is_cancelled() {
-                return found;
+    let found: Vec<Vec<LeafLight>> = groups(kernel.hierarchy, TASK_PATCHES)
+        .into_par_iter()
+        .map(|group| {
+            let mut walk = Walk {
+                kernel,
+                links,
+                closures,
+                path: Vec::new(),
+                found: Vec::new(),
+            };
+            if !cancel.is_cancelled() {
+                walk.enter(group);
             }
-            let chain = chain_above(hierarchy, links, cluster);
-            for patch in hierarchy.clusters[cluster].patches() {
-                let first = found.len();
-                gather_patch(kernel, links, &chain, patch, &mut found);
-                // Leaves come depth first, so those of a cell follow each other.
-                let cell = |leaf: &LeafLight| closures.cell(hierarchy, leaf.element as usize);
-                for leaves in found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-                    scale_to_closure(hierarchy, closures.of(cell(&leaves[0])), leaves);
-                }
-            }
-            found
+            walk.found
         })
         .collect();
     cancel.proceed()?;
@@ -84,101 +83,188 @@ fn scale_to_closure(hierarchy: &Hierarchy, closure: Closure, leaves: &mut [LeafL
     }
 }
 
-/// The links of a cluster and of all above it, each with the cluster that receives over it.
-fn chain_above<'a>(
-    hierarchy: &Hierarchy,
-    links: &'a LinkStore,
-    cluster: usize,
-) -> Vec<(usize, &'a [Link])> {
-    let mut chain = Vec::new();
-    let mut at = cluster;
-    loop {
-        let here = links.of(NodeId(at as u32));
-        if !here.is_empty() {
-            chain.push((at, here));
+/// Links of a node, and what is left of those above it, as far as they are worked out for all leaves below together.
+#[derive(Default)]
+struct Chain<'a> {
+    /// Irradiance that is the same everywhere.
+    even: Vec4,
+    /// Sources that are far enough to look alike from everywhere, with their transmissions.
+    sights: Vec<(Sight, Vec4)>,
+    /// The others.
+    rest: Vec<&'a Link>,
+    /// Links of elements, whose light is wanted at the corners of the leaves.
+    own: &'a [Link],
+    /// Sum of the errors of the links of clusters.
+    error: f32,
+}
+
+impl<'a> Chain<'a> {
+    /// Take a link over. It is worked out if its source looks alike from everywhere in a ball.
+    fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, radius: f32) {
+        let far = SIGHT_DISTANCE * radius;
+        match kernel.hierarchy.kind(link.source) {
+            Kind::Cluster(index)
+                if centre.distance_squared(kernel.tables.centres[index]) > far * far =>
+            {
+                let sight = kernel.sight(index, centre);
+                self.sights.push((sight, link.transmission()));
+            }
+            _ => self.rest.push(link),
         }
-        match hierarchy.clusters[at].parent {
-            u32::MAX => return chain,
-            parent => at = parent as usize,
-        }
+    }
+
+    /// Irradiance over the links that are worked out.
+    fn known(&self, point: Vec3, normal: Vec3) -> Vec4 {
+        let sights = self.sights.iter();
+        sights.fold(self.even, |sum, (sight, transmission)| {
+            sum + sight.incident(point).on_face(normal) * *transmission
+        })
     }
 }
 
-/// Light of all leaves of one patch.
-fn gather_patch(
-    kernel: Kernel<'_>,
-    links: &LinkStore,
-    chain: &[(usize, &[Link])],
-    patch: usize,
-    found: &mut Vec<LeafLight>,
-) {
-    let hierarchy = kernel.hierarchy;
-    let normal = hierarchy.patches[patch].normal;
-    let base = hierarchy.clusters.len() as u32;
-    let mut path: Vec<&[Link]> = Vec::new();
-    // Elements with the length of the path above them: depth first, without recursion.
-    let mut pending = vec![(patch, 0)];
-    while let Some((index, depth)) = pending.pop() {
-        let element = &hierarchy.mesh.elements[index];
-        path.truncate(depth);
-        path.push(links.of(NodeId(base + index as u32)));
-        if !element.is_leaf() {
+/// A walk over the leaves below a cluster, in the order of the tree.
+struct Walk<'a> {
+    kernel: Kernel<'a>,
+    links: &'a LinkStore,
+    closures: &'a Closures,
+    /// Of the nodes above the current one.
+    path: Vec<Chain<'a>>,
+    found: Vec<LeafLight>,
+}
+
+impl<'a> Walk<'a> {
+    /// Visit all leaves below a cluster.
+    fn enter(&mut self, group: usize) {
+        let hierarchy = self.kernel.hierarchy;
+        let mut above: Vec<usize> = Vec::new();
+        let mut at = hierarchy.clusters[group].parent;
+        while at != u32::MAX {
+            above.push(at as usize);
+            at = hierarchy.clusters[at as usize].parent;
+        }
+        for &cluster in above.iter().rev() {
+            self.push_cluster(cluster);
+        }
+        let mut pending = vec![(group, self.path.len())];
+        while let Some((cluster, depth)) = pending.pop() {
+            self.path.truncate(depth);
+            self.push_cluster(cluster);
+            if hierarchy.clusters[cluster].is_leaf() {
+                for patch in hierarchy.clusters[cluster].patches() {
+                    self.visit_patch(patch);
+                }
+            } else {
+                let children = hierarchy.children(NodeId(cluster as u32));
+                pending.extend(children.rev().map(|child| (child as usize, depth + 1)));
+            }
+        }
+    }
+
+    /// Add a node to the path, with the links that are not worked out above it.
+    fn push(&mut self, centre: Vec3, radius: f32, mut chain: Chain<'a>) {
+        if let Some(above) = self.path.last() {
+            for link in &above.rest {
+                chain.add(self.kernel, link, centre, radius);
+            }
+        }
+        self.path.push(chain);
+    }
+
+    fn push_cluster(&mut self, index: usize) {
+        let cluster = &self.kernel.hierarchy.clusters[index];
+        let mut chain = Chain::default();
+        for link in self.links.of(NodeId(index as u32)) {
+            chain.error += link.error;
+            if link.source.index() == index {
+                chain.even += own_irradiance(self.kernel, index, link);
+            } else {
+                chain.add(self.kernel, link, cluster.centroid, cluster.radius);
+            }
+        }
+        self.push(cluster.centroid, cluster.radius, chain);
+    }
+
+    /// Visit the leaves of a patch.
+    fn visit_patch(&mut self, patch: usize) {
+        let hierarchy = self.kernel.hierarchy;
+        let normal = hierarchy.patches[patch].normal;
+        let base = hierarchy.clusters.len() as u32;
+        let (first, above) = (self.found.len(), self.path.len());
+        // Elements with the length of the path above them: depth first, without recursion.
+        let mut pending = vec![(patch, above)];
+        while let Some((index, depth)) = pending.pop() {
+            let element = &hierarchy.mesh.elements[index];
+            self.path.truncate(depth);
+            let own = self.links.of(NodeId(base + index as u32));
+            if element.is_leaf() {
+                let light = self.leaf_light(index, normal, own);
+                self.found.push(light);
+                continue;
+            }
+            let chain = Chain {
+                own,
+                ..Chain::default()
+            };
+            self.push(element.centroid, element.radius, chain);
             pending.extend(
                 (0..4)
                     .rev()
                     .map(|child| (element.first_child as usize + child, depth + 1)),
             );
-            continue;
         }
+        self.path.truncate(above);
+        // Leaves come depth first, so those of a cell follow each other.
+        let cell = |leaf: &LeafLight| self.closures.cell(hierarchy, leaf.element as usize);
+        for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
+            scale_to_closure(hierarchy, self.closures.of(cell(&leaves[0])), leaves);
+        }
+    }
+
+    /// What a leaf finds; `own` are its links.
+    fn leaf_light(&self, index: usize, normal: Vec3, own: &[Link]) -> LeafLight {
+        let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
+        let centroid = hierarchy.mesh.elements[index].centroid;
         let mut light = LeafLight {
             element: index as u32,
             ..LeafLight::default()
         };
-        for &(receiver, links) in chain {
-            for link in links {
-                light.error += link.error;
-                light.centre += chain_irradiance(kernel, receiver, link, element.centroid, normal);
-            }
+        for chain in &self.path {
+            light.error += chain.error;
+            light.centre += chain.known(centroid, normal);
+        }
+        for link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
+            light.centre += link_irradiance(kernel, link, centroid, normal);
         }
         light.corners = [light.centre; 3];
         let corners = hierarchy
             .mesh
             .corners(index)
-            .map(|corner| corner.lerp(element.centroid, INSET));
-        for link in path.iter().copied().flatten() {
+            .map(|corner| corner.lerp(centroid, INSET));
+        let elements = self.path.iter().flat_map(|chain| chain.own);
+        for link in elements.chain(own) {
             light.error += link.error;
-            let transmission = match hierarchy.kind(link.source) {
-                Kind::Cluster(_) => link.transmission(),
-                Kind::Element(_) => Vec4::splat(link.visibility),
-            };
-            light.centre += kernel.irradiance(link.source, element.centroid, normal) * transmission;
+            light.centre += link_irradiance(kernel, link, centroid, normal);
             for (sum, &corner) in light.corners.iter_mut().zip(&corners) {
-                *sum += kernel.irradiance(link.source, corner, normal) * transmission;
+                *sum += link_irradiance(kernel, link, corner, normal);
             }
         }
-        found.push(light);
+        light
     }
 }
 
-/// What a face receives over a link of a cluster above it.
-pub(super) fn chain_irradiance(
-    kernel: Kernel<'_>,
-    receiver: usize,
-    link: &Link,
-    point: Vec3,
-    normal: Vec3,
-) -> Vec4 {
-    if link.source.index() == receiver {
-        return self_irradiance(
-            kernel.hierarchy,
-            receiver,
-            kernel.tables.clusters[receiver].total(),
-        ) * link.transmission();
-    }
-    debug_assert!(
-        !matches!(kernel.hierarchy.kind(link.source), Kind::Cluster(index) if index == receiver)
-    );
-    kernel.irradiance(link.source, point, normal) * link.transmission()
+/// What all faces of a cluster receive over its link with itself.
+pub(super) fn own_irradiance(kernel: Kernel<'_>, cluster: usize, link: &Link) -> Vec4 {
+    let total = kernel.tables.clusters[cluster].total();
+    self_irradiance(kernel.hierarchy, cluster, total) * link.transmission()
+}
+
+/// What a face receives over a link from another node, of its own or of what is above it.
+pub(super) fn link_irradiance(kernel: Kernel<'_>, link: &Link, point: Vec3, normal: Vec3) -> Vec4 {
+    let transmission = match kernel.hierarchy.kind(link.source) {
+        Kind::Cluster(_) => link.transmission(),
+        Kind::Element(_) => Vec4::splat(link.visibility),
+    };
+    kernel.irradiance(link.source, point, normal) * transmission
 }
 
 /// Area-weighted means of the leaves about each vertex.

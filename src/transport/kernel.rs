@@ -48,6 +48,36 @@ impl Incident {
     }
 }
 
+/// A cluster as it looks from about a point: what it sends there, by which its light is known at all points near by.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    /// Where the power comes from.
+    pub centre: Vec3,
+    /// Projected power along the way to the point.
+    power: Vec4,
+    /// Largest radiosity.
+    brightest: Vec4,
+    /// Square of the radius over which the light spreads, 0 if it does not.
+    spreads: f32,
+}
+
+impl Sight {
+    /// Vector irradiance at a point so near to that of the sight that the power along the way is the same.
+    pub fn incident(&self, point: Vec3) -> Incident {
+        let separation = point - self.centre;
+        let squared = separation.length_squared();
+        let towards_source = -separation / squared.sqrt();
+        if squared <= 0.0 || !towards_source.is_finite() {
+            return Incident::default();
+        }
+        Incident {
+            towards_source,
+            strength: (self.power * (1.0 / (PI * squared))).saturated(self.brightest),
+            spread: (self.spreads / squared).min(1.0),
+        }
+    }
+}
+
 /// Reads the source tables of a hierarchy by one method.
 #[derive(Clone, Copy)]
 pub struct Kernel<'a> {
@@ -97,34 +127,46 @@ impl Kernel<'_> {
         sum
     }
 
+    /// A cluster as it looks from about a point.
+    pub fn sight(&self, cluster: usize, point: Vec3) -> Sight {
+        let centre = self.tables.centres[cluster];
+        let radius = self.hierarchy.clusters[cluster].radius;
+        let separation = point - centre;
+        let squared = separation.length_squared();
+        let unit = separation / squared.sqrt();
+        let spread = self.spread(radius, squared);
+        let power = if squared <= 0.0 || !unit.is_finite() {
+            Vec4::ZERO
+        } else if spread == 0.0 {
+            self.cluster_power(cluster, unit)
+        } else {
+            self.tables.clusters[cluster].project_spread(unit, spread)
+        };
+        Sight {
+            centre,
+            power,
+            brightest: self.tables.brightest[cluster],
+            spreads: if spread > 0.0 { radius * radius } else { 0.0 },
+        }
+    }
+
+    fn spread(&self, radius: f32, squared: f32) -> f32 {
+        match self.reading {
+            Some(Reading::Bounded) => (radius * radius / squared.max(f32::MIN_POSITIVE)).min(1.0),
+            _ => 0.0,
+        }
+    }
+
     /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards its brightest patch, as that of a disc does exactly on its axis:
     /// A/π r² becomes A/(π r² + A).
     pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident {
-        let separation = point - self.tables.centre(self.hierarchy, source);
-        let squared = separation.length_squared();
-        let radius = self.hierarchy.radius(source);
-        let spread = match self.reading {
-            Some(Reading::Bounded) => (radius * radius / squared.max(f32::MIN_POSITIVE)).min(1.0),
-            _ => 0.0,
-        };
         match self.hierarchy.kind(source) {
-            Kind::Cluster(index) => {
-                let unit = separation / squared.sqrt();
-                if squared <= 0.0 || !unit.is_finite() {
-                    return Incident::default();
-                }
-                let power = match spread {
-                    0.0 => self.cluster_power(index, unit),
-                    _ => self.tables.clusters[index].project_spread(unit, spread),
-                };
-                let strength = power * (1.0 / (PI * squared));
-                Incident {
-                    towards_source: -unit,
-                    strength: strength.saturated(self.tables.brightest[index]),
-                    spread,
-                }
-            }
+            Kind::Cluster(index) => self.sight(index, point).incident(point),
             Kind::Element(index) => {
+                let spread = self.spread(
+                    self.hierarchy.radius(source),
+                    point.distance_squared(self.tables.centre(self.hierarchy, source)),
+                );
                 let vector = element_vector(self.hierarchy, index, point);
                 let length = vector.length();
                 let towards_source = if length > 0.0 {

@@ -6,7 +6,7 @@ mod oracle;
 mod refine;
 mod visibility;
 
-pub use kernel::{Incident, Kernel, element_form_factor};
+pub use kernel::{Incident, Kernel, Sight, element_form_factor};
 pub use link::{Link, LinkStore};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};

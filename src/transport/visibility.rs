@@ -18,7 +18,7 @@ use crate::{
 
 /// Candidate pairs of points for each ray. One candidate is the area-uniform way with its noise; more than some four
 /// cost as much as the ray that they improve.
-const CANDIDATES: u32 = 3;
+const CANDIDATES: u32 = 6;
 
 /// Share of the source's points that are chosen by power; the others by area. Few bright patches carry much of the light
 /// of many clusters, and what is bright is often what stands free: chosen by area, the light would seem blocked.
