@@ -99,6 +99,34 @@ fn a_reference_puts_an_error_into_every_step() {
 }
 
 #[test]
+fn a_solve_writes_glb_where_the_name_ends_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["--export", "lit.GLB", "--up", "+Z", "--exposure", "-1"];
+    let output = solve(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let glb = fs::read(folder.path().join("lit.GLB")).unwrap();
+    let number = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!(
+        (&glb[..4], number(4), number(8)),
+        (&b"glTF"[..], 2, glb.len())
+    );
+    let text = &glb[20..20 + number(12)];
+    let document: serde_json::Value = serde_json::from_slice(text).unwrap();
+    assert_eq!(document["meshes"][0]["extras"]["exposure_ev"], -1.0);
+    assert_eq!(document["nodes"][1]["children"][0], 0, "+Z is turned");
+    // Two one-sided plates of two triangles each at least.
+    let count = |accessor: usize| document["accessors"][accessor]["count"].as_u64().unwrap();
+    let (vertices, corners) = (count(0), count(5));
+    assert!(corners >= 12 && vertices >= 8);
+    let indices = &glb[glb.len() - 4 * corners as usize..];
+    assert!(
+        indices
+            .chunks_exact(4)
+            .all(|bytes| { u64::from(u32::from_le_bytes(bytes.try_into().unwrap())) < vertices })
+    );
+}
+
+#[test]
 fn a_limit_ends_with_code_4_and_writes_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     let output = solve(
@@ -114,7 +142,7 @@ fn a_limit_ends_with_code_4_and_writes_what_there_is() {
 fn wrong_usage_ends_with_code_2_and_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, sentence) in [
-        (&["--export", "lit.obj"][..], "must end in .ply"),
+        (&["--export", "lit.obj"][..], "must end in .ply or .glb"),
         (&["--export", "missing/lit.ply"], "there is no such folder"),
         (&["--epsilon", "-1"], "at least 0"),
         (&["--threads", "0"], "--threads"),

@@ -424,6 +424,46 @@ fn emission_is_scaled_at_once_and_reset() {
 }
 
 #[test]
+fn the_lit_mesh_is_exported_in_either_format() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let mut harness = plates();
+    for (label, ending, magic) in [("GLB", "glb", &b"glTF"[..]), ("PLY", "ply", &b"ply\n"[..])] {
+        harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::E);
+        harness.run_steps(3);
+        let path = folder.path().join("lit.obj");
+        harness.state_mut().state.panels.mesh_text = path.display().to_string();
+        harness.run_steps(2);
+        harness.get_by_label("Export").click();
+        harness.run_steps(2);
+        assert!(harness.state().state.panels.mesh, "that is no format");
+        harness.get_by_label(label).click();
+        harness.run_steps(2);
+        harness.get_by_label("Export").click();
+        harness.run_steps(2);
+        assert!(!harness.state().state.panels.mesh);
+        let path = path.with_extension(ending);
+        wait_for(&mut harness, |_| path.exists());
+        wait_for(&mut harness, |app| {
+            let said = app.state.messages.all.last();
+            said.is_some_and(|said| said.text.ends_with(&format!("lit.{ending}")))
+        });
+        assert!(fs::read(&path).is_ok_and(|bytes| bytes.starts_with(magic)));
+    }
+}
+
+#[test]
+fn the_layout_is_reset() {
+    let mut harness = plates();
+    harness.state_mut().state.panels.light = false;
+    harness.ctx.set_zoom_factor(1.5);
+    harness.run_steps(3);
+    perform(&mut harness, Action::ResetLayout);
+    assert!(harness.state().state.panels.light);
+    assert_eq!(harness.ctx.zoom_factor(), 1.0);
+    harness.get_by_label("Statistics");
+}
+
+#[test]
 fn an_idle_window_asks_for_no_frames() {
     let mut harness = plates();
     // Ends only when nothing asks for another frame; a restless window exceeds the steps and panics.

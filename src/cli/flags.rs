@@ -5,7 +5,7 @@ use std::{str::FromStr, time::Duration};
 use clap::{Args, ValueEnum};
 
 use crate::{
-    export::{ColorOptions, PlyOptions, ToneMap, UpAxis},
+    export::{ColorOptions, MeshOptions, ToneMap, UpAxis},
     scene::{SceneOptions, Sides},
     solver::{Direct, Method, Oracle, SolveSettings},
     worker::RunOptions,
@@ -164,8 +164,8 @@ impl RunFlags {
     }
 
     /// How exported files look.
-    pub fn export(&self, up: UpFlag) -> PlyOptions {
-        PlyOptions {
+    pub fn export(&self, up: UpFlag) -> MeshOptions {
+        MeshOptions {
             color: ColorOptions {
                 exposure_ev: self.exposure.unwrap_or(0.0),
                 tone_map: match self.tonemap {

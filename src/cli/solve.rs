@@ -21,7 +21,7 @@ use super::{
     truth::{self, Errors, Truth},
 };
 use crate::{
-    export::write_ply,
+    export::MeshFormat,
     reference::MatrixError,
     scene::Scene,
     solver::{Snapshot, StepReport},
@@ -42,7 +42,7 @@ pub struct SolveArguments {
     /// Built-in scene to light
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
-    /// Write the lit mesh (.ply)
+    /// Write the lit mesh (.ply or .glb)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub export: Option<PathBuf>,
     /// Write the report (JSON; - for standard output)
@@ -162,13 +162,7 @@ fn errors_of(
 /// Refuse what cannot be written before the work begins.
 fn check_outputs(arguments: &SolveArguments) -> Result<()> {
     if let Some(path) = &arguments.export {
-        let is_ply = path
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
-        if !is_ply {
-            let message = format!("the exported file must end in .ply: {}", path.display());
-            bail!(UsageError(message));
-        }
+        MeshFormat::of(path).map_err(|error| UsageError(error.to_string()))?;
         output::check(path)?;
     }
     #[cfg(feature = "viewer")]
@@ -292,8 +286,9 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
         return Ok(());
     };
     let export = arguments.run_flags.export(arguments.scene_flags.up);
-    output::write_whole(path, |mut out| {
-        write_ply(&mut out, &run.snapshot, &scene.frame, &export)
+    let format = MeshFormat::of(path)?;
+    output::write_whole(path, |out| {
+        format.write(out, &run.snapshot, &scene.frame, &export)
     })
 }
 

@@ -1,9 +1,11 @@
 //! Files of the lit scene and of reports: one format a file, and the colours they share.
 
 mod color;
+mod glb;
+mod mesh;
 mod plot;
 mod ply;
 
 pub use color::{ColorOptions, ToneMap, linear_from_srgb, neutral, srgb_from_linear};
+pub use mesh::{MeshFormat, MeshOptions, UnknownMeshFormat, UpAxis};
 pub use plot::{Curve, CurvePlot};
-pub use ply::{PlyOptions, UpAxis, write_ply};

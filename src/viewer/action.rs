@@ -81,10 +81,16 @@ pub enum Action {
         /// Width and height.
         size: [u32; 2],
     },
+    /// Ask where the lit mesh is to go.
+    MeshDialog,
+    /// Write the lit mesh; the ending names the format.
+    SaveMesh(PathBuf),
     /// Write settings and camera beside the scene.
     SaveSidecar,
     /// Panels on or off.
     TogglePanels,
+    /// Panels, their sizes and the size of text as at first.
+    ResetLayout,
     /// Whole screen on or off.
     ToggleFullScreen,
     /// The key sheet on or off.

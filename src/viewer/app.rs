@@ -54,7 +54,7 @@ pub struct App {
     /// Since when the file dialog is open.
     dialog_since: Option<Instant>,
     notices: (Sender<Notice>, Receiver<Notice>),
-    pictures: Unfinished,
+    unfinished: Unfinished,
     /// Set from the command line for the first scene only.
     first: Option<Options>,
     /// A new title for the window.
@@ -112,7 +112,7 @@ impl App {
             chosen: mpsc::channel(),
             dialog_since: None,
             notices: mpsc::channel(),
-            pictures: Unfinished::default(),
+            unfinished: Unfinished::default(),
             first: None,
             title: None,
             keeps_view: false,
@@ -131,7 +131,7 @@ impl App {
 impl Drop for App {
     fn drop(&mut self) {
         // What was asked for is written, even when the window closes at once.
-        self.pictures.finish();
+        self.unfinished.finish();
     }
 }
 
@@ -188,6 +188,7 @@ impl eframe::App for App {
             .inner;
         panels::scene::path_window(&ctx, &mut self.state, &mut actions);
         panels::picture::picture_window(&ctx, &mut self.state, &mut actions);
+        panels::mesh::mesh_window(&ctx, &mut self.state, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
         dropping::hover_ui(&ctx);
         if self.state.view != before {

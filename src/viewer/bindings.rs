@@ -208,6 +208,7 @@ pub fn bindings() -> Vec<Binding> {
             "Save camera and settings beside the scene",
             Action::SaveSidecar,
         ),
+        command(Key::E, File, "Export the lit mesh…", Action::MeshDialog),
         plain(
             Key::F12,
             File,

@@ -1,4 +1,4 @@
-//! Pictures to files, on a thread of their own.
+//! Pictures and lit meshes to files, on threads of their own.
 
 use std::{
     io::Cursor,
@@ -10,15 +10,21 @@ use std::{
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
 
 use super::{
+    loader::SceneSource,
     render::{Gpu, ReadError, Target},
     state::Severity,
 };
-use crate::{scene::write_whole, worker::Wake};
+use crate::{
+    export::{MeshFormat, MeshOptions, UnknownMeshFormat},
+    scene::{Frame, folder_of, write_whole},
+    solver::Snapshot,
+    worker::Wake,
+};
 
 /// A sentence from another thread.
 pub type Notice = (Severity, String);
 
-/// Threads that write pictures; the program stays until they are done.
+/// Threads that write files; the program stays until they are done.
 #[derive(Clone, Default)]
 pub struct Unfinished(Arc<Mutex<Vec<JoinHandle<()>>>>);
 
@@ -71,12 +77,40 @@ impl Shot {
     }
 }
 
-/// A picture on its way to a file.
+/// What becomes a file.
+pub enum Content {
+    /// A picture; `.exr` takes the radiance.
+    Picture(Shot),
+    /// The mesh with light at its vertices.
+    Mesh(LitMesh),
+}
+
+/// A mesh to be exported.
+pub struct LitMesh {
+    /// Mesh and light.
+    pub snapshot: Arc<Snapshot>,
+    /// Of the scene.
+    pub frame: Frame,
+    /// What the file says beside.
+    pub options: MeshOptions,
+}
+
+impl LitMesh {
+    fn save(&self, path: &Path) -> Result<(), EncodeError> {
+        let format = MeshFormat::of(path)?;
+        write_whole(path, |out| {
+            format.write(out, &self.snapshot, &self.frame, &self.options)
+        })
+        .map_err(EncodeError::Write)
+    }
+}
+
+/// Something on its way to a file.
 pub struct Saving {
-    /// Where to; `.exr` takes the radiance.
+    /// Where to; the ending names the format.
     pub path: PathBuf,
-    /// Where from.
-    pub shot: Shot,
+    /// What.
+    pub content: Content,
 }
 
 impl Saving {
@@ -84,7 +118,7 @@ impl Saving {
     pub fn start(self, notices: Sender<Notice>, unfinished: &Unfinished, wake: Wake) {
         let failed = notices.clone();
         let spawned = thread::Builder::new()
-            .name("picture".to_owned())
+            .name("saver".to_owned())
             .spawn(move || {
                 // Nobody listens once the window is closed.
                 let _ = notices.send(self.write());
@@ -93,14 +127,18 @@ impl Saving {
         match spawned {
             Ok(thread) => unfinished.add(thread),
             Err(error) => {
-                let text = format!("cannot save the picture: {error}");
+                let text = format!("cannot start to save: {error}");
                 let _ = failed.send((Severity::Error, text));
             }
         }
     }
 
     fn write(self) -> Notice {
-        match self.shot.read().and_then(|shot| save(shot, &self.path)) {
+        let written = match self.content {
+            Content::Picture(shot) => shot.read().and_then(|shot| save(shot, &self.path)),
+            Content::Mesh(mesh) => mesh.save(&self.path),
+        };
+        match written {
             Ok(()) => {
                 let place = std::path::absolute(&self.path).unwrap_or(self.path);
                 (Severity::Note, format!("saved {}", place.display()))
@@ -121,7 +159,7 @@ fn save(
     write_whole(path, |out| out.write_all(&bytes)).map_err(EncodeError::Write)
 }
 
-/// Why a picture does not become a file.
+/// Why something does not become a file.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
     /// It did not come back from the adapter.
@@ -133,6 +171,9 @@ pub enum EncodeError {
     /// The format is unknown or does not take it.
     #[error(transparent)]
     Format(#[from] image::ImageError),
+    /// The format is none of meshes.
+    #[error(transparent)]
+    MeshFormat(#[from] UnknownMeshFormat),
     /// The system refuses.
     #[error(transparent)]
     Write(std::io::Error),
@@ -164,6 +205,21 @@ pub fn free_path(scene: &str) -> PathBuf {
         .and_then(|folders| folders.picture_dir().map(Path::to_owned))
         .filter(|folder| folder.is_dir())
         .unwrap_or_default();
+    free_name(&folder, &plain_stem(scene), "png")
+}
+
+/// A name for the lit mesh that is free, beside the scene where that is a file: `scene_lit_1.glb` and on.
+pub fn free_mesh_path(source: &SceneSource) -> PathBuf {
+    let folder = source
+        .path()
+        .map(|path| folder_of(path).to_owned())
+        .unwrap_or_default();
+    let stem = format!("{}_lit", plain_stem(&source.label()));
+    free_name(&folder, &stem, MeshFormat::Glb.extension())
+}
+
+/// The name of a scene as files may have it.
+fn plain_stem(scene: &str) -> String {
     let stem: String = scene
         .trim_end_matches(".obj")
         .chars()
@@ -175,9 +231,16 @@ pub fn free_path(scene: &str) -> PathBuf {
             }
         })
         .collect();
-    let stem = if stem.is_empty() { "vecrad" } else { &stem };
+    if stem.is_empty() {
+        "vecrad".to_owned()
+    } else {
+        stem
+    }
+}
+
+fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
     (1_u32..)
-        .map(|number| folder.join(format!("{stem}_{number}.png")))
+        .map(|number| folder.join(format!("{stem}_{number}.{extension}")))
         .find(|path| !path.exists())
-        .unwrap_or_else(|| folder.join("vecrad.png"))
+        .unwrap_or_else(|| folder.join(format!("vecrad.{extension}")))
 }

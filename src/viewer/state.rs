@@ -209,12 +209,16 @@ pub struct PanelState {
     pub help: bool,
     /// Whether the dialog for pictures is open.
     pub picture: bool,
+    /// Whether the dialog for the lit mesh is open.
+    pub mesh: bool,
     /// Whether the field for a path is open.
     pub path: bool,
     /// The typed path.
     pub path_text: String,
     /// The typed path of a picture.
     pub picture_text: String,
+    /// The typed path of the lit mesh.
+    pub mesh_text: String,
     /// Size of a picture in pixels.
     pub picture_size: [u32; 2],
     /// Whether the messages are to be opened.
@@ -231,9 +235,11 @@ impl Default for PanelState {
             look: true,
             help: false,
             picture: false,
+            mesh: false,
             path: false,
             path_text: String::new(),
             picture_text: String::new(),
+            mesh_text: String::new(),
             picture_size: [1920, 1080],
             show_messages: false,
             fly_speed: 30.0,

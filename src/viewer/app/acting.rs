@@ -9,7 +9,7 @@ use super::{
         navigation::Picked,
         pick, saver,
         session::Recent,
-        state::{RunStatus, Selection, Severity},
+        state::{PanelState, RunStatus, Selection, Severity},
         view::ViewMode,
     },
     App,
@@ -69,11 +69,14 @@ impl App {
                 self.state.panels.picture = true;
             }
             Action::SavePicture { path, size } => self.save_picture(path, size),
+            Action::MeshDialog => self.ask_for_mesh(),
+            Action::SaveMesh(path) => self.save_mesh(path),
             Action::SaveSidecar => self.save_sidecar(),
             Action::ToggleFullScreen => {
                 let is_full = ctx.input(|input| input.viewport().fullscreen.unwrap_or(false));
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!is_full));
             }
+            Action::ResetLayout => self.reset_layout(ctx),
             Action::ClearRecent => self.state.recent = Recent::default(),
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             other => self.change_view(&other),
@@ -126,6 +129,20 @@ impl App {
             _ => {}
         }
         self.follow_light();
+    }
+
+    /// Panels, their sizes and the size of text as at first.
+    fn reset_layout(&mut self, ctx: &egui::Context) {
+        let PanelState {
+            shown, light, look, ..
+        } = PanelState::default();
+        let panels = &mut self.state.panels;
+        (panels.shown, panels.light, panels.look) = (shown, light, look);
+        ctx.set_zoom_factor(1.0);
+        ctx.memory_mut(|memory| {
+            memory.data.clear();
+            memory.reset_areas();
+        });
     }
 
     fn pause_or_continue(&mut self) {

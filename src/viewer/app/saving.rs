@@ -1,17 +1,21 @@
-//! What the window saves: pictures, and the sidecar of a scene.
+//! What the window saves: pictures, the lit mesh, and the sidecar of a scene.
 
 use std::path::PathBuf;
 
 use eframe::egui;
 
+use glam::Vec3;
+
 use super::{
     super::{
-        saver,
+        saver::{self, Content},
         session::{self, Session},
         state::Severity,
+        view::{ToneMap, ViewSettings},
     },
     App,
 };
+use crate::export::{self, ColorOptions, MeshOptions, UpAxis};
 
 impl App {
     pub(super) fn scene_name(&self) -> String {
@@ -24,7 +28,7 @@ impl App {
     pub(super) fn save_window(&mut self, ctx: &egui::Context) {
         let path = saver::free_path(&self.scene_name());
         let (sender, wake) = (self.notices.0.clone(), self.wake.clone());
-        let pictures = self.pictures.clone();
+        let unfinished = self.unfinished.clone();
         ctx.request_screenshot(move |seen| {
             let [width, height] = seen.size.map(|side| side as u32);
             let bytes: Vec<u8> = seen
@@ -35,9 +39,9 @@ impl App {
             if let Some(display) = image::RgbaImage::from_raw(width, height, bytes) {
                 let saving = saver::Saving {
                     path,
-                    shot: saver::Shot::Seen(display),
+                    content: Content::Picture(saver::Shot::Seen(display)),
                 };
-                saving.start(sender, &pictures, wake);
+                saving.start(sender, &unfinished, wake);
             }
         });
     }
@@ -52,12 +56,40 @@ impl App {
             Ok(drawn) => {
                 let saving = saver::Saving {
                     path,
-                    shot: saver::Shot::Drawn(Box::new(drawn)),
+                    content: Content::Picture(saver::Shot::Drawn(Box::new(drawn))),
                 };
-                saving.start(self.notices.0.clone(), &self.pictures, self.wake.clone());
+                saving.start(self.notices.0.clone(), &self.unfinished, self.wake.clone());
             }
             Err(error) => self.state.messages.push(Severity::Error, error),
         }
+    }
+
+    /// Ask where the lit mesh is to go.
+    pub(super) fn ask_for_mesh(&mut self) {
+        if let Some(loaded) = &self.state.loaded {
+            let path = saver::free_mesh_path(&loaded.source);
+            self.state.panels.mesh_text = path.display().to_string();
+            self.state.panels.mesh = true;
+        }
+    }
+
+    pub(super) fn save_mesh(&mut self, path: PathBuf) {
+        let snapshot = self.state.run.snapshot.as_ref();
+        let (Some(loaded), Some(snapshot)) = (&self.state.loaded, snapshot) else {
+            let text = "there is no light to export yet";
+            self.state.messages.push(Severity::Error, text);
+            return;
+        };
+        let mesh = saver::LitMesh {
+            snapshot: snapshot.clone(),
+            frame: loaded.scene.frame,
+            options: mesh_options(&self.state.view, self.state.rig.target.up),
+        };
+        let saving = saver::Saving {
+            path,
+            content: Content::Mesh(mesh),
+        };
+        saving.start(self.notices.0.clone(), &self.unfinished, self.wake.clone());
     }
 
     pub(super) fn save_sidecar(&mut self) {
@@ -76,5 +108,20 @@ impl App {
                 .push(Severity::Note, format!("saved {}", path.display())),
             Err(error) => self.state.messages.push(Severity::Error, error),
         }
+    }
+}
+
+/// A mesh that looks as the view does.
+fn mesh_options(view: &ViewSettings, up: Vec3) -> MeshOptions {
+    MeshOptions {
+        color: ColorOptions {
+            exposure_ev: view.exposure_factor().log2(),
+            tone_map: match view.tone_map {
+                ToneMap::Neutral => export::ToneMap::Neutral,
+                ToneMap::None => export::ToneMap::None,
+            },
+        },
+        up: if up == Vec3::Z { UpAxis::Z } else { UpAxis::Y },
+        emission_scale: view.emission_scale,
     }
 }

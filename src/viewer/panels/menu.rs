@@ -81,6 +81,9 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
         "Save camera and settings",
         Action::SaveSidecar,
     );
+    ui.add_enabled_ui(state.run.snapshot.is_some(), |ui| {
+        item(ui, table, actions, "Export lit mesh…", Action::MeshDialog);
+    });
     item(ui, table, actions, "Save picture", Action::Screenshot);
     item(
         ui,
@@ -131,6 +134,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     ui.separator();
     item(ui, table, actions, "Panels", Action::TogglePanels);
     item(ui, table, actions, "Full screen", Action::ToggleFullScreen);
+    item(ui, table, actions, "Reset layout", Action::ResetLayout);
     ui.menu_button("Theme", theme_menu);
 }
 

@@ -7,6 +7,7 @@ pub mod help;
 pub mod legend;
 pub mod links;
 pub mod menu;
+pub mod mesh;
 pub mod messages;
 pub mod path;
 pub mod picture;

@@ -1,0 +1,202 @@
+//! The lit mesh as a file: what the formats share.
+
+use std::{
+    f32::consts::FRAC_1_PI,
+    io::{self, Write},
+    path::Path,
+};
+
+use glam::Vec3;
+
+use super::{ColorOptions, glb::write_glb, ply::write_ply};
+use crate::{scene::Frame, solver::Snapshot};
+
+/// Which axis of the scene points up. Coordinates are never turned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum UpAxis {
+    /// +Y, as most OBJ files.
+    #[default]
+    Y,
+    /// +Z.
+    Z,
+}
+
+impl UpAxis {
+    /// As on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Y => "+Y",
+            Self::Z => "+Z",
+        }
+    }
+}
+
+/// What an exported mesh says beside the numbers of the solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeshOptions {
+    /// How displayed colours are made.
+    pub color: ColorOptions,
+    /// The scene's up axis.
+    pub up: UpAxis,
+    /// What all emission, and with it all light, is multiplied by.
+    pub emission_scale: f32,
+}
+
+impl Default for MeshOptions {
+    fn default() -> Self {
+        Self {
+            color: ColorOptions::default(),
+            up: UpAxis::default(),
+            emission_scale: 1.0,
+        }
+    }
+}
+
+/// A file format of lit meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshFormat {
+    /// Binary PLY.
+    Ply,
+    /// Binary glTF 2.0.
+    Glb,
+}
+
+/// The name of a file tells no format.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the exported file must end in .ply or .glb: {0}")]
+pub struct UnknownMeshFormat(String);
+
+impl MeshFormat {
+    /// All, in the order in which they are offered.
+    pub const ALL: [Self; 2] = [Self::Ply, Self::Glb];
+
+    /// How names of such files end, without the dot.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Ply => "ply",
+            Self::Glb => "glb",
+        }
+    }
+
+    /// The format that the name of a file asks for.
+    ///
+    /// # Errors
+    /// Where it ends otherwise.
+    pub fn of(path: &Path) -> Result<Self, UnknownMeshFormat> {
+        let ends_in = |format: &Self| {
+            path.extension()
+                .is_some_and(|extension| extension.eq_ignore_ascii_case(format.extension()))
+        };
+        Self::ALL
+            .into_iter()
+            .find(ends_in)
+            .ok_or_else(|| UnknownMeshFormat(path.display().to_string()))
+    }
+
+    /// Write the display mesh of a snapshot.
+    ///
+    /// # Errors
+    /// Those of `out`, and one sentence where the mesh does not fit into the format.
+    pub fn write(
+        self,
+        out: &mut dyn Write,
+        snapshot: &Snapshot,
+        frame: &Frame,
+        options: &MeshOptions,
+    ) -> io::Result<()> {
+        match self {
+            Self::Ply => write_ply(out, snapshot, frame, options),
+            Self::Glb => write_glb(out, snapshot, frame, options),
+        }
+    }
+}
+
+/// Light at a vertex of the display mesh, linear, finite and not negative.
+pub(super) struct Light {
+    /// Emitted and reflected, W·sr⁻¹·m⁻².
+    pub(super) radiance: Vec3,
+    /// Arriving, W·m⁻².
+    pub(super) irradiance: Vec3,
+}
+
+impl Light {
+    /// Light at the vertex of this index; dark where the snapshot knows none.
+    pub(super) fn at(snapshot: &Snapshot, index: usize, options: &MeshOptions) -> Self {
+        let mesh = &snapshot.mesh;
+        let arriving = snapshot.light.irradiance.get(index).copied();
+        let irradiance = presentable(arriving.unwrap_or_default() * options.emission_scale);
+        let emission = mesh.emission[index] * options.emission_scale;
+        Self {
+            radiance: presentable(emission + mesh.reflectance[index] * irradiance * FRAC_1_PI),
+            irradiance,
+        }
+    }
+}
+
+/// Finite and not negative, whatever comes in.
+fn presentable(light: Vec3) -> Vec3 {
+    light.map(|x| if x > 0.0 { x.min(f32::MAX) } else { 0.0 })
+}
+
+pub(super) fn write_vector(out: &mut dyn Write, vector: Vec3) -> io::Result<()> {
+    out.write_all(&vector.to_array().map(f32::to_le_bytes).concat())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::{f32::consts::PI, sync::Arc};
+
+    use super::*;
+    use crate::solver::{DisplayMesh, VertexLight};
+
+    /// One triangle that reflects half of an irradiance of π; its second corner emits 1.
+    pub(in crate::export) fn triangle() -> Snapshot {
+        let mesh = DisplayMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z; 3],
+            reflectance: vec![Vec3::splat(0.5); 3],
+            emission: vec![Vec3::ZERO, Vec3::ONE, Vec3::ZERO],
+            indices: vec![[0, 1, 2]],
+            triangle_of: vec![0],
+            is_back: vec![false],
+            element_of: vec![0],
+            ..DisplayMesh::default()
+        };
+        let light = VertexLight {
+            irradiance: vec![Vec3::splat(PI); 3],
+            direct: vec![Vec3::ZERO; 3],
+            uncertainty: vec![0.0; 3],
+        };
+        Snapshot {
+            step: 1,
+            mesh: Arc::new(mesh),
+            light: Arc::new(light),
+            ..Snapshot::default()
+        }
+    }
+
+    #[test]
+    fn the_name_of_a_file_tells_its_format() {
+        let of = |name: &str| MeshFormat::of(Path::new(name));
+        assert_eq!(of("a/lit.PLY"), Ok(MeshFormat::Ply));
+        assert_eq!(of("lit.ply.glb"), Ok(MeshFormat::Glb));
+        for name in ["lit.obj", "glb", "lit.", ".ply"] {
+            let said = of(name).unwrap_err().to_string();
+            assert!(said.contains(".ply or .glb") && said.ends_with(name));
+        }
+    }
+
+    #[test]
+    fn light_is_scaled_with_the_emission_and_always_presentable() {
+        let options = MeshOptions {
+            emission_scale: 2.0,
+            ..MeshOptions::default()
+        };
+        let light = Light::at(&triangle(), 1, &options);
+        assert!((light.irradiance.x - 2.0 * PI).abs() < 1e-5);
+        assert!((light.radiance.x - 3.0).abs() < 1e-5);
+        for (value, expected) in [(f32::NAN, 0.0), (-1.0, 0.0), (f32::INFINITY, f32::MAX)] {
+            assert_eq!(presentable(Vec3::splat(value)), Vec3::splat(expected));
+        }
+    }
+}
