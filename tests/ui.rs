@@ -129,6 +129,7 @@ fn a_scene_is_read_lit_and_finished() {
     );
     harness.get_by_label("Reset");
     harness.get_by_label("Statistics");
+    harness.get_by_label("Patches");
 }
 
 #[test]
@@ -449,6 +450,29 @@ fn the_lit_mesh_is_exported_in_either_format() {
         });
         assert!(fs::read(&path).is_ok_and(|bytes| bytes.starts_with(magic)));
     }
+}
+
+#[test]
+fn flying_slowly_opens_and_closes_nothing() {
+    let mut harness = plates();
+    let pos = harness.get_by_label("Scene").rect().center();
+    harness.hover_at(pos);
+    let right = |pressed| egui::Event::PointerButton {
+        pos,
+        button: egui::PointerButton::Secondary,
+        pressed,
+        modifiers: egui::Modifiers::NONE,
+    };
+    harness.event(right(true));
+    harness.run_steps(2);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::E);
+    harness.run_steps(2);
+    assert!(!harness.state().state.panels.mesh);
+    harness.event(right(false));
+    harness.run_steps(2);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::E);
+    harness.run_steps(2);
+    assert!(harness.state().state.panels.mesh);
 }
 
 #[test]

@@ -97,6 +97,9 @@ pub const MOUSE: [(&str, &str); 10] = [
     ("Drop a file", "Open it"),
 ];
 
+/// Keys that move the camera while the right button is held; Ctrl slows it then, and means nothing else.
+const FLYING: [Key; 6] = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E];
+
 /// All bindings.
 pub fn bindings() -> Vec<Binding> {
     use Group::{Camera, File, Solve, View};
@@ -228,6 +231,12 @@ pub fn bindings() -> Vec<Binding> {
             "Hide or show the panels",
             Action::TogglePanels,
         ),
+        command(
+            Key::B,
+            File,
+            "Hide or show the panels",
+            Action::TogglePanels,
+        ),
         plain(Key::F11, File, "Full screen", Action::ToggleFullScreen),
         plain(Key::F1, File, "This sheet", Action::ToggleHelp),
         plain(Key::Questionmark, File, "This sheet", Action::ToggleHelp),
@@ -258,6 +267,7 @@ pub fn bindings() -> Vec<Binding> {
 /// The actions whose keys were pressed, with exactly their modifiers; the key presses are used up.
 pub fn pressed(input: &mut InputState, table: &[Binding]) -> Vec<Action> {
     let mut actions = Vec::new();
+    let flies = input.pointer.secondary_down();
     input.events.retain(|event| {
         // The modifiers of the press count, not those that are held when the frame begins.
         let Event::Key {
@@ -270,6 +280,9 @@ pub fn pressed(input: &mut InputState, table: &[Binding]) -> Vec<Action> {
         else {
             return true;
         };
+        if flies && FLYING.contains(key) {
+            return true;
+        }
         let fits = |binding: &&Binding| binding.fits(*key, *modifiers, *repeat);
         let found = table.iter().find(fits);
         actions.extend(found.map(|binding| binding.action.clone()));
@@ -369,7 +382,7 @@ mod tests {
     #[test]
     fn flying_keys_are_free() {
         for binding in bindings() {
-            let flies = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E].contains(&binding.key);
+            let flies = FLYING.contains(&binding.key);
             assert!(!flies || binding.modifiers.command, "{}", binding.keys());
         }
     }

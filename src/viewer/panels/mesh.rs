@@ -20,7 +20,7 @@ pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Act
         .default_width(400.0)
         .anchor(egui::Align2::CENTER_CENTER, [0.0, -60.0])
         .show(ctx, |ui| {
-            done = mesh_ui(ui, &mut state.panels.mesh_text, actions)
+            done = mesh_ui(ui, &mut state.panels.mesh_text, actions);
         });
     state.panels.mesh = open && !done;
 }
@@ -43,7 +43,7 @@ fn mesh_ui(ui: &mut egui::Ui, text: &mut String, actions: &mut Vec<Action>) -> b
     let label = ui.label("File");
     let field = egui::TextEdit::singleline(text).desired_width(f32::INFINITY);
     ui.add(field).labelled_by(label.id);
-    ui.weak("Exposure, tone map and up axis are those of the view.");
+    ui.weak("Exposure and up axis are those of the view, in a PLY the tone map, too.");
     ui.add_space(4.0);
     let button = ui.add_enabled(present.is_ok(), egui::Button::new("Export"));
     let confirmed = button

@@ -41,6 +41,23 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 "Time to build the hierarchy and the ray tree",
             );
         }
+        let clusters = state.run.snapshot.as_ref().map(|shown| &shown.clusters);
+        if let Some(clusters) = clusters
+            && let Some(root) = clusters.first()
+        {
+            row::figure(
+                ui,
+                "Patches",
+                count(u64::from(root.patch_count)),
+                "Triangles that take part, one for each lit side",
+            );
+            row::figure(
+                ui,
+                "Clusters",
+                count(clusters.len() as u64),
+                "Groups of patches",
+            );
+        }
         if let Some(report) = state.report() {
             row::figure(
                 ui,
