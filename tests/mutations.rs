@@ -10,7 +10,7 @@ mod common;
 use std::{fmt::Write as _, fs, path::Path};
 
 use common::{Chance, assert_promises, case_count, folder, spoil};
-use vecrad::scene::{ReadError, Scene, SceneOptions, WarningKind, read_obj};
+use vecrad::scene::{ReadError, Scene, SceneOptions, Warning, WarningKind, read_obj};
 
 /// An OBJ file that is valid but for what a reader must bear anyway: names without a file, lines of other kinds.
 fn obj(chance: &mut Chance) -> String {
@@ -243,9 +243,11 @@ fn a_planted_fault_is_named_with_its_line() {
         fs::write(folder.join("scene.obj"), &text).unwrap();
         let scene = read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
         let said = scene.warnings.iter();
-        let said: Vec<_> = said
-            .filter(|warning| warning.kind != WarningKind::NoEmitter)
-            .collect();
+        // Faces are drawn at random, so some are the same.
+        let is_planted = |warning: &&Warning| {
+            warning.kind != WarningKind::NoEmitter && !warning.message.contains("lies on another")
+        };
+        let said: Vec<_> = said.filter(is_planted).collect();
         let [warning] = said[..] else {
             panic!("case {case}: {said:?}\n{text}");
         };

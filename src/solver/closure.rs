@@ -50,6 +50,11 @@ const MOST_CELL_RAYS: usize = 8192;
 /// Nearer to 1, and coarse links stay as wrong as they are; further, and the noise of a few rays is blown up.
 const LEAST_ROW: f32 = 0.3;
 
+/// Where more form factors are counted than there can be, by this share of the closure, half of the surplus is taken
+/// for light. Less of it may be that of dark and buried faces alone. Smaller, and light is lost about buried faces;
+/// larger, and coarse links stay too bright.
+const SURPLUS: f32 = 0.1;
+
 /// How much of a patch's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Closure {
@@ -97,7 +102,8 @@ impl Closure {
         let trust = if self.is_certain() {
             1.0
         } else {
-            gap * gap / (gap * gap + doubt * doubt)
+            let surplus = if gap < 0.0 { SURPLUS * self.share } else { 0.0 };
+            gap * gap / (gap * gap + doubt * doubt + surplus * surplus)
         };
         let target = row + trust * gap;
         let row = row.max(LEAST_ROW * self.share);
