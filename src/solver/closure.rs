@@ -210,7 +210,7 @@ pub(super) fn closures(
             !cancel.is_cancelled() && meets(group[ray * group.len() / count], first + ray) == 1
         })
     };
-    let first_look = |group: &[usize]| GROUP_RAYS.max(group.len() / CELLS_PER_RAY);
+    let first_look = |group: &[usize]| GROUP_RAYS.max(budget(group.len() / CELLS_PER_RAY));
     let mut closed: Vec<bool> = groups
         .par_iter()
         .map(|group| look(group, 0, first_look(group)))
