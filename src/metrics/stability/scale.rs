@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     Case, Claim, Finding, Group, Trouble,
-    solve::{one_sided, sides_by_shape, solve},
+    solve::{energy_claim, error_claim, one_sided, sides_by_shape, solve},
     stiff::settled,
 };
 use crate::{
@@ -83,7 +83,7 @@ fn lamps(cancel: &Cancel) -> Result<Finding, Trouble> {
             bright.difference(&both, 1.0),
             AGREEMENT,
         ),
-        Claim::near("absorbed / emitted", 1.0, both.absorbed_share(), 0.02),
+        both.balance(0.02),
     ]);
     bright.count_in(&mut finding);
     Ok(finding)
@@ -97,19 +97,7 @@ fn terrain(cancel: &Cancel) -> Result<Finding, Trouble> {
         cancel,
     )?;
     let error = lit.against_paths(4000, 64, cancel)?;
-    Ok(lit.finding(vec![
-        Claim::near(
-            "energy / path tracing",
-            1.0,
-            error.energy_ratio.unwrap_or(f64::NAN),
-            0.02,
-        ),
-        Claim::small(
-            "error against path tracing",
-            error.relative_rms_trimmed,
-            0.1,
-        ),
-    ]))
+    Ok(lit.finding(vec![energy_claim(&error, 0.02), error_claim(&error)]))
 }
 
 fn black(cancel: &Cancel) -> Result<Finding, Trouble> {
@@ -128,7 +116,7 @@ fn black(cancel: &Cancel) -> Result<Finding, Trouble> {
             f64::from(reflected.fold(0.0, f32::max)),
             0.0,
         ),
-        Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), 0.01),
+        lit.balance(0.01),
     ]))
 }
 

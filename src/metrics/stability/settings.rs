@@ -78,7 +78,7 @@ fn limited(mebibytes: u64, cancel: &Cancel) -> Result<Finding, Trouble> {
     Ok(lit.finding(vec![
         Claim::at_most("bytes held", limit as f64, most.unwrap_or(0) as f64),
         Claim::at_least("the limit is named", 1.0, f64::from(u8::from(is_full))),
-        Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), 0.03),
+        lit.balance(0.03),
     ]))
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::{
     Case, Claim, Finding, Group, Trouble,
-    solve::{Lit, one_sided, sides_by_shape, solve},
+    solve::{energy_claim, error_claim, one_sided, sides_by_shape, solve},
     stiff::settled,
 };
 use crate::{
@@ -108,12 +108,8 @@ fn glowing(builder: SceneBuilder, reflectance: f32, cancel: &Cancel) -> Result<F
             lit.mean_irradiance("wall").x,
             allowed,
         ),
-        balance(&lit, allowed),
+        lit.balance(allowed),
     ]))
-}
-
-fn balance(lit: &Lit, allowed: f64) -> Claim {
-    Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), allowed)
 }
 
 /// A scene that only path tracing knows; `allowed` is the share of its energy that may be missing or too much.
@@ -125,19 +121,7 @@ fn by_paths(
 ) -> Result<Finding, Trouble> {
     let lit = solve(builder, &one_sided(), settings, cancel)?;
     let error = lit.against_paths(1000, 64, cancel)?;
-    Ok(lit.finding(vec![
-        Claim::near(
-            "energy / path tracing",
-            1.0,
-            error.energy_ratio.unwrap_or(f64::NAN),
-            allowed,
-        ),
-        Claim::small(
-            "error against path tracing",
-            error.relative_rms_trimmed,
-            0.1,
-        ),
-    ]))
+    Ok(lit.finding(vec![energy_claim(&error, allowed), error_claim(&error)]))
 }
 
 /// Compare with a scene whose faces come first in this one.
@@ -156,7 +140,7 @@ fn like(
             original.difference(&other, 1.0),
             allowed,
         ),
-        balance(&other, 0.03),
+        other.balance(0.03),
     ]);
     original.count_in(&mut finding);
     Ok(finding)
@@ -194,7 +178,7 @@ fn twins(cancel: &Cancel) -> Result<Finding, Trouble> {
             found.x,
             0.02,
         ));
-        claims.push(balance(&twins, 0.03));
+        claims.push(twins.balance(0.03));
         twins.count_in(&mut finding);
     }
     finding.claims = claims;
@@ -246,7 +230,7 @@ fn boxed_lamp(cancel: &Cancel) -> Result<Finding, Trouble> {
             outside / lit.mean_irradiance("inside").x,
             1e-3,
         ),
-        balance(&lit, 0.02),
+        lit.balance(0.02),
     ]))
 }
 
@@ -281,6 +265,6 @@ fn thin_wall(cancel: &Cancel) -> Result<Finding, Trouble> {
             dark / lit.mean_irradiance(stability::WALL).x,
             1e-3,
         ),
-        balance(&lit, 0.02),
+        lit.balance(0.02),
     ]))
 }

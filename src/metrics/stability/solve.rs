@@ -267,6 +267,11 @@ impl Lit {
         absorbed.element_sum() / emitted_power(&self.scene).element_sum()
     }
 
+    /// All that is emitted is absorbed, but for a share.
+    pub(super) fn balance(&self, allowed: f64) -> Claim {
+        Claim::near("absorbed / emitted", 1.0, self.absorbed_share(), allowed)
+    }
+
     /// Error against path tracing at random points.
     pub(super) fn against_paths(
         &self,
@@ -316,6 +321,21 @@ impl Lit {
         }
         (difference / size).sqrt()
     }
+}
+
+/// The energy is that of path tracing, but for a share.
+pub(super) fn energy_claim(error: &ErrorMeasures, allowed: f64) -> Claim {
+    let ratio = error.energy_ratio.unwrap_or(f64::NAN);
+    Claim::near("energy / path tracing", 1.0, ratio, allowed)
+}
+
+/// Light is that of path tracing, but for a tenth.
+pub(super) fn error_claim(error: &ErrorMeasures) -> Claim {
+    Claim::small(
+        "error against path tracing",
+        error.relative_rms_trimmed,
+        0.1,
+    )
 }
 
 fn tracer(scene: &Arc<Scene>, point_count: u32, samples_per_pass: u32) -> PathTracer {

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::{
     Case, Claim, Finding, Group, Trouble,
-    solve::{one_sided, solve},
+    solve::{error_claim, one_sided, solve},
 };
 use crate::{
     reference::analytic::furnace_radiosity,
@@ -73,7 +73,7 @@ fn closed_furnace(reflectance: f32, allowed: f64, cancel: &Cancel) -> Result<Fin
             lit.mean_irradiance("wall").x,
             allowed,
         ),
-        Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), allowed),
+        lit.balance(allowed),
         Claim::at_most(
             "sweeps of a step",
             MOST_SWEEPS,
@@ -96,17 +96,8 @@ fn maze(cancel: &Cancel) -> Result<Finding, Trouble> {
     )?;
     let error = lit.against_paths(2000, 64, cancel)?;
     Ok(lit.finding(vec![
-        Claim::near(
-            "absorbed / emitted",
-            1.0,
-            lit.absorbed_share(),
-            LOST / (1.0 - f64::from(REFLECTANCE)),
-        ),
-        Claim::small(
-            "error against path tracing",
-            error.relative_rms_trimmed,
-            0.1,
-        ),
+        lit.balance(LOST / (1.0 - f64::from(REFLECTANCE))),
+        error_claim(&error),
     ]))
 }
 
@@ -165,7 +156,7 @@ fn pin_hole(cancel: &Cancel) -> Result<Finding, Trouble> {
             (lit.mean_irradiance("second").x - arrives(share * first, 0.0)) / arrives(first, PI),
             BLURRED,
         ),
-        Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), allowed),
+        lit.balance(allowed),
     ]))
 }
 
@@ -197,6 +188,6 @@ fn spheres(cancel: &Cancel) -> Result<Finding, Trouble> {
             lit.mean_irradiance("outer").x,
             0.01,
         ),
-        Claim::near("absorbed / emitted", 1.0, lit.absorbed_share(), 0.01),
+        lit.balance(0.01),
     ]))
 }
