@@ -11,7 +11,7 @@ use std::{
     io::{BufRead as _, BufReader, Read as _},
     os::unix::fs::symlink,
     path::Path,
-    process::{Child, Command, Output, Stdio},
+    process::{Child, ChildStderr, Command, Output, Stdio},
     thread::sleep,
     time::Duration,
 };
@@ -27,6 +27,18 @@ fn vecrad(folder: &Path, arguments: &[&str]) -> Command {
         .env("TMPDIR", elsewhere)
         .stdin(Stdio::null());
     command
+}
+
+/// A program that runs, the rest of what it says, and its first line of progress.
+fn begun(folder: &Path, arguments: &[&str]) -> (Child, BufReader<ChildStderr>, String) {
+    let mut child = vecrad(folder, arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    let mut said = String::new();
+    lines.read_line(&mut said).unwrap();
+    (child, lines, said)
 }
 
 const SOLVE: [&str; 5] = ["solve", "--scene", "plates", "--preset", "draft"];
@@ -139,17 +151,9 @@ fn a_folder_that_vanishes_does_not_take_the_light_with_it() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
-    let mut child = vecrad(
-        folder.path(),
-        &[&LONG[..], &["--export", "out/lit.ply"]].concat(),
-    )
-    .stderr(Stdio::piped())
-    .spawn()
-    .unwrap();
-    let mut lines = BufReader::new(child.stderr.take().unwrap());
-    // The first line of progress: outputs were checked, nothing is written yet.
-    let mut said = String::new();
-    lines.read_line(&mut said).unwrap();
+    let arguments = [&LONG[..], &["--export", "out/lit.ply"]].concat();
+    // Outputs were checked, nothing is written yet.
+    let (mut child, mut lines, mut said) = begun(folder.path(), &arguments);
     fs::remove_dir_all(&out).unwrap();
     lines.read_to_string(&mut said).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(1), "{said}");
@@ -297,14 +301,8 @@ fn a_signal_ends_a_long_preparation() {
     let folder = tempfile::tempdir().unwrap();
     let large = ["solve", "--scene", "room-1m", "--preset", "draft"];
     let outputs = ["--export", "lit.ply", "--report", "out.json"];
-    let mut child = vecrad(folder.path(), &[&large[..], &outputs].concat())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut lines = BufReader::new(child.stderr.take().unwrap());
-    // The first line of progress: the scene was read, and clusters and ray tree take many times as long.
-    let mut said = String::new();
-    lines.read_line(&mut said).unwrap();
+    // The scene was read, and clusters and ray tree take many times as long.
+    let (mut child, mut lines, mut said) = begun(folder.path(), &[&large[..], &outputs].concat());
     assert!(said.starts_with("preparing"), "{said}");
     send("-TERM", &child);
     lines.read_to_string(&mut said).unwrap();

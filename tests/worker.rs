@@ -389,8 +389,8 @@ fn dropping_the_handle_does_not_wait_for_what_cannot_be_interrupted() {
     wait_for_drops(&script, 1);
 }
 
-#[test]
-fn stopping_ends_the_preparation_and_going_on_prepares_anew() {
+/// A worker whose first preparation lasts until it is told to end, and how many were begun.
+fn prepared_at_the_second_try() -> (Arc<AtomicU32>, WorkerHandle) {
     let made = Arc::new(AtomicU32::new(0));
     let (counter, script) = (made.clone(), Arc::new(Script::default()));
     let make = move |job: Job, cancel: &Cancel| {
@@ -406,7 +406,13 @@ fn stopping_ends_the_preparation_and_going_on_prepares_anew() {
             step: 0,
         }) as Box<dyn Stepper>)
     };
-    let mut worker = WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap();
+    let worker = WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap();
+    (made, worker)
+}
+
+#[test]
+fn stopping_ends_the_preparation_and_going_on_prepares_anew() {
+    let (made, mut worker) = prepared_at_the_second_try();
     worker.start(triangle(), short(), one_thread());
     while made.load(Ordering::SeqCst) == 0 {
         thread::yield_now();
@@ -569,23 +575,7 @@ fn every_event_wakes_the_owner() {
 
 #[test]
 fn a_pause_ends_the_preparation_and_going_on_prepares_anew() {
-    let made = Arc::new(AtomicU32::new(0));
-    let (counter, script) = (made.clone(), Arc::new(Script::default()));
-    let make = move |job: Job, cancel: &Cancel| {
-        if counter.fetch_add(1, Ordering::SeqCst) == 0 {
-            // The first preparation lasts until it is told to end.
-            while !cancel.is_cancelled() {
-                thread::yield_now();
-            }
-            return None;
-        }
-        Some(Box::new(FakeSolver {
-            script: script.clone(),
-            settings: job.settings,
-            step: 0,
-        }) as Box<dyn Stepper>)
-    };
-    let mut worker = WorkerHandle::with_steppers(Arc::new(|| {}), Arc::new(make)).unwrap();
+    let (made, mut worker) = prepared_at_the_second_try();
     worker.start(triangle(), short(), one_thread());
     worker.pause();
     wait_for(&worker, |event| matches!(event, Event::Paused));
