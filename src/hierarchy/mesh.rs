@@ -5,7 +5,7 @@
 //! crease or of a material border have vertices of their own at the same point.
 //! Neighbours stay within one level, so that an edge of a leaf carries at most one hanging point.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, ops::Range};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -44,6 +44,15 @@ impl Element {
     /// Whether it has no children.
     pub fn is_leaf(&self) -> bool {
         self.first_child == Self::LEAF
+    }
+
+    /// Its four children among the elements; none of a leaf.
+    pub fn children(&self) -> Range<usize> {
+        if self.is_leaf() {
+            return 0..0;
+        }
+        let first = self.first_child as usize;
+        first..first + 4
     }
 }
 

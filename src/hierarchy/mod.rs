@@ -188,6 +188,21 @@ impl Hierarchy {
         })
     }
 
+    /// The largest clusters with few enough patches, in the order of the patches.
+    pub fn groups(&self, most_patches: u32) -> Vec<usize> {
+        let clusters = &self.clusters;
+        let is_small =
+            |cluster: &Cluster| cluster.is_leaf() || cluster.end - cluster.start <= most_patches;
+        let mut groups: Vec<usize> = (0..clusters.len())
+            .filter(|&index| {
+                let parent = clusters.get(clusters[index].parent as usize);
+                is_small(&clusters[index]) && parent.is_none_or(|parent| !is_small(parent))
+            })
+            .collect();
+        groups.sort_unstable_by_key(|&index| clusters[index].start);
+        groups
+    }
+
     /// Box around a node.
     pub fn bounds(&self, node: NodeId) -> (Vec3, Vec3) {
         match self.kind(node) {

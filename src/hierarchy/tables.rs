@@ -96,8 +96,7 @@ impl Tables {
             if element.is_leaf() {
                 continue;
             }
-            let first = element.first_child as usize;
-            let children = first..first + 4;
+            let children = element.children();
             self.elements[index] = self.elements[children.clone()].iter().sum::<Vec4>() * 0.25;
             self.brightest_in_elements[index] = self.brightest_in_elements[children.clone()]
                 .iter()

@@ -57,10 +57,7 @@ impl Hierarchy {
     fn validate_elements(&self) -> Result<(), String> {
         let elements = &self.mesh.elements;
         for (index, element) in elements.iter().enumerate() {
-            if element.is_leaf() {
-                continue;
-            }
-            for child in element.first_child as usize..element.first_child as usize + 4 {
+            for child in element.children() {
                 let child = elements
                     .get(child)
                     .ok_or(format!("element {index}: missing child"))?;

@@ -76,6 +76,12 @@ pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
     }
 }
 
+/// Root of an element's share of the area: what an error on it counts.
+fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
+    let area = hierarchy.mesh.elements[element].area_vector.length();
+    (area / hierarchy.area as f32).sqrt()
+}
+
 impl DirectField {
     /// Nothing is known yet.
     pub(super) fn new(lights: Lights) -> Self {
@@ -254,15 +260,13 @@ impl DirectField {
         let values = corners.map(|vertex| luminance(self.corner(vertex)));
         let range = values.iter().copied().fold(0.0, f32::max)
             - values.iter().copied().fold(f32::MAX, f32::min);
-        let share = hierarchy.mesh.elements[element].area_vector.length() / hierarchy.area as f32;
-        range * share.sqrt() / mean.max(f32::MIN_POSITIVE)
+        range * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
     /// The light that an element would get if nothing stood before it, as `spread` counts, where none of it reaches the
     /// corners: rings and bands lie with all their corners under the edges of their neighbours.
     fn hidden(&self, hierarchy: &Hierarchy, element: usize, mean: f32) -> f32 {
-        let element = &hierarchy.mesh.elements[element];
-        let lights = element
+        let lights = hierarchy.mesh.elements[element]
             .vertices
             .map(|vertex| self.vertices[vertex as usize].unwrap_or_default());
         if lights.iter().any(|light| light.fraction() != Vec4::ZERO) {
@@ -272,8 +276,7 @@ impl DirectField {
             .iter()
             .map(|light| luminance(light.unoccluded()))
             .fold(0.0, f32::max);
-        let share = element.area_vector.length() / hierarchy.area as f32;
-        most * share.sqrt() / mean.max(f32::MIN_POSITIVE)
+        most * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
     /// Sample the centroids of leaves whose corners differ, or may all be dark by chance. Returns the rays shot.
@@ -342,7 +345,7 @@ impl DirectField {
                 }
                 let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
                 let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
-                let weight = (area / hierarchy.area as f32).sqrt() / mean.max(f32::MIN_POSITIVE);
+                let weight = share_root(hierarchy, leaf) / mean.max(f32::MIN_POSITIVE);
                 bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
             })
             .map(|leaf| leaf as u32)

@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Cancel, Solver, groups};
+use super::{Cancel, Solver};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::Hierarchy,
@@ -55,7 +55,7 @@ const LEAST_ROW: f32 = 0.3;
 /// larger, and coarse links stay too bright.
 const SURPLUS: f32 = 0.1;
 
-/// How much of a patch's view is filled by lit surfaces.
+/// How much of a cell's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Closure {
     /// The part, 0…1.
@@ -198,82 +198,137 @@ pub(super) fn closures(
     seed: u64,
     cancel: &Cancel,
 ) -> Option<(Closures, u64)> {
-    let costly = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
-    let budget = |rays: usize| (rays as f32 / costly) as usize;
-    let groups: Vec<Vec<usize>> = groups(hierarchy, (GROUP_PATCHES as f32 * costly) as u32)
+    let prober = Prober {
+        hierarchy,
+        rays,
+        seed,
+        cancel,
+        cost: (rays.crossings() / USUAL_CROSSINGS).max(1.0),
+    };
+    let groups: Vec<Vec<usize>> = hierarchy
+        .groups((GROUP_PATCHES as f32 * prober.cost) as u32)
         .into_par_iter()
         .map(|group| cells(hierarchy, group))
         .collect();
-    let meets = |cell: usize, first: usize| probe(hierarchy, rays, cell, 1, first as u32, seed);
-    let look = |group: &[usize], first: usize, count: usize| {
-        (0..count).all(|ray| {
-            !cancel.is_cancelled() && meets(group[ray * group.len() / count], first + ray) == 1
-        })
-    };
-    let first_look = |group: &[usize]| GROUP_RAYS.max(budget(group.len() / CELLS_PER_RAY));
-    let mut closed: Vec<bool> = groups
-        .par_iter()
-        .map(|group| look(group, 0, first_look(group)))
-        .collect();
-    let mut ray_count: usize = groups.iter().map(|group| first_look(group)).sum();
-    if closed.iter().any(|is_closed| !is_closed) {
-        let count = (budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
-        closed
-            .par_iter_mut()
-            .zip(&groups)
-            .filter(|(is_closed, _)| **is_closed)
-            .for_each(|(is_closed, group)| *is_closed = look(group, first_look(group), count));
-        ray_count += groups.len() * count;
+    let (open, looked) = prober.open_groups(&groups);
+    let (found, probed) = prober.probe_groups(&open);
+    cancel.proceed()?;
+    let mut closures = vec![Closure::CLOSED; hierarchy.mesh.elements.len()];
+    for (&cell, closure) in open.into_iter().flatten().zip(found.into_iter().flatten()) {
+        closures[cell] = closure;
     }
-    let open: Vec<&[usize]> = groups
-        .iter()
-        .zip(&closed)
-        .filter(|(_, is_closed)| !**is_closed)
-        .map(|(group, _)| group.as_slice())
-        .collect();
-    let area = |cell: usize| hierarchy.mesh.elements[cell].area_vector.length();
-    let cell_count: usize = open.iter().map(|group| group.len()).sum();
-    let open_area: f32 = open.iter().copied().flatten().map(|&cell| area(cell)).sum();
-    let is_shared = cell_count > budget(MOST_PROBED_CELLS);
-    let sharing = if is_shared { open.len() } else { cell_count };
-    let even = 1.0 / sharing.max(1) as f32;
-    let count = |share: f32| {
-        let count = budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
-        (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
-    };
-    let found: Vec<(Vec<Closure>, usize)> = open
-        .par_iter()
-        .map(|group| {
-            if cancel.is_cancelled() {
-                return (Vec::new(), 0);
-            }
-            let mut shot = 0;
-            let found = if is_shared {
-                shot = count(even);
-                let hits = (0..shot).map(|ray| meets(group[ray * group.len() / shot], ray));
-                vec![Closure::shared(hits.sum(), shot); group.len()]
+    Some((Closures(closures), (looked + probed) as u64))
+}
+
+/// Shoots the rays of closures. When cancelled, what it finds is incomplete.
+struct Prober<'a> {
+    hierarchy: &'a Hierarchy,
+    rays: &'a RayTree,
+    seed: u64,
+    cancel: &'a Cancel,
+    /// What a ray costs, in usual rays; at least 1.
+    cost: f32,
+}
+
+impl Prober<'_> {
+    /// As many rays as cost what so many usual ones do.
+    fn budget(&self, rays: usize) -> usize {
+        (rays as f32 / self.cost) as usize
+    }
+
+    /// Whether one ray from a cell meets a lit side, as 0 or 1.
+    fn meets(&self, cell: usize, number: usize) -> u32 {
+        self.probe(cell, 1, number as u32)
+    }
+
+    /// The groups of cells that are not surrounded by lit surfaces, and the rays spent on finding them.
+    fn open_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
+        let look = |group: &[usize], first: usize, count: usize| {
+            (0..count).all(|ray| {
+                !self.cancel.is_cancelled()
+                    && self.meets(group[ray * group.len() / count], first + ray) == 1
+            })
+        };
+        let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
+        let mut closed: Vec<bool> = groups
+            .par_iter()
+            .map(|group| look(group, 0, first_look(group)))
+            .collect();
+        let mut shot: usize = groups.iter().map(|group| first_look(group)).sum();
+        if closed.iter().any(|is_closed| !is_closed) {
+            let count = (self.budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
+            closed
+                .par_iter_mut()
+                .zip(groups)
+                .filter(|(is_closed, _)| **is_closed)
+                .for_each(|(is_closed, group)| *is_closed = look(group, first_look(group), count));
+            shot += groups.len() * count;
+        }
+        let open = groups
+            .iter()
+            .zip(&closed)
+            .filter(|(_, is_closed)| !**is_closed);
+        (open.map(|(group, _)| group.as_slice()).collect(), shot)
+    }
+
+    /// The closures of all cells of some groups, group by group, and the rays spent on them.
+    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<Closure>>, usize) {
+        let area = |cell: usize| self.hierarchy.mesh.elements[cell].area_vector.length();
+        let cells = || groups.iter().copied().flatten();
+        let (cell_count, whole): (usize, f32) =
+            (cells().count(), cells().map(|&cell| area(cell)).sum());
+        let is_shared = cell_count > self.budget(MOST_PROBED_CELLS);
+        let sharing = if is_shared { groups.len() } else { cell_count };
+        let even = 1.0 / sharing.max(1) as f32;
+        let count = |share: f32| {
+            let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
+            (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
+        };
+        let count_of = |cell: usize| count(area(cell) / whole);
+        let shot = if is_shared {
+            groups.len() * count(even)
+        } else {
+            cells().map(|&cell| count_of(cell)).sum()
+        };
+        let found = groups.par_iter().map(|group| {
+            if self.cancel.is_cancelled() {
+                Vec::new()
+            } else if is_shared {
+                vec![self.probe_together(group, count(even)); group.len()]
             } else {
                 let of = |&cell: &usize| {
-                    let count = count(area(cell) / open_area);
-                    shot += count;
-                    Closure::of(probe(hierarchy, rays, cell, count as u32, 0, seed), count)
+                    let count = count_of(cell);
+                    Closure::of(self.probe(cell, count as u32, 0), count)
                 };
                 group.iter().map(of).collect()
-            };
-            (found, shot)
-        })
-        .collect();
-    if cancel.is_cancelled() {
-        return None;
+            }
+        });
+        (found.collect(), shot)
     }
-    let mut closures = vec![Closure::CLOSED; hierarchy.mesh.elements.len()];
-    for (group, (found, shot)) in open.iter().zip(found) {
-        ray_count += shot;
-        for (&cell, closure) in group.iter().zip(found) {
-            closures[cell] = closure;
-        }
+
+    /// One closure for all cells of a group.
+    fn probe_together(&self, group: &[usize], count: usize) -> Closure {
+        let hits = (0..count).map(|ray| self.meets(group[ray * group.len() / count], ray));
+        Closure::shared(hits.sum(), count)
     }
-    Some((Closures(closures), ray_count as u64))
+
+    /// How many of some cosine-weighted rays from an element meet a lit side; `first` numbers them within the element.
+    fn probe(&self, element: usize, count: u32, first: u32) -> u32 {
+        let mut random = Random::new(self.seed, (u64::from(first) << 32) | element as u64);
+        let shift = random.uniform_2d();
+        let [a, b, c] = self.hierarchy.mesh.corners(element);
+        let patch = self.hierarchy.patch_of(element);
+        let mut is_met = |index: u32| {
+            // Only the directions are stratified: a point from the same sequence would go with its direction.
+            let at = triangle_point(random.uniform_2d());
+            let origin: Vec3 = a * at.x + b * at.y + c * at.z;
+            let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
+            self.rays
+                .closest(origin, direction, Some(patch.triangle))
+                .is_some_and(|hit| self.hierarchy.patch_met(hit.triangle, direction).is_some())
+        };
+        (0..count).filter(|&index| is_met(index)).count() as u32
+    }
 }
 
 /// The leaf elements of a cluster, in the order of its patches.
@@ -284,34 +339,8 @@ fn cells(hierarchy: &Hierarchy, cluster: usize) -> Vec<usize> {
         let element = &hierarchy.mesh.elements[index];
         if element.is_leaf() {
             cells.push(index);
-        } else {
-            let first = element.first_child as usize;
-            pending.extend((first..first + 4).rev());
         }
+        pending.extend(element.children().rev());
     }
     cells
-}
-
-/// How many of some cosine-weighted rays from an element meet a lit side; `first` numbers them within the element.
-fn probe(
-    hierarchy: &Hierarchy,
-    rays: &RayTree,
-    element: usize,
-    count: u32,
-    first: u32,
-    seed: u64,
-) -> u32 {
-    let mut random = Random::new(seed, (u64::from(first) << 32) | element as u64);
-    let shift = random.uniform_2d();
-    let [a, b, c] = hierarchy.mesh.corners(element);
-    let patch = hierarchy.patch_of(element);
-    let mut is_met = |index: u32| {
-        // Only the directions are stratified: a point from the same sequence would go with its direction.
-        let at = triangle_point(random.uniform_2d());
-        let origin: Vec3 = a * at.x + b * at.y + c * at.z;
-        let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
-        rays.closest(origin, direction, Some(patch.triangle))
-            .is_some_and(|hit| hierarchy.patch_met(hit.triangle, direction).is_some())
-    };
-    (0..count).filter(|&index| is_met(index)).count() as u32
 }

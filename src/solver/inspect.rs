@@ -67,9 +67,9 @@ impl Solver {
             if element.is_leaf() {
                 return Some(NodeId((base + index) as u32));
             }
-            let first = element.first_child as usize;
-            index =
-                (first..first + 4).max_by(|&a, &b| depth_inside(a).total_cmp(&depth_inside(b)))?;
+            index = element
+                .children()
+                .max_by(|&a, &b| depth_inside(a).total_cmp(&depth_inside(b)))?;
         }
     }
 

@@ -33,7 +33,7 @@ pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
 use crate::{
     geometry::RayTree,
-    hierarchy::{Cluster, Hierarchy, Reading, Tables},
+    hierarchy::{Hierarchy, Reading, Tables},
     scene::Scene,
     transport::{
         Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
@@ -204,8 +204,8 @@ impl Solver {
         self.estimate_mean();
         report.epsilon = self.refine(report.epsilon, cancel)?;
         self.iterate(&mut report, cancel)?;
-        let found = reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
-        self.leaves = found;
+        self.leaves =
+            reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
         cancel.proceed()?;
         self.fill(&mut report);
         self.step = report.step;
@@ -351,8 +351,8 @@ impl Solver {
         self.mean_irradiance = mean;
     }
 
-    /// Bring the links to a smaller threshold; source tables are up to date before and after. Returns the threshold that they have: where links do not fit into memory,
-    /// those from before stay, and the first ones are made coarser.
+    /// Bring the links to a smaller threshold; source tables are up to date before and after. Returns the threshold that
+    /// they have: where links do not fit into memory, those from before stay, and the first ones are made coarser.
     fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
         let (mut passes, mut raises) = (0, 0);
         while passes < MOST_PASSES {
@@ -431,19 +431,4 @@ fn displayable(color: Vec4) -> Vec3 {
     color
         .truncate()
         .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
-}
-
-/// The largest clusters with few enough patches, in the order of the patches.
-fn groups(hierarchy: &Hierarchy, most_patches: u32) -> Vec<usize> {
-    let clusters = &hierarchy.clusters;
-    let is_small =
-        |cluster: &Cluster| cluster.is_leaf() || cluster.end - cluster.start <= most_patches;
-    let mut groups: Vec<usize> = (0..clusters.len())
-        .filter(|&index| {
-            let parent = clusters.get(clusters[index].parent as usize);
-            is_small(&clusters[index]) && parent.is_none_or(|parent| !is_small(parent))
-        })
-        .collect();
-    groups.sort_unstable_by_key(|&index| clusters[index].start);
-    groups
 }

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use super::{
     Cancel,
     closure::{Closure, Closures},
-    groups,
 };
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
@@ -48,7 +47,9 @@ pub(super) fn gather_leaves(
     closures: &Closures,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
-    let found: Vec<Vec<LeafLight>> = groups(kernel.hierarchy, TASK_PATCHES)
+    let found: Vec<Vec<LeafLight>> = kernel
+        .hierarchy
+        .groups(TASK_PATCHES)
         .into_par_iter()
         .map(|group| {
             let mut walk = Walk {
@@ -206,11 +207,7 @@ impl<'a> Walk<'a> {
                 ..Chain::default()
             };
             self.push(element.centroid, element.radius, chain);
-            pending.extend(
-                (0..4)
-                    .rev()
-                    .map(|child| (element.first_child as usize + child, depth + 1)),
-            );
+            pending.extend(element.children().rev().map(|child| (child, depth + 1)));
         }
         self.path.truncate(above);
         // Leaves come depth first, so those of a cell follow each other.

@@ -52,13 +52,13 @@ impl Incident {
 #[derive(Clone, Copy, Debug)]
 pub struct Sight {
     /// Where the power comes from.
-    pub centre: Vec3,
+    centre: Vec3,
     /// Projected power along the way to the point.
     power: Vec4,
     /// Largest radiosity.
     brightest: Vec4,
     /// Square of the radius over which the light spreads, 0 if it does not.
-    spreads: f32,
+    extent: f32,
 }
 
 impl Sight {
@@ -73,9 +73,14 @@ impl Sight {
         Incident {
             towards_source,
             strength: (self.power * (1.0 / (PI * squared))).saturated(self.brightest),
-            spread: (self.spreads / squared).min(1.0),
+            spread: spread(self.extent, squared),
         }
     }
+}
+
+/// Share of the light of a source of this squared extent that comes from the half-space about the way to it; 0…1.
+fn spread(extent: f32, squared_distance: f32) -> f32 {
+    (extent / squared_distance.max(f32::MIN_POSITIVE)).min(1.0)
 }
 
 /// Reads the source tables of a hierarchy by one method.
@@ -130,11 +135,11 @@ impl Kernel<'_> {
     /// A cluster as it looks from about a point.
     pub fn sight(&self, cluster: usize, point: Vec3) -> Sight {
         let centre = self.tables.centres[cluster];
-        let radius = self.hierarchy.clusters[cluster].radius;
+        let extent = self.extent(self.hierarchy.clusters[cluster].radius);
         let separation = point - centre;
         let squared = separation.length_squared();
         let unit = separation / squared.sqrt();
-        let spread = self.spread(radius, squared);
+        let spread = spread(extent, squared);
         let power = if squared <= 0.0 || !unit.is_finite() {
             Vec4::ZERO
         } else if spread == 0.0 {
@@ -146,27 +151,26 @@ impl Kernel<'_> {
             centre,
             power,
             brightest: self.tables.brightest[cluster],
-            spreads: if spread > 0.0 { radius * radius } else { 0.0 },
+            extent,
         }
     }
 
-    fn spread(&self, radius: f32, squared: f32) -> f32 {
+    /// Square of the radius over which the light of a node spreads: the paper's methods take it for a point.
+    fn extent(&self, radius: f32) -> f32 {
         match self.reading {
-            Some(Reading::Bounded) => (radius * radius / squared.max(f32::MIN_POSITIVE)).min(1.0),
+            Some(Reading::Bounded) => radius * radius,
             _ => 0.0,
         }
     }
 
-    /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards its brightest patch, as that of a disc does exactly on its axis:
-    /// A/π r² becomes A/(π r² + A).
+    /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards its
+    /// brightest patch, as that of a disc does exactly on its axis: A/π r² becomes A/(π r² + A).
     pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident {
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => self.sight(index, point).incident(point),
             Kind::Element(index) => {
-                let spread = self.spread(
-                    self.hierarchy.radius(source),
-                    point.distance_squared(self.tables.centre(self.hierarchy, source)),
-                );
+                let squared = point.distance_squared(self.tables.centre(self.hierarchy, source));
+                let spread = spread(self.extent(self.hierarchy.radius(source)), squared);
                 let vector = element_vector(self.hierarchy, index, point);
                 let length = vector.length();
                 let towards_source = if length > 0.0 {

@@ -20,8 +20,8 @@ pub struct Link {
 }
 
 impl Link {
-    /// By which each channel of an unoccluded irradiance from a source or to a receiver that is a cluster is multiplied:
-    /// colours by the visibility of the light, `w` (the form factor) by that of the area.
+    /// What each channel of an unoccluded irradiance is multiplied by where not both ends are elements: colours by the
+    /// visibility of the light, `w` (the form factor) by that of the area.
     pub fn transmission(&self) -> Vec4 {
         Vec3::splat(self.visibility).extend(self.form_factor)
     }
