@@ -6,7 +6,7 @@ use glam::{Vec3, Vec4};
 use super::{
     Cancel,
     direct::{DirectLight, Lights, Receiver},
-    reconstruct::INSET,
+    reconstruct::{INSET, project},
     smooth,
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
@@ -24,6 +24,13 @@ const HIDDEN_TOLERANCE: f32 = 4.0;
 
 /// Share of the shadow rays that is shot first.
 const PROBING_SHARE: f32 = 0.25;
+
+/// Noise of a point, times the root of its share of the area, that is let be: this share of the tolerance. Larger leaves
+/// blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
+const NOISE_SHARE: f32 = 0.25;
+
+/// Shadow rays of a point at most, in multiples of the usual number.
+const MOST_SAMPLES: u32 = 16;
 
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
@@ -43,6 +50,14 @@ pub(super) struct Limits {
     pub most_elements: u64,
 }
 
+impl Limits {
+    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root.
+    fn is_noisy(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
+        light.tried < MOST_SAMPLES * self.shadow_samples
+            && light.error() * weight > NOISE_SHARE * self.tolerance * mean
+    }
+}
+
 /// Direct light on a mesh.
 pub(super) struct DirectField {
     pub(super) lights: Lights,
@@ -50,8 +65,8 @@ pub(super) struct DirectField {
     vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
     centres: Vec<Option<DirectLight>>,
-    /// Visible fraction to show by vertex; shorter than the vertices where some are new.
-    smooth: Vec<Vec4>,
+    /// Irradiance to show by vertex; shorter than the vertices where some are new.
+    shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
     pub(super) is_full: bool,
 }
@@ -89,7 +104,7 @@ impl DirectField {
             lights,
             vertices: Vec::new(),
             centres: Vec::new(),
-            smooth: Vec::new(),
+            shown: Vec::new(),
             is_full: false,
         }
     }
@@ -110,16 +125,28 @@ impl DirectField {
 
     /// Bring what is shown at vertices up to date with the samples.
     pub(super) fn smooth(&mut self, hierarchy: &Hierarchy) {
-        self.smooth = smooth::fractions(hierarchy, &self.vertices);
+        let fractions = smooth::fractions(hierarchy, &self.vertices);
+        let known = self.vertices.iter().zip(fractions);
+        self.shown = known
+            .map(|(light, fraction)| {
+                let unoccluded = light.map_or(Vec4::ZERO, |light| light.unoccluded());
+                self.lights.bounded(unoccluded * fraction)
+            })
+            .collect();
+        let centres = hierarchy.mesh.leaves().filter_map(|leaf| {
+            let centre = self.centres.get(leaf).copied().flatten()?;
+            Some((leaf, self.lights.bounded(centre.irradiance())))
+        });
+        project(hierarchy, &mut self.shown, centres);
     }
 
     /// Direct irradiance to show at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
     /// mean of its ends.
     pub(super) fn vertex(&self, hierarchy: &Hierarchy, vertex: u32) -> (Vec4, f32) {
         if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
-            let fraction = self.smooth.get(vertex as usize).copied();
-            let shown = light.unoccluded() * fraction.unwrap_or_else(|| light.fraction());
-            return (self.lights.bounded(shown), light.error());
+            let shown = self.shown.get(vertex as usize).copied();
+            let shown = shown.unwrap_or_else(|| self.lights.bounded(light.irradiance()));
+            return (shown, light.error());
         }
         match hierarchy.mesh.vertices[vertex as usize].ends {
             // Ends were made before the vertices between them, so this descends.
@@ -153,6 +180,7 @@ impl DirectField {
         for _ in 0..MOST_ROUNDS {
             ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
+            ray_count += self.settle(rays, hierarchy, limits, mean, cancel)?;
             ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, limits, mean);
             self.is_full = !hierarchy.mesh.fits(&wanted, limits.most_elements);
@@ -161,7 +189,104 @@ impl DirectField {
             }
         }
         ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
+        let mean = self.mean(hierarchy);
+        ray_count += self.settle(rays, hierarchy, limits, mean, cancel)?;
         Some(ray_count)
+    }
+
+    /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
+    fn settle(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        limits: Limits,
+        mean: f32,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let mut weights = vec![0.0f32; self.vertices.len()];
+        for leaf in hierarchy.mesh.leaves() {
+            let element = &hierarchy.mesh.elements[leaf];
+            for &vertex in &element.vertices {
+                weights[vertex as usize] += element.area_vector.length() / 3.0;
+            }
+        }
+        let scale = 1.0 / (hierarchy.area as f32).sqrt();
+        weights
+            .iter_mut()
+            .for_each(|weight| *weight = weight.sqrt() * scale);
+        let receivers = self.receivers(hierarchy, |vertex, light| {
+            light.is_some_and(|light| limits.is_noisy(&light, weights[vertex], mean))
+        });
+        let before = self.shot(&receivers);
+        let weights: Vec<f32> = receivers
+            .iter()
+            .map(|&(vertex, _)| weights[vertex as usize])
+            .collect();
+        let mut known = self.known(&receivers);
+        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
+        let noisy =
+            |index: usize, light: &DirectLight| limits.is_noisy(light, weights[index], mean);
+        self.double(rays, &places, noisy, limits.seed, &mut known, cancel)?;
+        self.learn(&receivers, known);
+        Some(self.shot(&receivers) - before)
+    }
+
+    /// Double the rays of points for as long as they are too noisy.
+    fn double(
+        &self,
+        rays: &RayTree,
+        receivers: &[Receiver],
+        is_noisy: impl Fn(usize, &DirectLight) -> bool,
+        seed: u64,
+        known: &mut [DirectLight],
+        cancel: &Cancel,
+    ) -> Option<()> {
+        loop {
+            let noisy: Vec<usize> = (0..known.len())
+                .filter(|&index| is_noisy(index, &known[index]))
+                .collect();
+            if noisy.is_empty() {
+                return Some(());
+            }
+            let places: Vec<Receiver> = noisy.iter().map(|&index| receivers[index]).collect();
+            let mut lights: Vec<DirectLight> = noisy.iter().map(|&index| known[index]).collect();
+            self.lights.shoot(
+                rays,
+                &places,
+                |light| 2 * light.tried,
+                seed,
+                &mut lights,
+                cancel,
+            );
+            cancel.proceed()?;
+            for (index, light) in noisy.into_iter().zip(lights) {
+                known[index] = light;
+            }
+        }
+    }
+
+    /// What is known of some vertices.
+    fn known(&self, receivers: &[(u32, Receiver)]) -> Vec<DirectLight> {
+        let known = |&(vertex, _): &(u32, Receiver)| self.vertices[vertex as usize];
+        receivers
+            .iter()
+            .map(|receiver| known(receiver).unwrap_or_default())
+            .collect()
+    }
+
+    /// What is now known of some vertices.
+    fn learn(&mut self, receivers: &[(u32, Receiver)], known: Vec<DirectLight>) {
+        for (&(vertex, _), light) in receivers.iter().zip(known) {
+            self.vertices[vertex as usize] = Some(light);
+        }
+    }
+
+    /// Rays shot from some vertices.
+    fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
+        let shot = |&(vertex, _): &(u32, Receiver)| {
+            self.vertices[vertex as usize].map_or(0, |light| u64::from(light.shot))
+        };
+        receivers.iter().map(shot).sum()
     }
 
     /// Sample the corners of leaves that were not sampled yet. Returns the rays shot.
@@ -178,54 +303,41 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
-        let receivers = self.unsampled(hierarchy);
+        let receivers = self.receivers(hierarchy, |_, light| light.is_none());
         for &(vertex, _) in &receivers {
             self.vertices[vertex as usize] = Some(DirectLight::default());
         }
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
-        self.shoot(rays, &receivers, 0..probing, seed, cancel);
+        self.shoot(rays, &receivers, |_| probing, seed, cancel);
         let disputed = self.disputed(hierarchy);
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
             .filter(|&(vertex, _)| disputed[vertex as usize])
             .collect();
-        self.shoot(rays, &rest, probing..samples, seed, cancel);
+        self.shoot(rays, &rest, |_| samples, seed, cancel);
         if cancel.is_cancelled() {
             for &(vertex, _) in &receivers {
                 self.vertices[vertex as usize] = None;
             }
             return None;
         }
-        let shot = |&(vertex, _): &(u32, Receiver)| {
-            self.vertices[vertex as usize].map_or(0, |light| light.shot)
-        };
-        Some(
-            receivers
-                .iter()
-                .map(|receiver| u64::from(shot(receiver)))
-                .sum(),
-        )
+        Some(self.shot(&receivers))
     }
 
     fn shoot(
         &mut self,
         rays: &RayTree,
         receivers: &[(u32, Receiver)],
-        samples: std::ops::Range<u32>,
+        wanted: impl Fn(&DirectLight) -> u32 + Sync,
         seed: u64,
         cancel: &Cancel,
     ) {
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
-        let mut known: Vec<DirectLight> = receivers
-            .iter()
-            .map(|&(vertex, _)| self.vertices[vertex as usize].unwrap_or_default())
-            .collect();
+        let mut known = self.known(receivers);
         self.lights
-            .shoot(rays, &places, samples, seed, &mut known, cancel);
-        for (&(vertex, _), light) in receivers.iter().zip(known) {
-            self.vertices[vertex as usize] = Some(light);
-        }
+            .shoot(rays, &places, wanted, seed, &mut known, cancel);
+        self.learn(receivers, known);
     }
 
     /// Which vertices share an element with one whose rays had another outcome.
@@ -311,17 +423,20 @@ impl DirectField {
             })
             .collect();
         let mut lights = vec![DirectLight::default(); receivers.len()];
+        let samples = limits.shadow_samples;
         self.lights.shoot(
             rays,
             &receivers,
-            0..limits.shadow_samples,
+            |_| samples,
             limits.seed,
             &mut lights,
             cancel,
         );
-        if cancel.is_cancelled() {
-            return None;
-        }
+        cancel.proceed()?;
+        let noisy = |index: usize, light: &DirectLight| {
+            limits.is_noisy(light, share_root(hierarchy, unknown[index]), mean)
+        };
+        self.double(rays, &receivers, noisy, limits.seed, &mut lights, cancel)?;
         let mut ray_count = 0;
         for (leaf, light) in unknown.into_iter().zip(lights) {
             ray_count += u64::from(light.shot);
@@ -356,14 +471,18 @@ impl DirectField {
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
-            + size_of_val(self.smooth.as_slice())
+            + size_of_val(self.shown.as_slice())
     }
 }
 
 impl DirectField {
-    /// Where to sample each corner of a leaf that was not sampled yet: a little inside the leaf whose normal is nearest
-    /// to the mean normal about the vertex.
-    fn unsampled(&self, hierarchy: &Hierarchy) -> Vec<(u32, Receiver)> {
+    /// Where to sample each corner of a leaf that is wanted: a little inside the leaf whose normal is nearest to the mean
+    /// normal about the vertex.
+    fn receivers(
+        &self,
+        hierarchy: &Hierarchy,
+        is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,
+    ) -> Vec<(u32, Receiver)> {
         let mesh = &hierarchy.mesh;
         let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
         for leaf in mesh.leaves() {
@@ -377,7 +496,7 @@ impl DirectField {
             for vertex in mesh.elements[leaf].vertices.map(|vertex| vertex as usize) {
                 let likeness = normals[vertex].dot(normal);
                 let is_best = chosen[vertex].is_none_or(|(best, _)| likeness > best);
-                if self.vertices[vertex].is_none() && is_best {
+                if is_best && is_wanted(vertex, self.vertices[vertex]) {
                     chosen[vertex] = Some((likeness, leaf as u32));
                 }
             }

@@ -117,13 +117,13 @@ impl Lights {
         (0..self.is_sampled.len()).filter(|&patch| self.is_sampled[patch])
     }
 
-    /// Shoot a range of the shadow rays of many points, and add what they find to what is known of each.
-    /// When cancelled, some points are left out and all must be asked again.
+    /// Shoot shadow rays from many points until each has had `wanted` of them, and add what they find to what is known of
+    /// each. When cancelled, some points are left out and all must be asked again.
     pub(super) fn shoot(
         &self,
         rays: &RayTree,
         receivers: &[Receiver],
-        samples: Range<u32>,
+        wanted: impl Fn(&DirectLight) -> u32 + Sync,
         seed: u64,
         known: &mut [DirectLight],
         cancel: &Cancel,
@@ -134,7 +134,14 @@ impl Lights {
             .with_min_len(16)
             .for_each_init(Vec::new, |sums, (light, receiver)| {
                 if !cancel.is_cancelled() {
-                    self.shoot_at(rays, receiver, samples.clone(), seed, sums, light);
+                    self.shoot_at(
+                        rays,
+                        receiver,
+                        light.tried..wanted(light),
+                        seed,
+                        sums,
+                        light,
+                    );
                 }
             });
     }
@@ -150,6 +157,7 @@ impl Lights {
         light: &mut DirectLight,
     ) {
         light.exact = self.unoccluded(receiver, sums);
+        light.tried = samples.end.max(light.tried);
         let Some(&total) = sums.last().filter(|&&total| total > 0.0) else {
             return;
         };
@@ -158,8 +166,10 @@ impl Lights {
             .round()
             .to_array()
             .map(|x| u64::from(x.to_bits()));
-        let mut random = Random::new(seed, x ^ (y << 21) ^ (z << 42) ^ (z >> 22));
-        let shift = random.uniform_2d();
+        let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
+        let shift = Random::new(seed, place).uniform_2d();
+        // Each range of the rays is stratified by itself.
+        let mut random = Random::new(seed ^ (u64::from(samples.start + 1) << 32), place);
         let count = samples.len() as f32;
         for (stratum, sample) in samples.enumerate() {
             let target = (stratum as f32 + random.uniform()) / count * total;
@@ -223,6 +233,8 @@ pub(super) struct DirectLight {
     sent: Vec4,
     /// Weights of the rays that got through by colour.
     arrived: Vec4,
+    /// Rays tried: those that carry nothing are not shot.
+    pub tried: u32,
     /// Rays shot.
     pub shot: u32,
     /// Rays that got through.
