@@ -43,8 +43,9 @@ fn half_hidden() -> Scene {
     builder.finish(&options).expect("the squares are usable")
 }
 
-/// Visible parts of the light and of the area of both squares, whose radiosity is given by whether they are the left one.
-fn visible(radiosity: impl Fn(bool) -> f32 + Sync) -> (f32, f32) {
+/// Visible parts of the light and of the area of both squares, whose radiosity is given by whether they are the left one:
+/// the mean of some estimates by so many rays each.
+fn visible(radiosity: impl Fn(bool) -> f32 + Sync, estimates: u32, rays_each: u32) -> (f32, f32) {
     let scene = half_hidden();
     let (rays, hierarchy) = (RayTree::new(&scene), Hierarchy::new(&scene, 30.0));
     let centroid = |element: usize| hierarchy.mesh.elements[element].centroid;
@@ -75,7 +76,12 @@ fn visible(radiosity: impl Fn(bool) -> f32 + Sync) -> (f32, f32) {
         rays: &rays,
     };
     let source = NodeId(source as u32);
-    sampler.visibility(source, receiver, 4000, &mut Random::new(1, 2))
+    let sums = (0..estimates).fold((0.0, 0.0), |(light, area), estimate| {
+        let mut random = Random::new(1, u64::from(estimate));
+        let found = sampler.visibility(source, receiver, rays_each, &mut random);
+        (light + found.0, area + found.1)
+    });
+    (sums.0 / estimates as f32, sums.1 / estimates as f32)
 }
 
 #[test]
@@ -86,7 +92,7 @@ fn light_and_area_are_told_apart() {
         (0.0, 1.0, 0.0),
         (3.0, 1.0, 0.75),
     ] {
-        let (light, area) = visible(|is_left| if is_left { left } else { right });
+        let (light, area) = visible(|is_left| if is_left { left } else { right }, 1, 4000);
         assert!(
             (light - expected).abs() < 0.03,
             "{left} {right}: light {light}"
@@ -94,6 +100,14 @@ fn light_and_area_are_told_apart() {
         assert!((area - 0.5).abs() < 0.03, "{left} {right}: area {area}");
     }
     // Where nothing shines there is no light to tell: the area stands for it.
-    let (light, area) = visible(|_| 0.0);
+    let (light, area) = visible(|_| 0.0, 1, 4000);
     assert!((area - 0.5).abs() < 0.03 && light == area, "{light} {area}");
+}
+
+#[test]
+fn two_rays_are_right_on_average() {
+    // The ratio of what two rays stand for would be 0.69 on average.
+    let (light, area) = visible(|is_left| if is_left { 3.0 } else { 1.0 }, 4000, 2);
+    assert!((light - 0.75).abs() < 0.025, "light {light}");
+    assert!((area - 0.5).abs() < 0.025, "area {area}");
 }

@@ -89,23 +89,47 @@ struct Candidate {
     area: f32,
 }
 
-/// Which part of what was sent arrived.
+/// What a number of rays stand for, and what those that got through do.
 #[derive(Clone, Copy, Debug, Default)]
-struct Share {
+struct Arrival {
     sent: f32,
     arrived: f32,
 }
 
-impl Share {
-    fn count(&mut self, weight: f32, is_visible: bool) {
-        self.sent += weight;
-        if is_visible {
-            self.arrived += weight;
-        }
-    }
-
+impl Arrival {
     fn part(&self) -> Option<f32> {
         (self.sent > 0.0).then(|| self.arrived / self.sent)
+    }
+}
+
+/// Which part of what was sent arrived. Every second ray belongs to the same half.
+#[derive(Clone, Copy, Debug, Default)]
+struct Share {
+    halves: [Arrival; 2],
+    count: usize,
+}
+
+impl Share {
+    fn count(&mut self, weight: f32, is_visible: bool) {
+        let half = &mut self.halves[self.count % 2];
+        half.sent += weight;
+        if is_visible {
+            half.arrived += weight;
+        }
+        self.count += 1;
+    }
+
+    /// The part, 0…1.5. The ratio of two sums over few rays is too small on average, since what weighs much is often what
+    /// gets through. The halves have twice the bias of the whole, which tells how large it is (Quenouille 1956).
+    fn part(&self) -> Option<f32> {
+        let [first, second] = self.halves;
+        let whole = Arrival {
+            sent: first.sent + second.sent,
+            arrived: first.arrived + second.arrived,
+        };
+        let part = whole.part()?;
+        let halves = first.part().zip(second.part());
+        Some(halves.map_or(part, |(a, b)| (2.0 * part - 0.5 * (a + b)).max(0.0)))
     }
 }
 
@@ -216,7 +240,7 @@ impl PairSampler<'_> {
     }
 
     /// Unoccluded fractions of the light and of the area that a source shows to a receiver, by `ray_count` rays; both
-    /// 0…1. Where no sampled pair transfers anything, all of them count alike.
+    /// 0…1.5, since what is estimated without bias may exceed what can be. Where no sampled pair transfers anything, all of them count alike.
     pub fn visibility(
         &self,
         source: NodeId,
