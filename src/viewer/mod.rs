@@ -21,6 +21,7 @@ pub mod opening;
 pub mod overlay;
 pub mod panels;
 pub mod pick;
+pub mod preferences;
 pub mod render;
 pub mod saver;
 pub mod session;

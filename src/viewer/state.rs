@@ -12,7 +12,7 @@ use super::{
     session::Recent,
     stage::Staged,
     truth::Truth,
-    view::ViewSettings,
+    view::{ViewMode, ViewSettings},
 };
 use crate::{
     scene::SceneOptions,
@@ -221,10 +221,21 @@ pub struct PanelState {
     pub mesh_text: String,
     /// Size of a picture in pixels.
     pub picture_size: [u32; 2],
+    /// Whether a picture has no background.
+    pub picture_is_transparent: bool,
+    /// Whether the dialog for the table of errors is open.
+    pub table: bool,
+    /// The typed path of the table of errors.
+    pub table_text: String,
     /// Whether the messages are to be opened.
     pub show_messages: bool,
     /// Units a second when flying, in frame units.
     pub fly_speed: f32,
+}
+
+impl PanelState {
+    /// Speeds that can be flown at.
+    pub const FLY_SPEED_RANGE: std::ops::RangeInclusive<f32> = 0.05..=1000.0;
 }
 
 impl Default for PanelState {
@@ -241,6 +252,9 @@ impl Default for PanelState {
             picture_text: String::new(),
             mesh_text: String::new(),
             picture_size: [1920, 1080],
+            picture_is_transparent: false,
+            table: false,
+            table_text: String::new(),
             show_messages: false,
             fly_speed: 30.0,
         }
@@ -266,6 +280,8 @@ pub struct State {
     pub scene_options: SceneOptions,
     /// How the light is shown.
     pub view: ViewSettings,
+    /// What the surfaces showed before the key for normals was pressed.
+    pub mode_before_normals: ViewMode,
     /// From where.
     pub rig: CameraRig,
     /// The picked point.
@@ -323,6 +339,12 @@ impl State {
             let mut shown = self.shown_clusters.shown.iter().copied();
             self.cluster = shown.rfind(over).or(self.cluster);
         }
+    }
+
+    /// Whether there are emitters; of no scene nobody knows.
+    pub fn has_emitters(&self) -> bool {
+        let loaded = self.loaded.as_ref();
+        loaded.is_none_or(|loaded| loaded.emitter_count > 0)
     }
 
     /// The last report.

@@ -9,7 +9,7 @@ use super::{
         navigation::Picked,
         pick, saver,
         session::Recent,
-        state::{PanelState, RunStatus, Selection, Severity},
+        state::{PanelState, RunStatus, Selection, Severity, State},
         view::ViewMode,
     },
     App,
@@ -55,20 +55,26 @@ impl App {
                 self.change_view(&action);
             }
             Action::ForgetRuns => self.state.truth.forget_earlier(),
+            Action::TableDialog => self.ask_for_table(),
+            Action::SaveTable(path) => self.save_table(path),
             Action::FrameSelected => self.frame_selected(),
             Action::SelectCluster(index) => self.state.cluster = Some(index),
             Action::ClearSelection => self.clear_selection(),
             Action::ScreenshotWithWindow => self.save_window(ctx),
             Action::Screenshot => {
                 let size = self.state.viewport_size;
-                self.save_picture(saver::free_path(&self.scene_name()), size);
+                self.save_picture(saver::free_path(&self.scene_name()), size, false);
             }
             Action::PictureDialog => {
                 let path = saver::free_path(&self.scene_name());
                 self.state.panels.picture_text = path.display().to_string();
                 self.state.panels.picture = true;
             }
-            Action::SavePicture { path, size } => self.save_picture(path, size),
+            Action::SavePicture {
+                path,
+                size,
+                is_transparent,
+            } => self.save_picture(path, size, is_transparent),
             Action::MeshDialog => self.ask_for_mesh(),
             Action::SaveMesh(path) => self.save_mesh(path),
             Action::SaveSidecar => self.save_sidecar(),
@@ -89,6 +95,7 @@ impl App {
         let state = &mut self.state;
         match action {
             Action::Mode(mode) => state.view.mode = *mode,
+            Action::ToggleNormals => toggle_normals(state),
             Action::ExposureBy(step) => {
                 state.view.exposure += *step;
                 state.view.auto_exposure = false;
@@ -244,5 +251,15 @@ impl App {
                 }
             }
         }
+    }
+}
+
+/// Show normals, or again what was shown before.
+fn toggle_normals(state: &mut State) {
+    let mode = &mut state.view.mode;
+    if *mode == ViewMode::Normals {
+        *mode = state.mode_before_normals;
+    } else {
+        state.mode_before_normals = std::mem::replace(mode, ViewMode::Normals);
     }
 }

@@ -123,7 +123,16 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         Action::ToggleEdges,
     );
     item(ui, table, actions, "Cluster boxes", Action::ToggleClusters);
-    item(ui, table, actions, "Backs of faces", Action::ToggleBacks);
+    item(
+        ui,
+        table,
+        actions,
+        "Links of what is picked",
+        Action::ToggleLinks,
+    );
+    if state.loaded.as_ref().is_none_or(|loaded| loaded.has_backs) {
+        item(ui, table, actions, "Backs of faces", Action::ToggleBacks);
+    }
     item(
         ui,
         table,

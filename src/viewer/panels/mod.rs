@@ -9,6 +9,7 @@ pub mod links;
 pub mod menu;
 pub mod mesh;
 pub mod messages;
+pub mod method;
 pub mod path;
 pub mod picture;
 pub mod plot;
@@ -20,6 +21,7 @@ pub mod settings;
 pub mod sides;
 pub mod statistics;
 pub mod status;
+pub mod table;
 pub mod toolbar;
 
 /// Three significant digits, without an exponent where that is short.

@@ -42,6 +42,10 @@ fn picture_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) -
             panels.picture_size = [3840, 2160];
         }
     });
+    ui.checkbox(&mut panels.picture_is_transparent, "Transparent background")
+        .on_hover_text(
+            "Leave the background out: straight alpha in a PNG, colours multiplied by alpha in an EXR",
+        );
     let label = ui.label("File: .png as seen, .exr with linear radiance");
     let field = egui::TextEdit::singleline(&mut panels.picture_text).desired_width(f32::INFINITY);
     ui.add(field).labelled_by(label.id);
@@ -54,6 +58,7 @@ fn picture_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) -
         actions.push(Action::SavePicture {
             path: PathBuf::from(path),
             size: panels.picture_size,
+            is_transparent: panels.picture_is_transparent,
         });
     }
     confirmed
