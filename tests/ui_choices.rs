@@ -289,3 +289,48 @@ fn errors_are_saved_as_a_table_with_the_columns_of_the_report() {
     let error: f64 = last[error].parse().expect("a number");
     assert!(error > 0.0 && error < 1.0, "{error}");
 }
+
+#[test]
+fn escape_closes_a_dialog_before_it_clears_the_selection() {
+    let mut harness = plates();
+    perform(&mut harness, Action::SelectCluster(0));
+    perform(&mut harness, Action::PictureDialog);
+    harness.get_by_label("Transparent background");
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(3);
+    assert!(!harness.state().state.panels.picture);
+    assert_eq!(harness.state().state.cluster, Some(0));
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(3);
+    assert_eq!(harness.state().state.cluster, None);
+}
+
+#[test]
+fn escape_closes_a_menu_and_nothing_else() {
+    let mut harness = plates();
+    perform(&mut harness, Action::SelectCluster(0));
+    harness.get_by_label("View").click();
+    harness.run_steps(3);
+    harness.get_by_label("Reset layout");
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Reset layout").is_none());
+    assert_eq!(harness.state().state.cluster, Some(0));
+}
+
+#[test]
+fn enter_confirms_a_dialog_and_leaves_the_camera() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let path = folder.path().join("lit.ply");
+    let mut harness = plates();
+    harness.state_mut().state.rig.target.yaw = 1.25;
+    harness.state_mut().state.rig.target.pivot.x = 3.0;
+    perform(&mut harness, Action::MeshDialog);
+    harness.state_mut().state.panels.mesh_text = path.display().to_string();
+    harness.run_steps(2);
+    harness.key_press(egui::Key::Enter);
+    harness.run_steps(2);
+    assert!(!harness.state().state.panels.mesh);
+    wait_for(&mut harness, |_| path.exists());
+    assert_eq!(harness.state().state.rig.target.pivot.x, 3.0);
+}

@@ -153,12 +153,9 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        // What keys ask for shows in this frame already.
-        if !ctx.egui_wants_keyboard_input() {
-            for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
-                self.perform(&ctx, action);
-            }
-            self.want();
+        // What keys ask for shows in this frame already. Keys belong to fields and open menus first.
+        if !ctx.egui_wants_keyboard_input() && !egui::Popup::is_any_open(&ctx) {
+            self.obey_keys(&ctx);
         }
         let mut actions: Vec<Action> = self.take_dropped(&ctx).into_iter().collect();
         let before = self.state.view.clone();
@@ -191,7 +188,7 @@ impl eframe::App for App {
         panels::scene::path_window(&ctx, &mut self.state, &mut actions);
         panels::picture::picture_window(&ctx, &mut self.state, &mut actions);
         panels::mesh::mesh_window(&ctx, &mut self.state, &mut actions);
-        panels::table::table_window(&ctx, &mut self.state, &mut actions);
+        panels::table::table_window(&ctx, &mut self.state.panels, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
         dropping::hover_ui(&ctx);
         if self.state.view != before {

@@ -194,7 +194,7 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Escape,
             Solve,
-            "Stop reading or computing; else select nothing",
+            "Close a dialog, else stop, else select nothing",
             Action::Stop,
         ),
         command(Key::R, Solve, "Begin again", Action::Reset),

@@ -17,11 +17,7 @@ pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> V
     if !overlay.shown {
         return Vec::new();
     }
-    let shown: Vec<&ClusterBox> = shown
-        .iter()
-        .take(MAX_BOXES)
-        .map(|&index| &all[index])
-        .collect();
+    let shown: Vec<&ClusterBox> = spread(shown, MAX_BOXES).map(|index| &all[index]).collect();
     let [low, high] = color_range(&shown, overlay.color);
     shown
         .iter()
@@ -30,6 +26,13 @@ pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> V
             instance(cluster, theme::ramp(0.15 + 0.85 * t.clamp(0.0, 1.0)))
         })
         .collect()
+}
+
+/// At most so many of a list, evenly spread over it: neighbours in the tree's order are neighbours in the scene, so that
+/// no part of the scene is left bare.
+fn spread(list: &[usize], most: usize) -> impl Iterator<Item = usize> {
+    let count = list.len().min(most);
+    (0..count).map(move |place| list[place * list.len() / count])
 }
 
 /// One box in a colour.
@@ -144,6 +147,18 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn too_many_are_thinned_out_evenly() {
+        let list: Vec<usize> = (100..110).collect();
+        assert_eq!(spread(&list, 20).collect::<Vec<_>>(), list);
+        assert_eq!(
+            spread(&list, 5).collect::<Vec<_>>(),
+            [100, 102, 104, 106, 108]
+        );
+        assert_eq!(spread(&list, 3).collect::<Vec<_>>(), [100, 103, 106]);
+        assert_eq!(spread(&[], 5).count(), 0);
     }
 
     #[test]

@@ -236,6 +236,24 @@ pub struct PanelState {
 impl PanelState {
     /// Speeds that can be flown at.
     pub const FLY_SPEED_RANGE: std::ops::RangeInclusive<f32> = 0.05..=1000.0;
+
+    /// Whether a dialog asks for a file.
+    pub fn asks_for_file(&self) -> bool {
+        self.picture || self.mesh || self.table || self.path
+    }
+
+    /// Close the key sheet and all dialogs; whether there was one.
+    pub fn close_dialogs(&mut self) -> bool {
+        let open = [
+            &mut self.help,
+            &mut self.picture,
+            &mut self.mesh,
+            &mut self.table,
+            &mut self.path,
+        ];
+        open.into_iter()
+            .fold(false, |any, open| std::mem::take(open) | any)
+    }
 }
 
 impl Default for PanelState {

@@ -5,7 +5,7 @@ use eframe::egui;
 use super::{
     super::{
         action::Action,
-        clusters,
+        bindings, clusters,
         navigation::Picked,
         pick, saver,
         session::Recent,
@@ -88,6 +88,24 @@ impl App {
             other => self.change_view(&other),
         }
         ctx.request_repaint();
+    }
+
+    /// Do what keys ask for.
+    pub(super) fn obey_keys(&mut self, ctx: &egui::Context) {
+        if self.state.panels.asks_for_file() {
+            // All other keys are the dialog's.
+            if ctx.input(|input| input.key_pressed(egui::Key::Escape)) {
+                self.state.panels.close_dialogs();
+            }
+            return;
+        }
+        for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
+            // The key that stops closes what lies over the scene first.
+            if action != Action::Stop || !self.state.panels.close_dialogs() {
+                self.perform(ctx, action);
+            }
+        }
+        self.want();
     }
 
     /// Actions that change only how the scene is shown.

@@ -23,7 +23,10 @@ pub fn error_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let truth = &state.truth;
     reference_ui(ui, state, actions);
     if let Some(message) = &truth.progress.failed {
-        ui.colored_label(theme::BAD, format!("The reference failed: {message}"));
+        ui.colored_label(
+            theme::bad(ui.visuals()),
+            format!("The reference failed: {message}"),
+        );
     }
     if !truth.exists() {
         ui.weak("Path tracing at random surface points, to measure the light by.");

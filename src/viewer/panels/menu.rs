@@ -104,16 +104,19 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
 }
 
 fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
-    for mode in ViewMode::offered(state.truth.exists()) {
-        let action = Action::Mode(mode);
-        let keys = hint(table, &action);
-        let button =
-            egui::Button::selectable(mode == state.view.mode, mode.label()).shortcut_text(keys);
-        if ui.add(button).on_hover_text(mode.explanation()).clicked() {
-            actions.push(action);
-            ui.close();
+    // A menu of its own: with all modes in it, this one would not fit into a small window.
+    ui.menu_button("Surfaces show", |ui| {
+        for mode in ViewMode::offered(state.truth.exists()) {
+            let action = Action::Mode(mode);
+            let keys = hint(table, &action);
+            let button =
+                egui::Button::selectable(mode == state.view.mode, mode.label()).shortcut_text(keys);
+            if ui.add(button).on_hover_text(mode.explanation()).clicked() {
+                actions.push(action);
+                ui.close();
+            }
         }
-    }
+    });
     ui.separator();
     item(
         ui,

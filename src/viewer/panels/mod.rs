@@ -1,6 +1,7 @@
 //! The panels around the viewport, one a file. They show the state, and return wishes as actions.
 
 pub mod clusters;
+pub mod dialog;
 pub mod emission;
 pub mod error;
 pub mod help;

@@ -29,7 +29,10 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
     buttons_ui(ui, status, actions);
     if let RunStatus::Failed(message) = status {
-        ui.colored_label(theme::BAD, format!("The solver failed: {message}"));
+        ui.colored_label(
+            theme::bad(ui.visuals()),
+            format!("The solver failed: {message}"),
+        );
     }
     figures_ui(ui, state);
 }
@@ -135,7 +138,7 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
     });
     for note in &report.notes {
-        ui.colored_label(theme::WARNING, note);
+        ui.colored_label(theme::warning(ui.visuals()), note);
     }
 }
 

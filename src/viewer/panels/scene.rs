@@ -25,7 +25,7 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
             ui.add_space(6.0);
             let last = state.messages.all.last();
             if let Some(error) = last.filter(|message| message.severity == Severity::Error) {
-                ui.colored_label(theme::BAD, &error.text);
+                ui.colored_label(theme::bad(ui.visuals()), &error.text);
                 ui.add_space(6.0);
             }
             ui.label("Drop an OBJ file here, choose one, or type its path.");
