@@ -4,7 +4,7 @@
 
 mod display_scenes;
 
-use std::{path::Path, sync::Arc};
+use std::{path::Path, process::Command, sync::Arc};
 
 use glam::{DVec3, Vec3};
 use image::{DynamicImage, Rgba};
@@ -220,4 +220,30 @@ fn files_hold_the_alpha() {
     assert!(matches!(read, DynamicImage::ImageRgba8(_)));
     let alpha_of = |(x, y)| read.to_rgba8().get_pixel(x, y).0[3];
     assert_eq!([INSIDE, OUTSIDE].map(alpha_of), [255, 0]);
+}
+
+#[test]
+fn the_command_line_leaves_the_background_out() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let run = |more: &[&str]| {
+        let start = ["solve", "--scene", "plates", "--preset", "draft"];
+        Command::new(env!("CARGO_BIN_EXE_vecrad"))
+            .args(start.iter().chain(more))
+            .current_dir(folder.path())
+            .output()
+            .expect("it can be run")
+    };
+    // Nothing is drawn, so there is nothing to leave out.
+    assert_eq!(run(&["--transparent"]).status.code(), Some(2));
+    let flags = ["--screenshot", "a.png", "--transparent", "--size", "64x64"];
+    let output = run(&flags);
+    if output.status.code() == Some(5) && std::env::var_os("CI").is_none() {
+        eprintln!("skipped, no graphics adapter");
+        return;
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let read = image::open(folder.path().join("a.png")).expect("it was written");
+    let alphas: Vec<u8> = read.to_rgba8().pixels().map(|pixel| pixel.0[3]).collect();
+    assert!(alphas.contains(&0) && alphas.contains(&255));
 }

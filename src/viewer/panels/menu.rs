@@ -208,7 +208,11 @@ fn item(
     label: &str,
     action: Action,
 ) {
-    let button = egui::Button::new(label).shortcut_text(hint(table, &action));
+    let mut button = egui::Button::new(label);
+    let keys = hint(table, &action);
+    if !keys.is_empty() {
+        button = button.shortcut_text(keys);
+    }
     if ui.add(button).clicked() {
         actions.push(action);
         ui.close();
