@@ -19,6 +19,7 @@ pub mod loader;
 pub mod navigation;
 pub mod opening;
 pub mod overlay;
+pub mod panel_state;
 pub mod panels;
 pub mod pick;
 pub mod preferences;

@@ -4,8 +4,9 @@ use eframe::egui::{self, Key, PointerButton};
 use glam::{Vec2, Vec3};
 
 use super::{
+    panel_state::PanelState,
     pick::{self, Pick},
-    state::{PanelState, State},
+    state::State,
 };
 
 /// What a click asks for.

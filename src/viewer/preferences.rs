@@ -7,7 +7,8 @@ use eframe::Storage;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    state::{PanelState, State},
+    panel_state::PanelState,
+    state::State,
     view::{ToneMap, ViewMode, ViewSettings},
 };
 

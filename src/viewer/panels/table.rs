@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use eframe::egui;
 
 use super::dialog::{confirm, dialog, file_field};
-use crate::viewer::{action::Action, state::PanelState};
+use crate::viewer::{action::Action, panel_state::PanelState};
 
 /// Show the dialog where it is open; wishes go into `actions`.
 pub fn table_window(ctx: &egui::Context, panels: &mut PanelState, actions: &mut Vec<Action>) {
