@@ -7,7 +7,7 @@ mod windows;
 use std::{
     collections::HashMap,
     fs,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 
 use eframe::egui;
@@ -18,7 +18,9 @@ use vecrad::{
         Options,
         action::Action,
         app::App,
+        camera::AxisView,
         loader::SceneSource,
+        panels::figure,
         start::Faults,
         state::Severity,
         view::{ToneMap, ViewMode, ViewRequest},
@@ -57,7 +59,7 @@ fn window_with(kept: Kept, options: Options) -> Harness<'static, App> {
         .with_size([1280.0, 900.0])
         .build_eframe(move |cc| {
             cc.storage = Some(kept);
-            App::new(cc, options, std::sync::Arc::new(Faults::default())).expect("threads")
+            App::new(cc, options, Arc::new(Faults::default())).expect("threads")
         })
 }
 
@@ -186,7 +188,57 @@ fn what_a_scene_has_brings_its_controls() {
     wait_for(&mut harness, |app| app.state.loaded.is_some());
     harness.get_by_label("Textures");
     harness.get_by_label("Backs");
+    let is_grey = harness
+        .state()
+        .state
+        .loaded
+        .as_ref()
+        .map(|loaded| loaded.is_grey);
+    assert_eq!(is_grey, Some(false));
     perform(&mut harness, Action::Stop);
+}
+
+#[test]
+fn light_of_a_grey_scene_is_one_figure() {
+    // From above, so that the middle of the picture lies on a plate.
+    let figures = |is_grey: bool| {
+        let mut harness = plates();
+        let mut loaded = harness.state_mut().state.loaded.take().expect("a scene");
+        assert!(loaded.is_grey);
+        Arc::get_mut(&mut loaded)
+            .expect("nobody else has it")
+            .is_grey = is_grey;
+        harness.state_mut().state.loaded = Some(loaded);
+        perform(&mut harness, Action::LookFrom(AxisView::Top));
+        harness.run_steps(60);
+        let at = harness.get_by_label("Scene").rect().center();
+        harness.hover_at(at);
+        harness.step();
+        harness.drag_at(at);
+        harness.drop_at(at);
+        wait_for(&mut harness, |app| {
+            app.state
+                .selection
+                .as_ref()
+                .is_some_and(|selection| selection.probe.is_some())
+        });
+        let irradiance = harness
+            .state()
+            .state
+            .selection
+            .as_ref()
+            .and_then(|s| s.probe);
+        let [red, green, blue] = irradiance
+            .expect("waited for")
+            .irradiance
+            .to_array()
+            .map(|x| figure(f64::from(x)));
+        harness
+            .query_all_by_label(&format!("{red}  {green}  {blue}"))
+            .count()
+    };
+    assert!(figures(false) > 0);
+    assert_eq!(figures(true), 0);
 }
 
 #[test]

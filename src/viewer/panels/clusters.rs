@@ -92,7 +92,7 @@ fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
     ));
     if shown > MAX_BOXES {
         ui.weak(format!(
-            "Only {} of them are drawn, evenly spread.",
+            "Only {} of them are drawn, the largest first.",
             count(MAX_BOXES as u64)
         ));
     }

@@ -62,6 +62,9 @@ pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
         (_, Some(loaded)) if state.run.snapshot.is_none() && state.run.status.is_busy() => {
             format!("Building the clusters of {}…", loaded.source.label())
         }
+        (_, Some(loaded)) if state.staged.is_none() && state.run.snapshot.is_some() => {
+            format!("Handing {} to the graphics adapter…", loaded.source.label())
+        }
         (_, Some(_)) if lacks_errors(state) => "Tracing the reference at the vertices…".to_owned(),
         _ => return,
     };
