@@ -17,7 +17,7 @@ use vecrad::{
         cluster_lines,
         render::{
             Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
-            headless::{self, HeadlessError, HeadlessPicture},
+            headless::{self, HeadlessError, HeadlessPicture, Subject},
         },
         view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
     },
@@ -94,7 +94,12 @@ fn plain(mode: ViewMode) -> ViewSettings {
 
 /// A picture, or `None` on a machine that cannot draw; CI must be able to.
 fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<HeadlessPicture> {
-    match headless::picture(scene, snapshot, None, &camera(), view, SIZE) {
+    let subject = Subject {
+        scene,
+        snapshot,
+        errors: None,
+    };
+    match headless::picture(subject, &camera(), view, SIZE) {
         Ok(picture) => Some(picture),
         Err(HeadlessError::NoAdapter(reason)) => {
             assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
@@ -448,7 +453,12 @@ fn a_picture_that_is_too_large_is_one_sentence() {
     let scene = scene();
     let snapshot = snapshot(&scene, Vec3::ONE);
     let view = plain(ViewMode::Radiance);
-    match headless::picture(&scene, &snapshot, None, &camera(), &view, [1_000_000, 2]) {
+    let subject = Subject {
+        scene: &scene,
+        snapshot: &snapshot,
+        errors: None,
+    };
+    match headless::picture(subject, &camera(), &view, [1_000_000, 2]) {
         Err(HeadlessError::NoAdapter(_)) => {}
         Err(error) => assert!(error.to_string().contains("too large"), "{error}"),
         Ok(_) => panic!("no adapter takes a million pixels on a side"),

@@ -2,11 +2,12 @@
 
 #![cfg(feature = "viewer")]
 
+mod windows;
+
 use std::{
     fs,
     path::{Path, PathBuf},
     sync::Arc,
-    time::{Duration, Instant},
 };
 
 use eframe::egui;
@@ -18,36 +19,12 @@ use vecrad::{
         action::Action,
         app::App,
         loader::SceneSource,
-        start::Faults,
         state::{RunStatus, Severity},
         view::{ClusterCut, ClusterRequest, LinkEnd, ViewMode, ViewRequest},
     },
     worker::{Effect, StopReason},
 };
-
-/// Longest wait for a small scene on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
-
-fn window(options: Options) -> Harness<'static, App> {
-    Harness::builder()
-        .with_size([1280.0, 900.0])
-        .build_eframe(move |cc| {
-            App::new(cc, options, Arc::new(Faults::default())).expect("threads can be had")
-        })
-}
-
-/// A window that lights the two plates: a moment's work.
-fn plates() -> Harness<'static, App> {
-    let mut harness = window(Options {
-        source: Some(SceneSource::Builtin("plates".to_owned())),
-        settings: SolveSettings::draft(),
-        ..Options::default()
-    });
-    wait_for(&mut harness, |app| {
-        matches!(app.state.run.status, RunStatus::Finished(_))
-    });
-    harness
-}
+use windows::{perform, plates, wait_for, window};
 
 /// A window that has lit the box, with the middle of its back wall picked.
 fn picked_in_the_box() -> Harness<'static, App> {
@@ -70,21 +47,6 @@ fn picked_in_the_box() -> Harness<'static, App> {
     harness
 }
 
-/// Frames until something holds.
-fn wait_for(harness: &mut Harness<'static, App>, holds: impl Fn(&App) -> bool) {
-    let begin = Instant::now();
-    while !holds(harness.state()) {
-        assert!(
-            begin.elapsed() < PATIENCE,
-            "{:?}",
-            harness.state().state.run.status
-        );
-        std::thread::sleep(Duration::from_millis(10));
-        harness.step();
-    }
-    harness.run_steps(3);
-}
-
 /// Whether what is shown is what the state asks for.
 fn is_staged(app: &App) -> bool {
     let (state, staged) = (&app.state, app.state.staged.as_ref());
@@ -97,12 +59,6 @@ fn is_staged(app: &App) -> bool {
                 .as_ref()
                 .is_some_and(|snapshot| Arc::ptr_eq(snapshot, &staged.wanted.snapshot))
     })
-}
-
-fn perform(harness: &mut Harness<'static, App>, action: Action) {
-    let ctx = harness.ctx.clone();
-    harness.state_mut().perform(&ctx, action);
-    harness.run_steps(2);
 }
 
 #[test]

@@ -19,7 +19,7 @@ use crate::{
         CameraRequest,
         camera::UpAxis,
         loader, opening,
-        render::headless,
+        render::headless::{self, Subject},
         view::{ClusterOverlay, ClusterRequest, ToneMap, ViewMode, ViewRequest, ViewSettings},
     },
 };
@@ -128,6 +128,9 @@ pub struct PictureFlags {
         help_heading = "Picture"
     )]
     pub size: Size,
+    /// Leave the background out: straight alpha in a PNG, colours multiplied by alpha in an EXR
+    #[arg(long, requires = "screenshot", help_heading = "Picture")]
+    pub transparent: bool,
     /// What it shows
     #[command(flatten)]
     pub view: ViewFlags,
@@ -185,10 +188,17 @@ impl PictureFlags {
                     .to_owned()
             ));
         }
-        let picture = headless::picture(scene, snapshot, errors, &camera, &view, size)?;
-        let bytes = picture
-            .encode(path)
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        let subject = Subject {
+            scene,
+            snapshot,
+            errors,
+        };
+        let encoded = if self.transparent {
+            headless::cutout(subject, &camera, &view, size)?.encode(path)
+        } else {
+            headless::picture(subject, &camera, &view, size)?.encode(path)
+        };
+        let bytes = encoded.with_context(|| format!("cannot write {}", path.display()))?;
         output::write_whole(path, |out| out.write_all(&bytes))
     }
 }

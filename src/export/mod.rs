@@ -5,7 +5,9 @@ mod glb;
 mod mesh;
 mod plot;
 mod ply;
+mod table;
 
 pub use color::{ColorOptions, ToneMap, linear_from_srgb, neutral, srgb_from_linear};
 pub use mesh::{MeshFormat, MeshOptions, UnknownMeshFormat, UpAxis};
 pub use plot::{Curve, CurvePlot};
+pub use table::write_csv;

@@ -6,7 +6,7 @@ mod rays;
 mod sampling;
 
 pub use polygon::{irradiance_vector, point_irradiance};
-pub use rays::{Hit, RayTree};
+pub use rays::{Hit, RAY_OFFSET, RayTree};
 pub use sampling::{Random, cosine_direction, low_discrepancy_2d, triangle_point};
 
 use glam::Vec3;

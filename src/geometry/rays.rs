@@ -16,10 +16,10 @@ use obvhs::{
 
 use crate::scene::{Scene, TriangleId};
 
-/// Rays start and end this far from their ends, in frame units.
+/// Rays start and end this far from their ends, in frame units: a millionth of the scene's extent.
 /// Much smaller, and a ray meets the surface that it leaves; much larger, and thin gaps leak or close.
 /// At the rim of the frame (50 units) single precision resolves 4e-6.
-const RAY_OFFSET: f32 = 1e-4;
+pub const RAY_OFFSET: f32 = 1e-4;
 
 /// What a ray meets first.
 #[derive(Clone, Copy, Debug, PartialEq)]

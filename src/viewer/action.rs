@@ -26,6 +26,10 @@ pub enum Action {
     TraceReference,
     /// Forget the errors of earlier runs.
     ForgetRuns,
+    /// Ask where the table of errors is to go.
+    TableDialog,
+    /// Write the table of errors as CSV.
+    SaveTable(PathBuf),
     /// Light the scene from the beginning.
     Reset,
     /// Put settings in force.
@@ -36,6 +40,8 @@ pub enum Action {
     Sides(Sides),
     /// Show something else.
     Mode(ViewMode),
+    /// Show normals, or again what was shown before.
+    ToggleNormals,
     /// Brighter or darker, in EV.
     ExposureBy(f32),
     /// Multiply all emission by this.
@@ -80,6 +86,8 @@ pub enum Action {
         path: PathBuf,
         /// Width and height.
         size: [u32; 2],
+        /// Whether the background is left out.
+        is_transparent: bool,
     },
     /// Ask where the lit mesh is to go.
     MeshDialog,

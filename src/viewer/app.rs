@@ -21,13 +21,13 @@ use super::{
     action::Action,
     bindings::{self, Binding},
     panels,
+    preferences::Preferences,
     saver::{Notice, Unfinished},
     session::Recent,
     stage::Stage,
     start::{Faults, Options},
     state::State,
     theme,
-    view::ViewSettings,
     viewport::{Viewport, viewport_ui},
 };
 use crate::worker::{RunOptions, Wake, WorkerHandle};
@@ -86,6 +86,7 @@ impl App {
             .and_then(|storage| storage.get_string(RECENT_KEY))
             .and_then(|text| toml::from_str::<Recent>(&text).ok())
             .unwrap_or_default();
+        let preferences = Preferences::load(cc.storage);
         let state = State {
             settings: options.settings.clone(),
             options: RunOptions {
@@ -93,7 +94,8 @@ impl App {
                 ..options.run.clone()
             },
             scene_options: options.scene_options,
-            view: options.view.apply(&ViewSettings::default()),
+            view: options.view.apply(&preferences.view()),
+            panels: preferences.panels(),
             recent,
             adapter_name: viewport
                 .as_ref()
@@ -151,12 +153,9 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        // What keys ask for shows in this frame already.
-        if !ctx.egui_wants_keyboard_input() {
-            for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
-                self.perform(&ctx, action);
-            }
-            self.want();
+        // What keys ask for shows in this frame already. Keys belong to fields and open menus first.
+        if !ctx.egui_wants_keyboard_input() && !egui::Popup::is_any_open(&ctx) {
+            self.obey_keys(&ctx);
         }
         let mut actions: Vec<Action> = self.take_dropped(&ctx).into_iter().collect();
         let before = self.state.view.clone();
@@ -189,6 +188,7 @@ impl eframe::App for App {
         panels::scene::path_window(&ctx, &mut self.state, &mut actions);
         panels::picture::picture_window(&ctx, &mut self.state, &mut actions);
         panels::mesh::mesh_window(&ctx, &mut self.state, &mut actions);
+        panels::table::table_window(&ctx, &mut self.state.panels, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
         dropping::hover_ui(&ctx);
         if self.state.view != before {
@@ -210,5 +210,6 @@ impl eframe::App for App {
         if let Ok(text) = toml::to_string(&self.state.recent) {
             storage.set_string(RECENT_KEY, text);
         }
+        Preferences::of(&self.state).store(storage);
     }
 }

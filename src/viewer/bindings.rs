@@ -169,6 +169,12 @@ pub fn bindings() -> Vec<Binding> {
             Action::ClusterLevelBy(1),
         ),
         plain(Key::L, View, "Links of what is picked", Action::ToggleLinks),
+        plain(
+            Key::N,
+            View,
+            "Normals, or what was shown before",
+            Action::ToggleNormals,
+        ),
         plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
         plain(Key::Minus, View, "Darker by ½ EV", Action::ExposureBy(-0.5)),
         plain(
@@ -188,7 +194,7 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Escape,
             Solve,
-            "Stop reading or computing; else select nothing",
+            "Close a dialog, else stop, else select nothing",
             Action::Stop,
         ),
         command(Key::R, Solve, "Begin again", Action::Reset),

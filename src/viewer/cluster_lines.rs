@@ -17,10 +17,9 @@ pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> V
     if !overlay.shown {
         return Vec::new();
     }
-    let shown: Vec<&ClusterBox> = shown
-        .iter()
-        .take(MAX_BOXES)
-        .map(|&index| &all[index])
+    let shown: Vec<&ClusterBox> = chosen(all, shown, MAX_BOXES)
+        .into_iter()
+        .map(|index| &all[index])
         .collect();
     let [low, high] = color_range(&shown, overlay.color);
     shown
@@ -30,6 +29,27 @@ pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> V
             instance(cluster, theme::ramp(0.15 + 0.85 * t.clamp(0.0, 1.0)))
         })
         .collect()
+}
+
+/// At most so many boxes: the largest, and with half of them or more the others, evenly spread.
+fn chosen(all: &[ClusterBox], shown: &[usize], most: usize) -> Vec<usize> {
+    if shown.len() <= most {
+        return shown.to_vec();
+    }
+    let extent = |index: usize| (all[index].max - all[index].min).max_element();
+    let mut extents: Vec<f32> = shown.iter().map(|&index| extent(index)).collect();
+    let (_, limit, _) = extents.select_nth_unstable_by(most / 2, |a, b| b.total_cmp(a));
+    let (large, small): (Vec<usize>, Vec<usize>) =
+        shown.iter().partition(|&&index| extent(index) > *limit);
+    let rest = spread(&small, most - large.len());
+    large.iter().copied().chain(rest).collect()
+}
+
+/// At most so many of a list, evenly spread over it: neighbours in the tree's order are neighbours in the scene, so that
+/// no part of the scene is left bare.
+fn spread(list: &[usize], most: usize) -> impl Iterator<Item = usize> {
+    let count = list.len().min(most);
+    (0..count).map(move |place| list[place * list.len() / count])
 }
 
 /// One box in a colour.
@@ -144,6 +164,34 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn too_many_are_thinned_out_evenly() {
+        let list: Vec<usize> = (100..110).collect();
+        assert_eq!(spread(&list, 20).collect::<Vec<_>>(), list);
+        assert_eq!(
+            spread(&list, 5).collect::<Vec<_>>(),
+            [100, 102, 104, 106, 108]
+        );
+        assert_eq!(spread(&list, 3).collect::<Vec<_>>(), [100, 103, 106]);
+        assert_eq!(spread(&[], 5).count(), 0);
+    }
+
+    #[test]
+    fn of_too_many_the_largest_are_kept() {
+        let sized = |size: f32| ClusterBox {
+            max: tree()[0].min + Vec3::splat(size),
+            ..tree()[0]
+        };
+        // One large box among many small ones of one size.
+        let all: Vec<ClusterBox> = (0..100)
+            .map(|index| sized(if index == 37 { 5.0 } else { 1.0 }))
+            .collect();
+        let shown: Vec<usize> = (0..100).collect();
+        let kept = chosen(&all, &shown, 10);
+        assert_eq!(kept, [37, 0, 11, 22, 33, 45, 56, 67, 78, 89]);
+        assert_eq!(chosen(&all, &shown, 100), shown);
     }
 
     #[test]

@@ -65,6 +65,10 @@ pub struct LoadedScene {
     pub max: Vec3,
     /// Triangles that emit.
     pub emitter_count: usize,
+    /// Whether there are one-sided faces, whose backs can be shown or looked through.
+    pub has_backs: bool,
+    /// Whether all surfaces are grey and all light white, so that one channel tells all.
+    pub is_grey: bool,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
 }
@@ -135,6 +139,8 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
         emitter_count: scene.surfaces.iter().filter(emits).count(),
+        has_backs: scene.triangles.iter().any(|triangle| !triangle.two_sided),
+        is_grey: is_grey(&scene),
         rays: Arc::new(rays),
         scene: Arc::new(scene),
         source,
@@ -142,6 +148,14 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
         max,
         viewpoint,
     })
+}
+
+/// Whether nothing in a scene has a colour.
+fn is_grey(scene: &Scene) -> bool {
+    let is_grey = |color: Vec3| color.min_element() == color.max_element();
+    let mut surfaces = scene.surfaces.iter();
+    scene.textures.is_empty()
+        && surfaces.all(|surface| is_grey(surface.reflectance) && is_grey(surface.emission))
 }
 
 /// The view that a built-in scene brings along.

@@ -4,6 +4,7 @@ use eframe::egui::{self, Key, PointerButton};
 use glam::{Vec2, Vec3};
 
 use super::{
+    panel_state::PanelState,
     pick::{self, Pick},
     state::State,
 };
@@ -92,7 +93,8 @@ fn zoom(ui: &egui::Ui, rect: egui::Rect, state: &mut State, flies: bool) {
     });
     if flies {
         let speed = state.panels.fly_speed * (scroll * 0.004).exp();
-        state.panels.fly_speed = speed.clamp(0.05, 1000.0);
+        let (slowest, fastest) = PanelState::FLY_SPEED_RANGE.into_inner();
+        state.panels.fly_speed = speed.clamp(slowest, fastest);
         return;
     }
     let factor = (-scroll * 0.004).exp() / pinch.max(1e-3);

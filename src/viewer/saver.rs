@@ -1,4 +1,4 @@
-//! Pictures and lit meshes to files, on threads of their own.
+//! Pictures, lit meshes and tables to files, on threads of their own.
 
 use std::{
     io::Cursor,
@@ -7,15 +7,17 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbaImage};
+use image::{DynamicImage, ImageFormat, RgbaImage};
 
 use super::{
     loader::SceneSource,
-    render::{Gpu, ReadError, Target},
+    render::{CutoutTarget, Gpu, ReadError, Target},
     state::Severity,
+    view::ToneMap,
 };
 use crate::{
-    export::{MeshFormat, MeshOptions, UnknownMeshFormat},
+    export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    metrics::SceneComparison,
     scene::{Frame, folder_of, write_whole},
     solver::Snapshot,
     worker::Wake,
@@ -48,11 +50,21 @@ impl Unfinished {
 /// A picture that the adapter is drawing.
 pub struct Drawn {
     /// Where it is drawn.
-    pub target: Target,
+    pub canvas: Canvas,
     /// By what.
     pub gpu: Gpu,
     /// What its radiance was multiplied by.
     pub exposure_factor: f32,
+    /// How it becomes display colours.
+    pub tone_map: ToneMap,
+}
+
+/// Where a picture is drawn.
+pub enum Canvas {
+    /// Over a background.
+    Opaque(Box<Target>),
+    /// Without one.
+    Cutout(Box<CutoutTarget>),
 }
 
 /// Where a picture comes from.
@@ -65,13 +77,23 @@ pub enum Shot {
 
 impl Shot {
     /// Wait for the picture: display colours, and linear radiance where there is any.
-    fn read(self) -> Result<(RgbaImage, Option<Rgb32FImage>), EncodeError> {
-        match self {
-            Self::Seen(display) => Ok((display, None)),
-            Self::Drawn(drawn) => {
-                let display = drawn.target.read_display(&drawn.gpu)?;
-                let radiance = drawn.target.read_linear(&drawn.gpu, drawn.exposure_factor);
-                Ok((display, radiance.ok()))
+    fn read(self) -> Result<(DynamicImage, Option<DynamicImage>), EncodeError> {
+        let opaque = |display: RgbaImage| DynamicImage::from(display).into_rgb8().into();
+        let drawn = match self {
+            Self::Seen(display) => return Ok((opaque(display), None)),
+            Self::Drawn(drawn) => drawn,
+        };
+        let (gpu, exposure_factor) = (&drawn.gpu, drawn.exposure_factor);
+        match &drawn.canvas {
+            Canvas::Opaque(target) => {
+                let display = target.read_display(gpu)?;
+                let radiance = target.read_linear(gpu, exposure_factor).ok();
+                Ok((opaque(display), radiance.map(DynamicImage::from)))
+            }
+            Canvas::Cutout(target) => {
+                let cutout = target.read(gpu, drawn.tone_map, exposure_factor)?;
+                let (display, radiance) = cutout.into_images();
+                Ok((display, Some(radiance)))
             }
         }
     }
@@ -83,6 +105,8 @@ pub enum Content {
     Picture(Shot),
     /// The mesh with light at its vertices.
     Mesh(LitMesh),
+    /// Error against run time, as a table with a line for each step.
+    Table(SceneComparison),
 }
 
 /// A mesh to be exported.
@@ -137,6 +161,8 @@ impl Saving {
         let written = match self.content {
             Content::Picture(shot) => shot.read().and_then(|shot| save(shot, &self.path)),
             Content::Mesh(mesh) => mesh.save(&self.path),
+            Content::Table(table) => write_whole(&self.path, |out| write_csv(table.rows(), out))
+                .map_err(EncodeError::Write),
         };
         match written {
             Ok(()) => {
@@ -152,7 +178,7 @@ impl Saving {
 }
 
 fn save(
-    (display, radiance): (RgbaImage, Option<Rgb32FImage>),
+    (display, radiance): (DynamicImage, Option<DynamicImage>),
     path: &Path,
 ) -> Result<(), EncodeError> {
     let bytes = encode(display, radiance, path)?;
@@ -184,15 +210,15 @@ pub enum EncodeError {
 /// # Errors
 /// See [`EncodeError`].
 pub fn encode(
-    display: RgbaImage,
-    radiance: Option<Rgb32FImage>,
+    display: DynamicImage,
+    radiance: Option<DynamicImage>,
     path: &Path,
 ) -> Result<Vec<u8>, EncodeError> {
     let format = ImageFormat::from_path(path)?;
     let picture = match (format, radiance) {
-        (ImageFormat::OpenExr, Some(radiance)) => DynamicImage::from(radiance),
+        (ImageFormat::OpenExr, Some(radiance)) => radiance,
         (ImageFormat::OpenExr, None) => return Err(EncodeError::NoRadiance),
-        _ => DynamicImage::from(DynamicImage::from(display).into_rgb8()),
+        _ => display,
     };
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, format)?;
@@ -208,14 +234,23 @@ pub fn free_path(scene: &str) -> PathBuf {
     free_name(&folder, &plain_stem(scene), "png")
 }
 
+/// A name for a table of errors that is free, beside the scene where that is a file: `scene_errors_1.csv` and on.
+pub fn free_table_path(source: &SceneSource) -> PathBuf {
+    free_path_beside(source, "errors", "csv")
+}
+
 /// A name for the lit mesh that is free, beside the scene where that is a file: `scene_lit_1.glb` and on.
 pub fn free_mesh_path(source: &SceneSource) -> PathBuf {
+    free_path_beside(source, "lit", MeshFormat::Glb.extension())
+}
+
+fn free_path_beside(source: &SceneSource, what: &str, extension: &str) -> PathBuf {
     let folder = source
         .path()
         .map(|path| folder_of(path).to_owned())
         .unwrap_or_default();
-    let stem = format!("{}_lit", plain_stem(&source.label()));
-    free_name(&folder, &stem, MeshFormat::Glb.extension())
+    let stem = format!("{}_{what}", plain_stem(&source.label()));
+    free_name(&folder, &stem, extension)
 }
 
 /// The name of a scene as files may have it.

@@ -8,11 +8,12 @@ use super::{
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
+    panel_state::PanelState,
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
     stage::Staged,
     truth::Truth,
-    view::ViewSettings,
+    view::{ViewMode, ViewSettings},
 };
 use crate::{
     scene::SceneOptions,
@@ -196,57 +197,6 @@ pub struct Selection {
     pub object: Option<usize>,
 }
 
-/// What the panels hold open and half typed.
-#[derive(Clone, Debug)]
-pub struct PanelState {
-    /// Whether anything but the scene is shown.
-    pub shown: bool,
-    /// Whether the panel of the run and its settings is shown beside the scene.
-    pub light: bool,
-    /// Whether the panel of what is looked into is shown beside the scene.
-    pub look: bool,
-    /// Whether the key sheet is open.
-    pub help: bool,
-    /// Whether the dialog for pictures is open.
-    pub picture: bool,
-    /// Whether the dialog for the lit mesh is open.
-    pub mesh: bool,
-    /// Whether the field for a path is open.
-    pub path: bool,
-    /// The typed path.
-    pub path_text: String,
-    /// The typed path of a picture.
-    pub picture_text: String,
-    /// The typed path of the lit mesh.
-    pub mesh_text: String,
-    /// Size of a picture in pixels.
-    pub picture_size: [u32; 2],
-    /// Whether the messages are to be opened.
-    pub show_messages: bool,
-    /// Units a second when flying, in frame units.
-    pub fly_speed: f32,
-}
-
-impl Default for PanelState {
-    fn default() -> Self {
-        Self {
-            shown: true,
-            light: true,
-            look: true,
-            help: false,
-            picture: false,
-            mesh: false,
-            path: false,
-            path_text: String::new(),
-            picture_text: String::new(),
-            mesh_text: String::new(),
-            picture_size: [1920, 1080],
-            show_messages: false,
-            fly_speed: 30.0,
-        }
-    }
-}
-
 /// All of it.
 #[derive(Default)]
 pub struct State {
@@ -266,6 +216,8 @@ pub struct State {
     pub scene_options: SceneOptions,
     /// How the light is shown.
     pub view: ViewSettings,
+    /// What the surfaces showed before the key for normals was pressed.
+    pub mode_before_normals: ViewMode,
     /// From where.
     pub rig: CameraRig,
     /// The picked point.
@@ -323,6 +275,12 @@ impl State {
             let mut shown = self.shown_clusters.shown.iter().copied();
             self.cluster = shown.rfind(over).or(self.cluster);
         }
+    }
+
+    /// Whether there are emitters; of no scene nobody knows.
+    pub fn has_emitters(&self) -> bool {
+        let loaded = self.loaded.as_ref();
+        loaded.is_none_or(|loaded| loaded.emitter_count > 0)
     }
 
     /// The last report.

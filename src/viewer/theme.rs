@@ -10,13 +10,7 @@ pub const PICTURE_BACKGROUND: f32 = 0.018;
 /// Display-linear lightness of the backs of one-sided faces.
 pub(super) const BACK_LIGHTNESS: f32 = 0.035;
 
-/// Colour of good news.
-pub const GOOD: Color32 = Color32::from_rgb(0x5b, 0xb9, 0x74);
-/// Colour of warnings.
-pub const WARNING: Color32 = Color32::from_rgb(0xe0, 0xa0, 0x30);
-/// Colour of errors.
-pub const BAD: Color32 = Color32::from_rgb(0xe5, 0x5b, 0x55);
-/// Colour of what is selected, in the window.
+/// Colour of what is selected, over the scene.
 pub const SELECTED: Color32 = Color32::from_rgb(0xff, 0xb4, 0x3a);
 
 /// Colour of lines that mark the selection, display-linear.
@@ -80,6 +74,31 @@ fn encoded(linear: f32) -> f32 {
     }
 }
 
+/// Colour of good news.
+pub fn good(visuals: &egui::Visuals) -> Color32 {
+    by_theme(visuals, [0x5b, 0xb9, 0x74], [0x1b, 0x74, 0x38])
+}
+
+/// Colour of warnings.
+pub fn warning(visuals: &egui::Visuals) -> Color32 {
+    by_theme(visuals, [0xe0, 0xa0, 0x30], [0x85, 0x58, 0x00])
+}
+
+/// Colour of errors.
+pub fn bad(visuals: &egui::Visuals) -> Color32 {
+    by_theme(visuals, [0xee, 0x6f, 0x69], [0xb3, 0x26, 0x1e])
+}
+
+/// Colour of what is selected, as text.
+pub fn selected_text(visuals: &egui::Visuals) -> Color32 {
+    by_theme(visuals, [0xff, 0xb4, 0x3a], [0x90, 0x55, 0x00])
+}
+
+fn by_theme(visuals: &egui::Visuals, dark: [u8; 3], light: [u8; 3]) -> Color32 {
+    let [r, g, b] = if visuals.dark_mode { dark } else { light };
+    Color32::from_rgb(r, g, b)
+}
+
 /// Colour of names beside figures: quieter than the figures, but easy to read.
 pub fn secondary_text(visuals: &egui::Visuals) -> Color32 {
     if visuals.dark_mode {
@@ -114,4 +133,31 @@ pub fn axis_color(axis: usize) -> Color32 {
         Color32::from_rgb(0x6c, 0xbf, 0x4c),
         Color32::from_rgb(0x5b, 0x8f, 0xf5),
     ][axis.min(2)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How much brighter one colour is than the other, 1…21 (WCAG 2).
+    fn contrast(a: Color32, b: Color32) -> f32 {
+        let luminance = |color: Color32| {
+            let [r, g, b, _] = color.to_array().map(|byte| linear(f32::from(byte) / 255.0));
+            0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05
+        };
+        let (a, b) = (luminance(a), luminance(b));
+        a.max(b) / a.min(b)
+    }
+
+    #[test]
+    fn coloured_text_can_be_read_in_both_themes() {
+        for visuals in [egui::Visuals::dark(), egui::Visuals::light()] {
+            for color in [good, warning, bad, selected_text, secondary_text] {
+                let color = color(&visuals);
+                let seen = contrast(color, visuals.panel_fill);
+                // What WCAG 2 asks of text of this size.
+                assert!(seen >= 4.5, "{color:?} {seen}");
+            }
+        }
+    }
 }

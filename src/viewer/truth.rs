@@ -7,22 +7,14 @@ use std::{collections::BTreeMap, io, sync::Arc};
 
 use super::{loader::LoadedScene, state::Run, view::ViewMode};
 use crate::{
-    metrics::ErrorMeasures,
-    solver::{Method, Oracle, Snapshot, SolveSettings},
-    worker::{Event, TruthHandle, TruthProgress, VertexErrors, Wake, Watch},
+    metrics::{ErrorMeasures, ReferenceFacts, SceneComparison, Trajectory},
+    scene::Scene,
+    solver::{Method, Oracle, Snapshot, SolveSettings, StepReport},
+    worker::{self, Event, TruthHandle, TruthProgress, VertexErrors, Wake, Watch},
 };
 
 /// Runs kept for comparison, the present one included. More lines than colours are a tangle.
 const MOST_RUNS: usize = 8;
-
-/// What is known of a step beside its error.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StepFacts {
-    /// Seconds since the run began.
-    pub elapsed_s: f64,
-    /// The bound that the solver gives, relative to the mean irradiance.
-    pub bound: f32,
-}
 
 /// One run under the reference.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,12 +25,14 @@ pub struct RunRecord {
     pub ordinal: u32,
     /// Ordinal and settings, for people.
     pub name: String,
+    /// Its settings, those of its last step where they were changed on the way.
+    pub settings: SolveSettings,
     /// Its steps.
-    pub steps: BTreeMap<u32, StepFacts>,
+    pub steps: BTreeMap<u32, StepReport>,
 }
 
 /// One row of the table: a step, what the solver says of it, and what was measured.
-pub type MeasuredRow<'a> = (u32, StepFacts, &'a ErrorMeasures);
+pub type MeasuredRow<'a> = (u32, &'a StepReport, &'a ErrorMeasures);
 
 /// The reference of the present scene, where there is one.
 #[derive(Default)]
@@ -111,14 +105,11 @@ impl Truth {
         match event {
             Event::Started => self.begin_run(run, settings),
             Event::Stepped(report) => {
-                let facts = StepFacts {
-                    elapsed_s: report.elapsed_s,
-                    bound: report.estimated_error,
-                };
                 if let Some(run) = self.runs.last_mut() {
-                    run.steps.insert(report.step, facts);
+                    run.steps.insert(report.step, report.clone());
                     // A run may go on under finer settings.
                     run.name = name(run.ordinal, settings);
+                    run.settings = settings.clone();
                 }
             }
             _ => {}
@@ -139,6 +130,7 @@ impl Truth {
             number,
             ordinal: self.run_count,
             name: name(self.run_count, settings),
+            settings: settings.clone(),
             steps: BTreeMap::new(),
         });
     }
@@ -176,12 +168,40 @@ impl Truth {
         self.progress
             .errors
             .range((run.number, 0)..=(run.number, u32::MAX))
-            .filter_map(|((_, step), error)| Some((*step, *run.steps.get(step)?, error)))
+            .filter_map(|((_, step), error)| Some((*step, run.steps.get(step)?, error)))
     }
 
     /// The newest measured step of the present run.
     pub fn newest_error(&self) -> Option<MeasuredRow<'_>> {
         self.steps_of(self.runs.last()?).last()
+    }
+
+    /// Error against run time of all runs, as tables of them are made.
+    pub fn comparison(&self, scene: &Scene) -> SceneComparison {
+        let newest = self.progress.errors.values().next_back();
+        SceneComparison {
+            scene: scene.name.clone(),
+            triangles: scene.triangles.len(),
+            reference: ReferenceFacts {
+                points: self.progress.points,
+                samples: self.progress.samples,
+                noise_floor: newest.map_or(0.0, |error| error.noise_floor),
+                // Traced beside the runs, it has no time of its own; tables do not ask for it.
+                seconds: 0.0,
+            },
+            runs: self.runs.iter().map(|run| self.trajectory(run)).collect(),
+        }
+    }
+
+    /// A run with its measured steps, as far as it has come.
+    fn trajectory(&self, run: &RunRecord) -> Trajectory {
+        let last = run.steps.values().next_back();
+        worker::trajectory(
+            run.name.clone(),
+            run.settings.clone(),
+            last.is_none_or(|last| !last.is_final),
+            self.steps_of(run).map(|(_, report, error)| (report, error)),
+        )
     }
 
     /// Errors at the vertices of a snapshot's mesh, where they are known.
@@ -212,7 +232,6 @@ fn name(ordinal: u32, settings: &SolveSettings) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::StepReport;
 
     fn stepped(step: u32) -> Event {
         Event::Stepped(StepReport {

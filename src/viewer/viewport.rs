@@ -13,8 +13,11 @@ use super::{
     line_cache::LineCache,
     navigation,
     pick::Pick,
-    render::{Gpu, Overlay, Picture, RenderError, Renderer, SegmentInstance, Target, Uploads},
-    saver::Drawn,
+    render::{
+        CutoutTarget, Gpu, Overlay, Picture, RenderError, Renderer, SegmentInstance, Target,
+        Uploads,
+    },
+    saver::{Canvas, Drawn},
     stage::Staged,
     state::{Severity, State},
     theme,
@@ -99,7 +102,9 @@ impl Viewport {
         if self.drawn.as_ref() != Some(&key)
             && let Some((target, id)) = self.target.take()
         {
-            self.draw(&key, &target, pixels_per_point);
+            self.draw(&key, pixels_per_point, |renderer, picture, uploads| {
+                renderer.draw(&target, picture, uploads);
+            });
             self.target = Some((target, id));
             self.drawn = Some(key);
         }
@@ -107,24 +112,42 @@ impl Viewport {
         ui.painter().image(texture, rect, whole, Color32::WHITE);
     }
 
-    /// Begin a picture of what is shown, at another size.
+    /// Begin a picture of what is shown, at another size, with or without the background.
     ///
     /// # Errors
     /// One sentence for people.
-    pub fn picture(&mut self, state: &State, size: [u32; 2]) -> Result<Drawn, String> {
+    pub fn picture(
+        &mut self,
+        state: &State,
+        size: [u32; 2],
+        is_transparent: bool,
+    ) -> Result<Drawn, String> {
         let background = Vec3::splat(theme::PICTURE_BACKGROUND);
         let key = self
             .key(state, size, background)
             .ok_or("there is nothing to take a picture of; open a scene first")?;
         let gpu = self.renderer.gpu().clone();
-        let target = Target::new(&gpu, size).map_err(|error| error.to_string())?;
+        let canvas = if is_transparent {
+            CutoutTarget::new(&gpu, size).map(|target| Canvas::Cutout(Box::new(target)))
+        } else {
+            Target::new(&gpu, size).map(|target| Canvas::Opaque(Box::new(target)))
+        };
+        let canvas = canvas.map_err(|error| error.to_string())?;
         // Lines as wide, in the picture, as they are in the window.
         let pixels_per_point = size[1] as f32 / 800.0;
-        self.draw(&key, &target, pixels_per_point);
+        self.draw(
+            &key,
+            pixels_per_point,
+            |renderer, picture, uploads| match &canvas {
+                Canvas::Opaque(target) => renderer.draw(target, picture, uploads),
+                Canvas::Cutout(target) => renderer.draw_cutout(target, picture, uploads),
+            },
+        );
         Ok(Drawn {
-            target,
+            canvas,
             gpu,
             exposure_factor: key.view.exposure_factor(),
+            tone_map: key.view.tone_map,
         })
     }
 
@@ -146,8 +169,13 @@ impl Viewport {
         })
     }
 
-    /// Draw a picture into a target.
-    fn draw(&mut self, key: &PictureKey, target: &Target, pixels_per_point: f32) {
+    /// Describe the picture, and draw it.
+    fn draw(
+        &mut self,
+        key: &PictureKey,
+        pixels_per_point: f32,
+        draw: impl FnOnce(&mut Renderer, &Picture<'_>, &Uploads),
+    ) {
         let Some(uploads) = &key.staged.uploads else {
             return;
         };
@@ -169,7 +197,7 @@ impl Viewport {
             background: key.background,
             pixels_per_point,
         };
-        self.renderer.draw(target, &picture, uploads);
+        draw(&mut self.renderer, &picture, uploads);
     }
 
     /// The texture of a target of a size.

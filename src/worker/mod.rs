@@ -15,6 +15,7 @@ mod priority;
 mod run;
 mod slot;
 mod stepper;
+mod trajectory;
 mod truth;
 mod visit;
 
@@ -32,6 +33,7 @@ pub use effect::{Effect, effect_of_change};
 pub use message::{Event, Generation, RunOptions, StopReason};
 pub use slot::Slot;
 pub use stepper::{Job, MakeStepper, Stepper};
+pub use trajectory::trajectory;
 pub use truth::{MeasuredStep, SAMPLE_GOAL, TruthHandle, TruthProgress, VertexErrors};
 
 use crate::{

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     cli::{output::write_whole, report::Machine},
-    export::{Curve, CurvePlot},
+    export::{Curve, CurvePlot, write_csv},
     metrics::{Runner, SceneComparison, Trajectory, grouped},
     scene::{Scene, SceneOptions},
     solver::SolveSettings,
@@ -115,7 +115,9 @@ fn write(session: &Session<'_>, scenes: &[SceneComparison]) -> Result<()> {
             plot.write_png(out)
         })?;
     }
-    write_whole(&folder.join("report.csv"), |out| write_csv(scenes, out))?;
+    write_whole(&folder.join("report.csv"), |out| {
+        write_csv(scenes.iter().flat_map(SceneComparison::rows), out)
+    })?;
     let report = report(session, scenes);
     write_whole(&folder.join("report.json"), |out| {
         serde_json::to_writer_pretty(&mut *out, &report)?;
@@ -145,14 +147,6 @@ fn report<'a>(session: &Session<'_>, scenes: &'a [SceneComparison]) -> Report<'a
         is_interrupted: session.is_interrupted(),
         scenes,
     }
-}
-
-fn write_csv(scenes: &[SceneComparison], out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::Writer::from_writer(out);
-    for row in scenes.iter().flat_map(SceneComparison::rows) {
-        table.serialize(row)?;
-    }
-    table.flush()
 }
 
 fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {

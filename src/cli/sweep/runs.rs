@@ -14,10 +14,10 @@ use super::{
 };
 use crate::{
     cli::observed::observed_solvers,
-    metrics::{ErrorMeasures, Measurement, Runner, Trajectory},
+    metrics::{ErrorMeasures, Trajectory},
     scene::Scene,
     solver::{DisplayMesh, StepReport},
-    worker::{Event, StopReason, WorkerHandle},
+    worker::{self, Event, StopReason, WorkerHandle},
 };
 
 /// How often an interruption is looked for.
@@ -54,20 +54,18 @@ pub(super) fn solve(
         meshes = meshes.or(run.meshes);
         runs.push(run.trajectory);
     }
-    let trajectory = Trajectory::median(runs).unwrap_or_else(|| trajectory(configuration));
+    let trajectory =
+        Trajectory::median(runs).unwrap_or_else(|| trajectory(configuration, true, None));
     Ok(SolverRun { trajectory, meshes })
 }
 
-/// A run without measurements.
-fn trajectory(configuration: &Configuration) -> Trajectory {
-    Trajectory {
-        label: configuration.label.clone(),
-        runner: Runner::Solver,
-        settings: Some(configuration.settings.clone()),
-        repeats: 1,
-        is_cut_short: true,
-        points: Vec::new(),
-    }
+fn trajectory<'a>(
+    configuration: &Configuration,
+    is_cut_short: bool,
+    steps: impl IntoIterator<Item = (&'a StepReport, &'a ErrorMeasures)>,
+) -> Trajectory {
+    let (label, settings) = (configuration.label.clone(), configuration.settings.clone());
+    worker::trajectory(label, settings, is_cut_short, steps)
 }
 
 fn solve_once(
@@ -92,32 +90,14 @@ fn solve_once(
     if is_cut_short {
         session.note_cut();
     }
-    let points = reports.into_iter().filter_map(|report| {
-        let error = record.errors.get(&report.step)?.clone();
-        Some(measurement(&report, error))
-    });
+    let measured = |report: &StepReport| record.errors.get(&report.step);
+    let steps = reports
+        .iter()
+        .filter_map(|report| Some((report, measured(report)?)));
     Ok(SolverRun {
-        trajectory: Trajectory {
-            is_cut_short,
-            points: points.collect(),
-            ..trajectory(configuration)
-        },
+        trajectory: trajectory(configuration, is_cut_short, steps),
         meshes: record.meshes,
     })
-}
-
-fn measurement(report: &StepReport, error: ErrorMeasures) -> Measurement {
-    Measurement {
-        step: report.step,
-        time_s: report.solve_s,
-        epsilon: Some(report.epsilon),
-        samples: None,
-        rays: report.shadow_rays,
-        links: report.links,
-        elements: report.elements,
-        memory_bytes: report.memory_bytes,
-        error,
-    }
 }
 
 /// Follow a run to its end.

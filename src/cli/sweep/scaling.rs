@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     cli::{output::write_whole, report::Machine},
-    export::{Curve, CurvePlot},
+    export::{Curve, CurvePlot, write_csv},
     metrics::{COST_KINDS, ReferenceFacts, SizeCost, Trajectory, exponent_of, scaling_markdown},
     solver::SolveSettings,
 };
@@ -96,14 +96,6 @@ fn write(session: &Session<'_>, settings: &SolveSettings, sizes: &[Size]) -> Res
     write_whole(&folder.join("scaling.md"), |out| {
         write_markdown(&report, &costs, out)
     })
-}
-
-fn write_csv(costs: &[SizeCost], out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::Writer::from_writer(out);
-    for cost in costs {
-        table.serialize(cost)?;
-    }
-    table.flush()
 }
 
 fn write_markdown(report: &Report<'_>, costs: &[SizeCost], out: &mut dyn Write) -> io::Result<()> {

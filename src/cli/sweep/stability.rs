@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::{ReportArguments, session::Session};
 use crate::{
     cli::{UsageError, output::write_whole, report::Machine},
+    export::write_csv,
     metrics::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
     solver::Cancel,
 };
@@ -151,7 +152,7 @@ fn write(session: &Session<'_>, outcomes: &[Outcome]) -> Result<()> {
         cases: outcomes,
     };
     write_whole(&folder.join("stability.csv"), |out| {
-        write_csv(outcomes, out)
+        write_csv(outcomes.iter().flat_map(Row::of), out)
     })?;
     write_whole(&folder.join("stability.json"), |out| {
         serde_json::to_writer_pretty(&mut *out, &report)?;
@@ -160,14 +161,6 @@ fn write(session: &Session<'_>, outcomes: &[Outcome]) -> Result<()> {
     write_whole(&folder.join("stability.md"), |out| {
         write_markdown(&report, out)
     })
-}
-
-fn write_csv(outcomes: &[Outcome], out: &mut dyn Write) -> io::Result<()> {
-    let mut table = csv::Writer::from_writer(out);
-    for row in outcomes.iter().flat_map(Row::of) {
-        table.serialize(row)?;
-    }
-    table.flush()
 }
 
 fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {

@@ -5,11 +5,12 @@ use eframe::egui;
 use super::{
     super::{
         action::Action,
-        clusters,
+        bindings, clusters,
         navigation::Picked,
+        panel_state::PanelState,
         pick, saver,
         session::Recent,
-        state::{PanelState, RunStatus, Selection, Severity},
+        state::{RunStatus, Selection, Severity, State},
         view::ViewMode,
     },
     App,
@@ -55,20 +56,26 @@ impl App {
                 self.change_view(&action);
             }
             Action::ForgetRuns => self.state.truth.forget_earlier(),
+            Action::TableDialog => self.ask_for_table(),
+            Action::SaveTable(path) => self.save_table(path),
             Action::FrameSelected => self.frame_selected(),
             Action::SelectCluster(index) => self.state.cluster = Some(index),
             Action::ClearSelection => self.clear_selection(),
             Action::ScreenshotWithWindow => self.save_window(ctx),
             Action::Screenshot => {
                 let size = self.state.viewport_size;
-                self.save_picture(saver::free_path(&self.scene_name()), size);
+                self.save_picture(saver::free_path(&self.scene_name()), size, false);
             }
             Action::PictureDialog => {
                 let path = saver::free_path(&self.scene_name());
                 self.state.panels.picture_text = path.display().to_string();
                 self.state.panels.picture = true;
             }
-            Action::SavePicture { path, size } => self.save_picture(path, size),
+            Action::SavePicture {
+                path,
+                size,
+                is_transparent,
+            } => self.save_picture(path, size, is_transparent),
             Action::MeshDialog => self.ask_for_mesh(),
             Action::SaveMesh(path) => self.save_mesh(path),
             Action::SaveSidecar => self.save_sidecar(),
@@ -84,11 +91,30 @@ impl App {
         ctx.request_repaint();
     }
 
+    /// Do what keys ask for.
+    pub(super) fn obey_keys(&mut self, ctx: &egui::Context) {
+        if self.state.panels.asks_for_file() {
+            // All other keys are the dialog's.
+            if ctx.input(|input| input.key_pressed(egui::Key::Escape)) {
+                self.state.panels.close_dialogs();
+            }
+            return;
+        }
+        for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
+            // The key that stops closes what lies over the scene first.
+            if action != Action::Stop || !self.state.panels.close_dialogs() {
+                self.perform(ctx, action);
+            }
+        }
+        self.want();
+    }
+
     /// Actions that change only how the scene is shown.
     fn change_view(&mut self, action: &Action) {
         let state = &mut self.state;
         match action {
             Action::Mode(mode) => state.view.mode = *mode,
+            Action::ToggleNormals => toggle_normals(state),
             Action::ExposureBy(step) => {
                 state.view.exposure += *step;
                 state.view.auto_exposure = false;
@@ -244,5 +270,15 @@ impl App {
                 }
             }
         }
+    }
+}
+
+/// Show normals, or again what was shown before.
+fn toggle_normals(state: &mut State) {
+    let mode = &mut state.view.mode;
+    if *mode == ViewMode::Normals {
+        *mode = state.mode_before_normals;
+    } else {
+        state.mode_before_normals = std::mem::replace(mode, ViewMode::Normals);
     }
 }

@@ -46,13 +46,13 @@ impl App {
         });
     }
 
-    pub(super) fn save_picture(&mut self, path: PathBuf, size: [u32; 2]) {
+    pub(super) fn save_picture(&mut self, path: PathBuf, size: [u32; 2], is_transparent: bool) {
         let Some(viewport) = &mut self.viewport else {
             let text = "no picture can be drawn without a graphics adapter";
             self.state.messages.push(Severity::Error, text);
             return;
         };
-        match viewport.picture(&self.state, size) {
+        match viewport.picture(&self.state, size, is_transparent) {
             Ok(drawn) => {
                 let saving = saver::Saving {
                     path,
@@ -88,6 +88,26 @@ impl App {
         let saving = saver::Saving {
             path,
             content: Content::Mesh(mesh),
+        };
+        saving.start(self.notices.0.clone(), &self.unfinished, self.wake.clone());
+    }
+
+    /// Ask where the table of errors is to go.
+    pub(super) fn ask_for_table(&mut self) {
+        if let Some(loaded) = &self.state.loaded {
+            let path = saver::free_table_path(&loaded.source);
+            self.state.panels.table_text = path.display().to_string();
+            self.state.panels.table = true;
+        }
+    }
+
+    pub(super) fn save_table(&mut self, path: PathBuf) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let saving = saver::Saving {
+            path,
+            content: Content::Table(self.state.truth.comparison(&loaded.scene)),
         };
         saving.start(self.notices.0.clone(), &self.unfinished, self.wake.clone());
     }

@@ -19,22 +19,15 @@ use crate::{
 pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let snapshot = state.run.snapshot.clone();
     let clusters: &[ClusterBox] = snapshot.as_ref().map_or(&[], |snapshot| &snapshot.clusters);
-    let overlay = &mut state.view.clusters;
-    ui.checkbox(&mut overlay.shown, "Show boxes")
+    ui.checkbox(&mut state.view.clusters.shown, "Show boxes")
         .on_hover_text("Boxes of the cluster tree over the light (B)");
     if clusters.is_empty() {
         ui.weak("There are no clusters yet.");
         return;
     }
-    cut_ui(
-        ui,
-        overlay,
-        state.shown_clusters.deepest.unwrap_or(overlay.level),
-    );
-    let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
-    let label = ui.label("Colour");
-    row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);
-    counts_ui(ui, state, clusters.len());
+    if state.view.clusters.shown {
+        boxes_ui(ui, state, clusters.len());
+    }
     match state
         .cluster
         .and_then(|index| clusters.get(index).map(|cluster| (index, cluster)))
@@ -46,10 +39,22 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
                 path_ui(ui, clusters, index, actions);
             }
         }
-        None => {
+        None if state.view.clusters.shown => {
             ui.weak("Click a surface to select the cluster around it.");
         }
+        None => {}
     }
+}
+
+/// Which boxes are drawn, and what their colours tell.
+fn boxes_ui(ui: &mut egui::Ui, state: &mut State, cluster_count: usize) {
+    let overlay = &mut state.view.clusters;
+    let deepest = state.shown_clusters.deepest.unwrap_or(overlay.level);
+    cut_ui(ui, overlay, deepest);
+    let options = ClusterColor::ALL.map(|color| (color, color.label(), ""));
+    let label = ui.label("Colour");
+    row::choice(ui, "cluster colour", &mut overlay.color, &options).labelled_by(label.id);
+    counts_ui(ui, state, cluster_count);
 }
 
 /// Which clusters are shown.
@@ -87,7 +92,7 @@ fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
     ));
     if shown > MAX_BOXES {
         ui.weak(format!(
-            "Only {} of them are drawn.",
+            "Only {} of them are drawn, the largest first.",
             count(MAX_BOXES as u64)
         ));
     }
@@ -102,7 +107,7 @@ fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
     let power = |value: f32| figure(f64::from(value) * area_scale);
     ui.add_space(4.0);
     ui.colored_label(
-        theme::SELECTED,
+        theme::selected_text(ui.visuals()),
         format!("Cluster at level {}", cluster.level),
     );
     row::figures(ui, "cluster", |ui| {

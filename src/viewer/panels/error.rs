@@ -4,12 +4,15 @@ use eframe::egui::{self, Color32, RichText};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
 use super::{count, figure, plot::run_time, row, seconds};
-use crate::viewer::{
-    action::Action,
-    state::State,
-    theme,
-    truth::{RunRecord, StepFacts, Truth},
-    view::ViewMode,
+use crate::{
+    solver::StepReport,
+    viewer::{
+        action::Action,
+        state::State,
+        theme,
+        truth::{RunRecord, Truth},
+        view::ViewMode,
+    },
 };
 
 /// Smallest error on the logarithmic axis, in per cent. Noise of the reference hides less.
@@ -20,7 +23,10 @@ pub fn error_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let truth = &state.truth;
     reference_ui(ui, state, actions);
     if let Some(message) = &truth.progress.failed {
-        ui.colored_label(theme::BAD, format!("The reference failed: {message}"));
+        ui.colored_label(
+            theme::bad(ui.visuals()),
+            format!("The reference failed: {message}"),
+        );
     }
     if !truth.exists() {
         ui.weak("Path tracing at random surface points, to measure the light by.");
@@ -70,7 +76,7 @@ fn reference_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
 }
 
 fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
-    let Some((step, facts, error)) = truth.newest_error() else {
+    let Some((step, report, error)) = truth.newest_error() else {
         ui.weak("The first error shows when both the light and the reference are there.");
         return;
     };
@@ -108,7 +114,7 @@ fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
         row::figure(
             ui,
             "Bound",
-            percent(f64::from(facts.bound)),
+            percent(f64::from(report.estimated_error)),
             "What the solver guarantees by itself, of the irradiance",
         );
     });
@@ -132,10 +138,10 @@ fn steps_ui(ui: &mut egui::Ui, truth: &Truth) {
             heading(ui, "RMS", "Measured, relative");
             heading(ui, "Trimmed", "Without the worst 1 % of the points");
             ui.end_row();
-            for (step, facts, error) in truth.steps_of(run) {
+            for (step, report, error) in truth.steps_of(run) {
                 ui.label(step.to_string());
-                ui.label(seconds(facts.elapsed_s));
-                ui.label(percent(f64::from(facts.bound)));
+                ui.label(seconds(report.elapsed_s));
+                ui.label(percent(f64::from(report.estimated_error)));
                 ui.label(percent(error.relative_rms));
                 ui.label(percent(error.relative_rms_trimmed));
                 ui.end_row();
@@ -151,8 +157,16 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
         return;
     }
     ui.add_space(4.0);
+    ui.label("Trimmed RMS against run time");
     ui.horizontal(|ui| {
-        ui.label("Trimmed RMS against run time");
+        let save = egui::Button::new("Save CSV…").small();
+        if ui
+            .add(save)
+            .on_hover_text("All measured steps of all runs as a table")
+            .clicked()
+        {
+            actions.push(Action::TableDialog);
+        }
         let clear = egui::Button::new("Forget earlier runs").small();
         if ui
             .add_enabled(truth.runs.len() > 1, clear)
@@ -180,7 +194,7 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
                 let is_present = Some(run.number) == present;
                 let points: Vec<[f64; 2]> = truth
                     .steps_of(run)
-                    .map(|(_, facts, error)| point(facts, error.relative_rms_trimmed))
+                    .map(|(_, report, error)| point(report, error.relative_rms_trimmed))
                     .collect();
                 let color = run_color(run.ordinal);
                 plot.points(
@@ -197,8 +211,8 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
         });
 }
 
-fn point(facts: StepFacts, error: f64) -> [f64; 2] {
-    [facts.elapsed_s, (100.0 * error).max(FLOOR_PERCENT).log10()]
+fn point(report: &StepReport, error: f64) -> [f64; 2] {
+    [report.elapsed_s, (100.0 * error).max(FLOOR_PERCENT).log10()]
 }
 
 /// A whole power of ten as per cent, and nothing between.

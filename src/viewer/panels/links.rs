@@ -40,6 +40,9 @@ pub fn links_ui(ui: &mut egui::Ui, state: &mut State) {
     let overlay = &mut state.view.links;
     ui.checkbox(&mut overlay.shown, "Show links")
         .on_hover_text("Lines to where the light of what is picked comes from (L)");
+    if !overlay.shown {
+        return;
+    }
     let label = ui.label("Links of");
     row::choice(ui, "links of", &mut overlay.of, &ENDS).labelled_by(label.id);
     let label = ui.label("Link colour");

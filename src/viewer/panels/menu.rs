@@ -104,16 +104,19 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
 }
 
 fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
-    for mode in ViewMode::offered(state.truth.exists()) {
-        let action = Action::Mode(mode);
-        let keys = hint(table, &action);
-        let button =
-            egui::Button::selectable(mode == state.view.mode, mode.label()).shortcut_text(keys);
-        if ui.add(button).on_hover_text(mode.explanation()).clicked() {
-            actions.push(action);
-            ui.close();
+    // A menu of its own: with all modes in it, this one would not fit into a small window.
+    ui.menu_button("Surfaces show", |ui| {
+        for mode in ViewMode::offered(state.truth.exists()) {
+            let action = Action::Mode(mode);
+            let keys = hint(table, &action);
+            let button =
+                egui::Button::selectable(mode == state.view.mode, mode.label()).shortcut_text(keys);
+            if ui.add(button).on_hover_text(mode.explanation()).clicked() {
+                actions.push(action);
+                ui.close();
+            }
         }
-    }
+    });
     ui.separator();
     item(
         ui,
@@ -123,7 +126,16 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         Action::ToggleEdges,
     );
     item(ui, table, actions, "Cluster boxes", Action::ToggleClusters);
-    item(ui, table, actions, "Backs of faces", Action::ToggleBacks);
+    item(
+        ui,
+        table,
+        actions,
+        "Links of what is picked",
+        Action::ToggleLinks,
+    );
+    if state.loaded.as_ref().is_none_or(|loaded| loaded.has_backs) {
+        item(ui, table, actions, "Backs of faces", Action::ToggleBacks);
+    }
     item(
         ui,
         table,
@@ -196,7 +208,11 @@ fn item(
     label: &str,
     action: Action,
 ) {
-    let button = egui::Button::new(label).shortcut_text(hint(table, &action));
+    let mut button = egui::Button::new(label);
+    let keys = hint(table, &action);
+    if !keys.is_empty() {
+        button = button.shortcut_text(keys);
+    }
     if ui.add(button).clicked() {
         actions.push(action);
         ui.close();

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui;
 
+use super::dialog::{confirm, dialog, file_field};
 use crate::{
     export::MeshFormat,
     viewer::{action::Action, state::State},
@@ -11,18 +12,10 @@ use crate::{
 
 /// Show the dialog where it is open; wishes go into `actions`.
 pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
-    let mut open = state.panels.mesh;
-    let mut done = false;
-    egui::Window::new("Export lit mesh")
-        .open(&mut open)
-        .collapsible(false)
-        .resizable(false)
-        .default_width(400.0)
-        .anchor(egui::Align2::CENTER_CENTER, [0.0, -60.0])
-        .show(ctx, |ui| {
-            done = mesh_ui(ui, &mut state.panels.mesh_text, actions);
-        });
-    state.panels.mesh = open && !done;
+    let text = &mut state.panels.mesh_text;
+    dialog(ctx, "Export lit mesh", &mut state.panels.mesh, |ui| {
+        mesh_ui(ui, text, actions)
+    });
 }
 
 /// Format and place; whether it was confirmed.
@@ -40,15 +33,10 @@ fn mesh_ui(ui: &mut egui::Ui, text: &mut String, actions: &mut Vec<Action>) -> b
             }
         }
     });
-    let label = ui.label("File");
-    let field = egui::TextEdit::singleline(text).desired_width(f32::INFINITY);
-    ui.add(field).labelled_by(label.id);
+    file_field(ui, "File", text);
     ui.weak("Exposure and up axis are those of the view, in a PLY the tone map, too.");
-    ui.add_space(4.0);
-    let button = ui.add_enabled(present.is_ok(), egui::Button::new("Export"));
-    let confirmed = button
-        .on_disabled_hover_text("The name must end in .ply or .glb.")
-        .clicked();
+    let hint = "The name must end in .ply or .glb.";
+    let confirmed = confirm(ui, "Export", present.is_ok(), hint);
     if confirmed {
         actions.push(Action::SaveMesh(PathBuf::from(text.trim())));
     }

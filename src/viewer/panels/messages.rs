@@ -31,9 +31,9 @@ pub fn messages_ui(ui: &mut egui::Ui, state: &mut State) {
     });
     for message in messages.all.iter().rev() {
         let (mark, color) = match message.severity {
-            Severity::Note => ("Note", theme::GOOD),
-            Severity::Warning => ("Warning", theme::WARNING),
-            Severity::Error => ("Error", theme::BAD),
+            Severity::Note => ("Note", theme::good(ui.visuals())),
+            Severity::Warning => ("Warning", theme::warning(ui.visuals())),
+            Severity::Error => ("Error", theme::bad(ui.visuals())),
         };
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;

@@ -1,6 +1,7 @@
 //! The panels around the viewport, one a file. They show the state, and return wishes as actions.
 
 pub mod clusters;
+pub mod dialog;
 pub mod emission;
 pub mod error;
 pub mod help;
@@ -9,6 +10,7 @@ pub mod links;
 pub mod menu;
 pub mod mesh;
 pub mod messages;
+pub mod method;
 pub mod path;
 pub mod picture;
 pub mod plot;
@@ -20,6 +22,7 @@ pub mod settings;
 pub mod sides;
 pub mod statistics;
 pub mod status;
+pub mod table;
 pub mod toolbar;
 
 /// Three significant digits, without an exponent where that is short.

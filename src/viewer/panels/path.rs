@@ -49,12 +49,16 @@ fn node_ui(
     let small = |text: String| RichText::new(text).size(FONT_SIZE);
     let explanation = explanation(node, frame);
     let Some(patch_count) = node.patch_count else {
-        ui.label(small(format!(
-            " Element {} · {} links",
+        let text = format!(
+            "Element {} · {} links",
             node.place.node.0,
             count(u64::from(node.link_count))
-        )))
-        .on_hover_text(explanation);
+        );
+        ui.horizontal(|ui| {
+            // As far in as the text of the buttons above.
+            ui.add_space(ui.spacing().button_padding.x);
+            ui.label(small(text)).on_hover_text(explanation);
+        });
         return;
     };
     let index = node.place.node.index();

@@ -4,20 +4,16 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, DragValue};
 
+use super::dialog::{confirm, dialog, file_field};
 use crate::viewer::{action::Action, state::State};
 
 /// Show the dialog where it is open; wishes go into `actions`.
 pub fn picture_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let mut open = state.panels.picture;
-    let mut done = false;
-    egui::Window::new("Save picture")
-        .open(&mut open)
-        .collapsible(false)
-        .resizable(false)
-        .default_width(400.0)
-        .anchor(egui::Align2::CENTER_CENTER, [0.0, -60.0])
-        .show(ctx, |ui| done = picture_ui(ui, state, actions));
-    state.panels.picture = open && !done;
+    dialog(ctx, "Save picture", &mut open, |ui| {
+        picture_ui(ui, state, actions)
+    });
+    state.panels.picture = open;
 }
 
 /// Size and place; whether it was confirmed.
@@ -42,18 +38,19 @@ fn picture_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) -
             panels.picture_size = [3840, 2160];
         }
     });
-    let label = ui.label("File: .png as seen, .exr with linear radiance");
-    let field = egui::TextEdit::singleline(&mut panels.picture_text).desired_width(f32::INFINITY);
-    ui.add(field).labelled_by(label.id);
-    ui.add_space(4.0);
+    ui.checkbox(&mut panels.picture_is_transparent, "Transparent background")
+        .on_hover_text(
+            "Leave the background out: straight alpha in a PNG, colours multiplied by alpha in an EXR",
+        );
+    let label = "File: .png as seen, .exr with linear radiance";
+    file_field(ui, label, &mut panels.picture_text);
     let path = panels.picture_text.trim();
-    let confirmed = ui
-        .add_enabled(!path.is_empty(), egui::Button::new("Save"))
-        .clicked();
+    let confirmed = confirm(ui, "Save", !path.is_empty(), "Name a file.");
     if confirmed {
         actions.push(Action::SavePicture {
             path: PathBuf::from(path),
             size: panels.picture_size,
+            is_transparent: panels.picture_is_transparent,
         });
     }
     confirmed

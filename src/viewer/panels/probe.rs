@@ -34,19 +34,20 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             &material.name
         };
         row::figure(ui, "Material", name, "");
-        row::figure(
-            ui,
-            "Reflectance",
-            rgb(surface.reflectance),
-            "Red, green, blue",
-        );
+        let is_grey = loaded.is_grey;
+        let (color, channels) = if is_grey {
+            (grey as fn(Vec3) -> String, "Of all colours alike")
+        } else {
+            (rgb as fn(Vec3) -> String, "Red, green, blue")
+        };
+        row::figure(ui, "Reflectance", color(surface.reflectance), channels);
         if surface.emission != Vec3::ZERO {
             row::figure(
                 ui,
                 "Emission",
                 format!(
                     "{} W/(sr·m²)",
-                    rgb(surface.emission * state.view.emission_scale)
+                    color(surface.emission * state.view.emission_scale)
                 ),
                 "Emitted radiance",
             );
@@ -65,7 +66,9 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
                 format!("{} W/m²", figure(f64::from(luminance(probe.irradiance)))),
                 "Luminance of the light that arrives",
             );
-            row::figure(ui, "", rgb(probe.irradiance), "");
+            if !is_grey {
+                row::figure(ui, "", rgb(probe.irradiance), "Red, green, blue");
+            }
             row::figure(
                 ui,
                 "Direct",
@@ -78,7 +81,9 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
                 format!("{} W/(sr·m²)", figure(f64::from(luminance(probe.radiance)))),
                 "Luminance of the light that leaves",
             );
-            row::figure(ui, "", rgb(probe.radiance), "");
+            if !is_grey {
+                row::figure(ui, "", rgb(probe.radiance), "Red, green, blue");
+            }
             row::figure(
                 ui,
                 "Radiosity",
@@ -97,7 +102,7 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             inspection_rows(ui, state);
         }
     });
-    if selection.probe.is_none() {
+    if selection.probe.is_none() && pick.is_back && !triangle.two_sided {
         ui.weak("This side is the back of a one-sided face: it reflects nothing.");
     }
     object_ui(ui, state);
@@ -197,6 +202,10 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
             "Smallest, mean and largest luminance over the object, in W/m²",
         );
     });
+}
+
+fn grey(color: Vec3) -> String {
+    figure(f64::from(color.x))
 }
 
 fn rgb(color: Vec3) -> String {

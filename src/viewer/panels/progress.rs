@@ -3,10 +3,13 @@
 use eframe::egui::{self, Button};
 
 use super::{bytes, count, figure, row, seconds};
-use crate::viewer::{
-    action::Action,
-    state::{RunStatus, State},
-    theme,
+use crate::{
+    solver::StepReport,
+    viewer::{
+        action::Action,
+        state::{RunStatus, State},
+        theme,
+    },
 };
 
 /// Show the run; wishes go into `actions`.
@@ -26,7 +29,10 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
     buttons_ui(ui, status, actions);
     if let RunStatus::Failed(message) = status {
-        ui.colored_label(theme::BAD, format!("The solver failed: {message}"));
+        ui.colored_label(
+            theme::bad(ui.visuals()),
+            format!("The solver failed: {message}"),
+        );
     }
     figures_ui(ui, state);
 }
@@ -93,6 +99,14 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
         row::figure(
             ui,
+            "Transported",
+            transported(report).map_or_else(|| "–".to_owned(), share_text),
+            "Estimated part of the light that has found its place over the links of the last step. The rest, residual / \
+             (1 − contraction), is still on its way between surfaces. Finer links change the light, too: that is what \
+             the error bound tells",
+        );
+        row::figure(
+            ui,
             "Residual",
             figure(f64::from(report.residual)),
             "Change of the last sweep, relative to the total power",
@@ -124,6 +138,52 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
     });
     for note in &report.notes {
-        ui.colored_label(theme::WARNING, note);
+        ui.colored_label(theme::warning(ui.visuals()), note);
+    }
+}
+
+/// Estimated part of the light that has been distributed over the links of a step. Each further sweep changes the light
+/// by at most the contraction times what the one before did, so that all of them together, the last one's residual
+/// among them, change residual / (1 − contraction). `None` where the light does not settle.
+fn transported(report: &StepReport) -> Option<f64> {
+    let rest = f64::from(report.residual) / (1.0 - f64::from(report.contraction));
+    (report.contraction < 1.0 && rest.is_finite()).then(|| (1.0 - rest).max(0.0))
+}
+
+/// A share as per cent. Rounded down: all of it is only what is all of it.
+fn share_text(share: f64) -> String {
+    format!("{:.2} %", (share * 1e4).floor() / 100.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(residual: f32, contraction: f32) -> StepReport {
+        StepReport {
+            residual,
+            contraction,
+            ..StepReport::default()
+        }
+    }
+
+    #[test]
+    fn what_is_on_its_way_is_a_geometric_series() {
+        // In a furnace of reflectance 0.5 each sweep moves half of what the one before moved. After ten sweeps the next
+        // moves 0.5¹¹ of all light, and all from there on 0.5¹⁰.
+        let light = |sweeps: i32| 1.0 - 0.5_f64.powi(sweeps);
+        let residual = light(11) - light(10);
+        let share = transported(&report(residual as f32, 0.5)).expect("it settles");
+        assert!((share - light(10)).abs() < 1e-9, "{share}");
+        assert_eq!(transported(&report(0.0, 0.0)), Some(1.0));
+        assert_eq!(transported(&report(0.6, 0.9)), Some(0.0));
+        assert_eq!(transported(&report(0.1, 1.0)), None);
+    }
+
+    #[test]
+    fn nearly_all_is_not_all() {
+        assert_eq!(share_text(0.999_99), "99.99 %");
+        assert_eq!(share_text(1.0), "100.00 %");
+        assert_eq!(share_text(0.5), "50.00 %");
     }
 }

@@ -55,6 +55,21 @@ pub fn setting<T: PartialEq + Clone>(
     *value != before
 }
 
+/// Something that cannot be set, beside the settings.
+pub fn fixed(ui: &mut egui::Ui, label: &str, explanation: &str, text: &str) {
+    ui.horizontal(|ui| {
+        ui.allocate_ui_with_layout(
+            egui::vec2(LABEL_WIDTH, ui.spacing().interact_size.y),
+            egui::Layout::left_to_right(egui::Align::Center),
+            |ui| {
+                ui.set_min_width(LABEL_WIDTH);
+                ui.label(label).on_hover_text(explanation);
+            },
+        );
+        ui.weak(text).on_hover_text(explanation);
+    });
+}
+
 /// A small arrow that turns back.
 fn reset_button(ui: &mut egui::Ui, label: &str) -> egui::Response {
     let size = egui::Vec2::splat(ui.spacing().interact_size.y - 4.0);

@@ -25,7 +25,7 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
             ui.add_space(6.0);
             let last = state.messages.all.last();
             if let Some(error) = last.filter(|message| message.severity == Severity::Error) {
-                ui.colored_label(theme::BAD, &error.text);
+                ui.colored_label(theme::bad(ui.visuals()), &error.text);
                 ui.add_space(6.0);
             }
             ui.label("Drop an OBJ file here, choose one, or type its path.");
@@ -61,6 +61,9 @@ pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
         (Some(loading), None) => format!("Reading {}…", loading.source().label()),
         (_, Some(loaded)) if state.run.snapshot.is_none() && state.run.status.is_busy() => {
             format!("Building the clusters of {}…", loaded.source.label())
+        }
+        (_, Some(loaded)) if state.staged.is_none() && state.run.snapshot.is_some() => {
+            format!("Handing {} to the graphics adapter…", loaded.source.label())
         }
         (_, Some(_)) if lacks_errors(state) => "Tracing the reference at the vertices…".to_owned(),
         _ => return,

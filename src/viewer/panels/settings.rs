@@ -1,13 +1,13 @@
-//! Settings of the solve: presets, thresholds, method, limits.
+//! Settings of the solve: presets, thresholds, limits.
 
 use std::time::Duration;
 
 use eframe::egui::{self, DragValue, Slider};
 
-use super::row;
+use super::{method::method_ui, row};
 use crate::{
     scene::Sides,
-    solver::{Direct, Method, Oracle, Push, SolveSettings},
+    solver::SolveSettings,
     viewer::{action::Action, state::State},
     worker::Effect,
 };
@@ -17,8 +17,8 @@ pub fn settings_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     let mut settings = state.settings.clone();
     presets_ui(ui, &mut settings);
     ui.add_space(4.0);
-    quality_ui(ui, &mut settings);
-    method_ui(ui, &mut settings);
+    quality_ui(ui, state, &mut settings);
+    method_ui(ui, state, &mut settings);
     if settings != state.settings {
         actions.push(Action::Settings(settings));
     }
@@ -75,7 +75,7 @@ fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
     });
 }
 
-fn quality_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
+fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
     let default = SolveSettings::normal();
     row::setting(
         ui,
@@ -103,20 +103,22 @@ fn quality_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
         &default.min_area,
         |ui, value| ui.add(slider(value, 1e-8..=1e-3)),
     );
-    row::setting(
-        ui,
-        "Shadow rays",
-        "Rays from a vertex towards the lights. More makes penumbrae smoother; the time for direct light grows with it.",
-        &mut settings.shadow_samples,
-        &default.shadow_samples,
-        |ui, value| {
-            ui.add(
-                Slider::new(value, 1..=256)
-                    .logarithmic(true)
-                    .clamping(egui::SliderClamping::Edits),
-            )
-        },
-    );
+    if state.has_emitters() {
+        row::setting(
+            ui,
+            "Shadow rays",
+            "Rays from a vertex towards the lights. More makes penumbrae smoother; the time for direct light grows with it.",
+            &mut settings.shadow_samples,
+            &default.shadow_samples,
+            |ui, value| {
+                ui.add(
+                    Slider::new(value, 1..=256)
+                        .logarithmic(true)
+                        .clamping(egui::SliderClamping::Edits),
+                )
+            },
+        );
+    }
     row::setting(
         ui,
         "Steps",
@@ -125,172 +127,6 @@ fn quality_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
         &default.max_steps,
         |ui, value| ui.add(DragValue::new(value).range(1..=64).speed(0.1)),
     );
-}
-
-fn method_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
-    row::section(ui, "Method", false, |ui| {
-        let default = SolveSettings::normal();
-        row::setting(
-            ui,
-            "Clusters",
-            "How a cluster keeps its power and area by direction. Changing it begins again.",
-            &mut settings.method,
-            &default.method,
-            |ui, value| {
-                row::choice(
-                    ui,
-                    "method",
-                    value,
-                    &[
-                        (
-                            Method::Bounded,
-                            "Bounded",
-                            "Spherical harmonics kept within guaranteed bounds",
-                        ),
-                        (
-                            Method::SixFace,
-                            "Six faces",
-                            "Six vectors along the box normals, as in the paper; too bright at coarse links",
-                        ),
-                        (
-                            Method::Single,
-                            "One vector",
-                            "One vector; opposite faces cancel",
-                        ),
-                        (Method::Exact, "Exact sum", "The sum over all patches; slow"),
-                        (
-                            Method::Isotropic,
-                            "Isotropic",
-                            "The same in every direction",
-                        ),
-                    ],
-                )
-            },
-        );
-        row::setting(
-            ui,
-            "Link error",
-            "How the error of a link is judged. Changing it begins again.",
-            &mut settings.oracle,
-            &default.oracle,
-            |ui, value| {
-                row::choice(
-                    ui,
-                    "oracle",
-                    value,
-                    &[
-                        (
-                            Oracle::Interval,
-                            "Interval bounds",
-                            "Bounds over both boxes",
-                        ),
-                        (
-                            Oracle::Samples,
-                            "p samples",
-                            "Largest minus smallest of p sample pairs, as in the paper",
-                        ),
-                    ],
-                )
-            },
-        );
-        row::setting(
-            ui,
-            "Samples p",
-            "Sample pairs of a link. The cost of judging a link grows with it.",
-            &mut settings.samples,
-            &default.samples,
-            |ui, value| {
-                ui.add_enabled(
-                    settings.oracle == Oracle::Samples,
-                    DragValue::new(value).range(1..=4096).speed(0.2),
-                )
-            },
-        );
-        row::setting(
-            ui,
-            "Direct light",
-            "How light straight from emitters is computed. Changing it begins again.",
-            &mut settings.direct,
-            &default.direct,
-            |ui, value| {
-                row::choice(
-                    ui,
-                    "direct",
-                    value,
-                    &[
-                        (
-                            Direct::Auto,
-                            "Automatic",
-                            "Sampled where emitters are few or small, linked where they are many",
-                        ),
-                        (
-                            Direct::Sampled,
-                            "Shadow rays",
-                            "From every vertex to every light: sharp shadows",
-                        ),
-                        (
-                            Direct::Linked,
-                            "Links",
-                            "Through links, as all other light; the paper's way",
-                        ),
-                    ],
-                )
-            },
-        );
-        row::setting(
-            ui,
-            "Push",
-            "How the light of several links reaches the faces of a cluster. Changing it begins again.",
-            &mut settings.push,
-            &default.push,
-            |ui, value| {
-                row::choice(
-                    ui,
-                    "push",
-                    value,
-                    &[
-                        (Push::Combined, "Once a sweep", "Combined first"),
-                        (
-                            Push::AtOnce,
-                            "Link by link",
-                            "To every face at once; slow on large clusters",
-                        ),
-                    ],
-                )
-            },
-        );
-        row::setting(
-            ui,
-            "Crease angle",
-            "Edges sharper than this are shaded as edges. Changing it begins again.",
-            &mut settings.crease_degrees,
-            &default.crease_degrees,
-            |ui, value| {
-                ui.add(
-                    DragValue::new(value)
-                        .range(0.0..=180.0)
-                        .suffix("°")
-                        .speed(0.5),
-                )
-            },
-        );
-        row::setting(
-            ui,
-            "Convergence",
-            "Sweeps stop when the change is below this fraction of the power.",
-            &mut settings.tolerance,
-            &default.tolerance,
-            |ui, value| ui.add(slider(value, 1e-6..=1e-1)),
-        );
-        row::setting(
-            ui,
-            "Seed",
-            "Of every random choice. The same seed gives the same light. Changing it begins again.",
-            &mut settings.seed,
-            &default.seed,
-            |ui, value| ui.add(DragValue::new(value).speed(0.1)),
-        );
-    });
 }
 
 fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
@@ -372,7 +208,7 @@ fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
 }
 
 /// A logarithmic slider whose typed value may leave its range, but not go to 0 or below.
-fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> Slider<'_> {
+pub(super) fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> Slider<'_> {
     Slider::new(value, range)
         .logarithmic(true)
         .clamping(egui::SliderClamping::Never)

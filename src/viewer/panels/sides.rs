@@ -33,7 +33,9 @@ fn light_panel(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) 
                     });
                     row::section(ui, "Settings", true, |ui| {
                         settings::settings_ui(ui, state, actions);
-                        emission::emission_ui(ui, state, actions);
+                        if state.has_emitters() {
+                            emission::emission_ui(ui, state, actions);
+                        }
                     });
                 });
         });

@@ -18,7 +18,9 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 "Of the scene as read",
             );
             row::figure(ui, "Materials", count(scene.materials.len() as u64), "");
-            row::figure(ui, "Textures", count(scene.textures.len() as u64), "");
+            if !scene.textures.is_empty() {
+                row::figure(ui, "Textures", count(scene.textures.len() as u64), "");
+            }
             row::figure(
                 ui,
                 "Objects",

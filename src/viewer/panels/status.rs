@@ -16,9 +16,9 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
             ui.label(format!("Reading {}", loading.source().label()));
         }
         let color = match &state.run.status {
-            RunStatus::Failed(_) => theme::BAD,
-            RunStatus::Finished(_) => theme::GOOD,
-            RunStatus::Pausing | RunStatus::Paused => theme::WARNING,
+            RunStatus::Failed(_) => theme::bad(ui.visuals()),
+            RunStatus::Finished(_) => theme::good(ui.visuals()),
+            RunStatus::Pausing | RunStatus::Paused => theme::warning(ui.visuals()),
             _ => ui.visuals().text_color(),
         };
         ui.colored_label(color, state.run.status.label());
@@ -52,9 +52,9 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
         return;
     };
     let color = match worst.severity {
-        Severity::Note => theme::GOOD,
-        Severity::Warning => theme::WARNING,
-        Severity::Error => theme::BAD,
+        Severity::Note => theme::good(ui.visuals()),
+        Severity::Warning => theme::warning(ui.visuals()),
+        Severity::Error => theme::bad(ui.visuals()),
     };
     let mut text = worst.text.clone();
     if text.chars().count() > 90 {

@@ -24,13 +24,13 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
             .on_hover_text("Edges of the elements over the light (M)");
         ui.toggle_value(&mut view.clusters.shown, "Clusters")
             .on_hover_text("Boxes of the cluster tree; [ and ] change the level (B)");
-        ui.toggle_value(&mut view.backs, "Backs")
-            .on_hover_text("Draw the backs of one-sided faces instead of looking through them (K)");
-        let has_textures = state
-            .loaded
-            .as_ref()
-            .is_some_and(|loaded| !loaded.scene.textures.is_empty());
-        if has_textures {
+        let loaded = state.loaded.as_ref();
+        if loaded.is_none_or(|loaded| loaded.has_backs) {
+            ui.toggle_value(&mut view.backs, "Backs").on_hover_text(
+                "Draw the backs of one-sided faces instead of looking through them (K)",
+            );
+        }
+        if loaded.is_some_and(|loaded| !loaded.scene.textures.is_empty()) {
             ui.toggle_value(&mut view.texture_detail, "Textures")
                 .on_hover_text("Textures in detail, lit by the computed light");
         }

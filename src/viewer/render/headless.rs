@@ -3,9 +3,11 @@
 use std::{path::Path, sync::Arc};
 
 use glam::Vec3;
-use image::{Rgb32FImage, RgbaImage};
+use image::{DynamicImage, Rgb32FImage, RgbaImage};
 
-use super::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target};
+use super::{
+    Cutout, CutoutTarget, Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
+};
 use crate::{
     scene::Scene,
     solver::Snapshot,
@@ -48,8 +50,20 @@ impl HeadlessPicture {
     /// # Errors
     /// See [`EncodeError`].
     pub fn encode(self, path: &Path) -> Result<Vec<u8>, EncodeError> {
-        saver::encode(self.display, self.radiance, path)
+        let display = DynamicImage::from(self.display).into_rgb8();
+        saver::encode(display.into(), self.radiance.map(DynamicImage::from), path)
     }
+}
+
+/// What is drawn: a scene under a snapshot's light.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// The scene.
+    pub scene: &'a Arc<Scene>,
+    /// Its mesh, light and clusters.
+    pub snapshot: &'a Snapshot,
+    /// Errors measured at its vertices, for the mode that shows them.
+    pub errors: Option<&'a Arc<Vec<f32>>>,
 }
 
 /// A device of one's own.
@@ -82,24 +96,69 @@ pub fn open_gpu() -> Result<Gpu, HeadlessError> {
 }
 
 /// Draw a snapshot at a size in pixels. Automatic exposure and ranges are taken from its light, as in the window.
-/// `errors` are those measured at its vertices, for the mode that shows them.
 ///
 /// # Errors
 /// See [`HeadlessError`].
 pub fn picture(
-    scene: &Arc<Scene>,
-    snapshot: &Snapshot,
-    errors: Option<&Arc<Vec<f32>>>,
+    subject: Subject<'_>,
     camera: &Camera,
     view: &ViewSettings,
     size: [u32; 2],
 ) -> Result<HeadlessPicture, HeadlessError> {
     let mut renderer = Renderer::new(open_gpu()?);
     let target = Target::new(renderer.gpu(), size)?;
+    let view = exposed(view, subject.snapshot);
+    with_picture(subject, camera, &view, |picture| {
+        renderer.render(&target, picture)
+    })?;
+    Ok(HeadlessPicture {
+        display: target.read_display(renderer.gpu())?,
+        radiance: target
+            .read_linear(renderer.gpu(), view.exposure_factor())
+            .ok(),
+    })
+}
+
+/// Draw a snapshot as [`picture`] does, without the background.
+///
+/// # Errors
+/// See [`HeadlessError`].
+pub fn cutout(
+    subject: Subject<'_>,
+    camera: &Camera,
+    view: &ViewSettings,
+    size: [u32; 2],
+) -> Result<Cutout, HeadlessError> {
+    let mut renderer = Renderer::new(open_gpu()?);
+    let target = CutoutTarget::new(renderer.gpu(), size)?;
+    let view = exposed(view, subject.snapshot);
+    with_picture(subject, camera, &view, |picture| {
+        renderer.render_cutout(&target, picture)
+    })?;
+    Ok(target.read(renderer.gpu(), view.tone_map, view.exposure_factor())?)
+}
+
+/// A view with the exposure that the light asks for, where it is automatic.
+fn exposed(view: &ViewSettings, snapshot: &Snapshot) -> ViewSettings {
     let mut view = view.clone();
     if view.auto_exposure {
         view.exposure = light_range::auto_exposure(snapshot).unwrap_or(view.exposure);
     }
+    view
+}
+
+/// Describe the picture, and draw it.
+fn with_picture(
+    subject: Subject<'_>,
+    camera: &Camera,
+    view: &ViewSettings,
+    draw: impl FnOnce(&Picture<'_>) -> Result<(), RenderError>,
+) -> Result<(), RenderError> {
+    let Subject {
+        scene,
+        snapshot,
+        errors,
+    } = subject;
     let overlay = Overlay {
         boxes: Arc::new(cluster_lines::boxes(
             &snapshot.clusters,
@@ -108,7 +167,7 @@ pub fn picture(
         )),
         segments: Arc::default(),
     };
-    let drawn = Picture {
+    draw(&Picture {
         scene,
         mesh: &snapshot.mesh,
         light: &snapshot.light,
@@ -117,19 +176,12 @@ pub fn picture(
         is_unlit: !snapshot.is_lit(),
         range: light_range::false_color_range(
             snapshot,
-            &view,
+            view,
             errors.map(|errors| errors.as_slice()),
         ),
-        view: &view,
+        view,
         overlay: &overlay,
         background: Vec3::splat(theme::PICTURE_BACKGROUND),
         pixels_per_point: 1.0,
-    };
-    renderer.render(&target, &drawn)?;
-    Ok(HeadlessPicture {
-        display: target.read_display(renderer.gpu())?,
-        radiance: target
-            .read_linear(renderer.gpu(), view.exposure_factor())
-            .ok(),
     })
 }

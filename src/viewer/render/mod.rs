@@ -3,6 +3,7 @@
 //! The same code draws the window's viewport, screenshots and headless pictures. Buffers are uploaded only when the
 //! `Arc` they come from changes, so that a still picture costs nothing.
 
+mod cutout;
 mod detail;
 pub mod headless;
 mod line_pass;
@@ -15,8 +16,9 @@ mod uploads;
 
 use std::sync::{Arc, OnceLock};
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
+pub use cutout::{Cutout, CutoutTarget};
 pub use readback::ReadError;
 pub use target::Target;
 pub use uploads::{Source, Uploads};
@@ -253,32 +255,45 @@ impl Renderer {
     /// # Errors
     /// [`RenderError::MeshTooLarge`]; the target then holds the background.
     pub fn render(&mut self, target: &Target, picture: &Picture<'_>) -> Result<(), RenderError> {
+        self.renew(picture, |renderer, uploads| {
+            renderer.draw(target, picture, uploads);
+        })
+    }
+
+    /// Upload a picture and draw it without its background.
+    ///
+    /// # Errors
+    /// [`RenderError::MeshTooLarge`]; the target is then empty but for lines.
+    pub fn render_cutout(
+        &mut self,
+        target: &CutoutTarget,
+        picture: &Picture<'_>,
+    ) -> Result<(), RenderError> {
+        self.renew(picture, |renderer, uploads| {
+            renderer.draw_cutout(target, picture, uploads);
+        })
+    }
+
+    /// Upload a picture, and draw with what was uploaded.
+    fn renew(
+        &mut self,
+        picture: &Picture<'_>,
+        draw: impl FnOnce(&mut Self, &Uploads),
+    ) -> Result<(), RenderError> {
         // Taken out, so that nothing is held twice while the next is made.
         let empty = Uploads::new(self.uploads.details().clone());
         let mut uploads = std::mem::replace(&mut self.uploads, empty);
         let result = uploads.renew(&self.gpu, &picture.source());
-        self.draw(target, picture, &uploads);
+        draw(self, &uploads);
         self.uploads = uploads;
         result
     }
 
     /// Draw a picture of what was uploaded for it.
     pub fn draw(&mut self, target: &Target, picture: &Picture<'_>, uploads: &Uploads) {
-        self.line_pass.prepare(&self.gpu, &picture.overlay.segments);
-        self.uniforms.write(&self.gpu.queue, target.size(), picture);
-        // Draw surfaces and lines into the linear picture.
-        let mut encoder = self
-            .gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
-                label: Some("picture"),
-            });
-        {
-            let mut pass = target.begin_linear(&mut encoder, picture.background);
-            pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
-            self.mesh_pass.draw(&mut pass, uploads, picture.view);
-            self.line_pass.draw(&mut pass, uploads.boxes());
-        }
+        let mut encoder = self.begin(target.size(), picture);
+        let background = picture.background.extend(0.0);
+        self.draw_linear(&mut encoder, target, background, picture, uploads);
         // Turn it into display colours.
         {
             let mut pass = target.begin_display(&mut encoder);
@@ -286,5 +301,43 @@ impl Renderer {
             self.tonemap_pass.draw(&self.gpu, &mut pass, target);
         }
         self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Draw a picture of what was uploaded for it, without its background.
+    pub fn draw_cutout(&mut self, target: &CutoutTarget, picture: &Picture<'_>, uploads: &Uploads) {
+        let mut encoder = self.begin(target.over_nothing.size(), picture);
+        for (target, background) in [
+            (&target.over_nothing, Vec4::ZERO),
+            (&target.over_light, Vec4::W),
+        ] {
+            self.draw_linear(&mut encoder, target, background, picture, uploads);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Hand over what changes with every picture.
+    fn begin(&mut self, size: [u32; 2], picture: &Picture<'_>) -> wgpu::CommandEncoder {
+        self.line_pass.prepare(&self.gpu, &picture.overlay.segments);
+        self.uniforms.write(&self.gpu.queue, size, picture);
+        self.gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("picture"),
+            })
+    }
+
+    /// Draw surfaces and lines into the linear picture.
+    fn draw_linear(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        background: Vec4,
+        picture: &Picture<'_>,
+        uploads: &Uploads,
+    ) {
+        let mut pass = target.begin_linear(encoder, background);
+        pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+        self.mesh_pass.draw(&mut pass, uploads, picture.view);
+        self.line_pass.draw(&mut pass, uploads.boxes());
     }
 }

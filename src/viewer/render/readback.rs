@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use glam::Vec4;
 use image::{Rgb32FImage, RgbaImage};
 
 use super::{Gpu, Target};
@@ -30,21 +31,28 @@ impl Target {
     /// # Errors
     /// When the device is lost or out of memory, or the adapter has no linear pictures.
     pub fn read_linear(&self, gpu: &Gpu, exposure_factor: f32) -> Result<Rgb32FImage, ReadError> {
+        let pixels = self.read_pixels(gpu)?;
+        let [width, height] = self.size();
+        let scale = 1.0 / exposure_factor;
+        let floats = pixels
+            .iter()
+            .flat_map(|pixel| (pixel.truncate() * scale).to_array())
+            .collect();
+        Rgb32FImage::from_raw(width, height, floats)
+            .ok_or_else(|| ReadError("wrong size".to_owned()))
+    }
+
+    /// The linear picture as it was drawn, exposed, row by row. Alpha is the part of a pixel that is light.
+    pub(super) fn read_pixels(&self, gpu: &Gpu) -> Result<Vec<Vec4>, ReadError> {
         if gpu.linear_format != super::LINEAR_FORMAT {
             return Err(ReadError("it cannot draw linear pictures".to_owned()));
         }
         let bytes = read_texture(gpu, self.linear(), 8)?;
-        let [width, height] = self.size();
-        let scale = 1.0 / exposure_factor;
-        let floats = bytes
-            .chunks_exact(8)
-            .flat_map(|pixel| {
-                [0, 2, 4]
-                    .map(|at| f32_from_half(u16::from_le_bytes([pixel[at], pixel[at + 1]])) * scale)
-            })
-            .collect();
-        Rgb32FImage::from_raw(width, height, floats)
-            .ok_or_else(|| ReadError("wrong size".to_owned()))
+        let pixel = |bytes: &[u8]| {
+            let channel = |at: usize| f32_from_half(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+            Vec4::from_array([0, 2, 4, 6].map(channel))
+        };
+        Ok(bytes.chunks_exact(8).map(pixel).collect())
     }
 }
 

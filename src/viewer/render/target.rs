@@ -1,6 +1,6 @@
 //! What pictures are drawn into: a linear picture with depth, and the display picture that is made of it.
 
-use glam::Vec3;
+use glam::Vec4;
 
 use super::{DEPTH_FORMAT, DISPLAY_FORMAT, Gpu, RenderError};
 
@@ -77,17 +77,17 @@ impl Target {
         &self.linear_view
     }
 
-    /// Begin drawing surfaces and lines.
+    /// Begin drawing surfaces and lines over a background, whose alpha says whether it is light.
     pub(super) fn begin_linear<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
-        background: Vec3,
+        background: Vec4,
     ) -> wgpu::RenderPass<'e> {
         let (view, resolve_target, store) = match &self.multisampled_view {
             Some(samples) => (samples, Some(&self.linear_view), wgpu::StoreOp::Discard),
             None => (&self.linear_view, None, wgpu::StoreOp::Store),
         };
-        let [r, g, b] = background.to_array().map(f64::from);
+        let [r, g, b, a] = background.to_array().map(f64::from);
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("linear picture"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -95,7 +95,7 @@ impl Target {
                 resolve_target,
                 depth_slice: None,
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 0.0 }),
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
                     store,
                 },
             })],

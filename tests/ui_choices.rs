@@ -1,0 +1,388 @@
+//! The window shows what a scene can use, saves what is asked for, and remembers what was chosen.
+
+#![cfg(feature = "viewer")]
+
+mod windows;
+
+use std::{
+    collections::HashMap,
+    fs,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use eframe::egui;
+use egui_kittest::{Harness, kittest::Queryable as _};
+use vecrad::{
+    solver::SolveSettings,
+    viewer::{
+        Options,
+        action::Action,
+        app::App,
+        camera::AxisView,
+        loader::SceneSource,
+        panels::figure,
+        start::Faults,
+        state::Severity,
+        view::{ToneMap, ViewMode, ViewRequest},
+    },
+};
+use windows::{perform, plates, wait_for, window};
+
+/// What eframe keeps in a file.
+#[derive(Default)]
+struct Kept(Mutex<HashMap<String, String>>);
+
+impl eframe::Storage for Kept {
+    fn get_string(&self, key: &str) -> Option<String> {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.get(key).cloned()
+    }
+
+    fn set_string(&mut self, key: &str, value: String) {
+        let kept = self.0.get_mut().unwrap_or_else(PoisonError::into_inner);
+        kept.insert(key.to_owned(), value);
+    }
+
+    fn remove_string(&mut self, key: &str) {
+        let kept = self.0.get_mut().unwrap_or_else(PoisonError::into_inner);
+        kept.remove(key);
+    }
+
+    fn flush(&mut self) {}
+}
+
+/// A window that finds these entries kept.
+fn window_with(kept: Kept, options: Options) -> Harness<'static, App> {
+    // It must outlive the window, which lives as long as the test.
+    let kept: &'static Kept = Box::leak(Box::new(kept));
+    Harness::builder()
+        .with_size([1280.0, 900.0])
+        .build_eframe(move |cc| {
+            cc.storage = Some(kept);
+            App::new(cc, options, Arc::new(Faults::default())).expect("threads")
+        })
+}
+
+/// What a window leaves behind.
+fn kept_by(harness: &mut Harness<'static, App>) -> Kept {
+    let mut kept = Kept::default();
+    eframe::App::save(harness.state_mut(), &mut kept);
+    kept
+}
+
+#[test]
+fn what_was_chosen_is_there_in_the_next_window() {
+    let mut harness = plates();
+    perform(&mut harness, Action::Mode(ViewMode::FalseRadiance));
+    perform(&mut harness, Action::ToggleToneMap);
+    harness.get_by_label("Details").click();
+    harness.run_steps(3);
+    harness.state_mut().state.panels.fly_speed = 4.0;
+    let kept = kept_by(&mut harness);
+    drop(harness);
+
+    let mut next = window_with(kept, Options::default());
+    next.run_steps(2);
+    let state = &next.state().state;
+    assert_eq!(state.view.mode, ViewMode::FalseRadiance);
+    assert_eq!(state.view.tone_map, ToneMap::None);
+    assert_eq!(state.panels.fly_speed, 4.0);
+    assert!(state.panels.light && !state.panels.look);
+    assert!(next.query_by_label("Statistics").is_none());
+    // Panels come back by the menu's entry.
+    perform(&mut next, Action::ResetLayout);
+    next.get_by_label("Statistics");
+
+    // The command line goes before it.
+    let asked = Options {
+        view: ViewRequest {
+            mode: Some(ViewMode::Normals),
+            ..ViewRequest::default()
+        },
+        ..Options::default()
+    };
+    let again = window_with(kept_by(&mut next), asked);
+    assert_eq!(again.state().state.view.mode, ViewMode::Normals);
+    assert_eq!(again.state().state.view.tone_map, ToneMap::None);
+}
+
+#[test]
+fn what_was_kept_and_cannot_be_read_is_as_if_it_were_not() {
+    let broken = ["preferences", "recent"].map(|key| (key.to_owned(), "[= nonsense".to_owned()));
+    let kept = Kept(Mutex::new(HashMap::from(broken)));
+    let mut harness = window_with(kept, Options::default());
+    harness.run_steps(2);
+    let state = &harness.state().state;
+    assert_eq!(state.view.mode, ViewMode::Radiance);
+    assert!(state.panels.light && state.panels.look);
+    assert!(state.recent.files.is_empty());
+    harness.get_by_label("Open a scene to light it");
+}
+
+#[test]
+fn the_key_for_normals_leads_there_and_back() {
+    let mut harness = plates();
+    let mode = |harness: &Harness<'static, App>| harness.state().state.view.mode;
+    perform(&mut harness, Action::Mode(ViewMode::LightOnly));
+    for expected in [ViewMode::Normals, ViewMode::LightOnly] {
+        harness.key_press(egui::Key::N);
+        harness.run_steps(2);
+        assert_eq!(mode(&harness), expected);
+    }
+}
+
+#[test]
+fn a_scene_shows_only_what_it_can_use() {
+    // Two grey sheets under white light, without a texture or a reference.
+    let mut harness = plates();
+    let lacks = |harness: &Harness<'static, App>, label: &str| {
+        assert!(
+            harness.query_all_by_label_contains(label).next().is_none(),
+            "{label}"
+        );
+    };
+    for label in [
+        "Textures",
+        "Backs",
+        "Relative RMS",
+        "Trimmed RMS against run time",
+        "Save CSV…",
+    ] {
+        lacks(&harness, label);
+    }
+    // Advanced settings are folded.
+    for label in ["Link error", "Crease angle", "Ray offset", "Memory limit"] {
+        lacks(&harness, label);
+    }
+    for label in ["Emission scale", "Shadow rays", "Transported"] {
+        assert!(
+            harness.query_all_by_label(label).next().is_some(),
+            "{label}"
+        );
+    }
+    // The table of views does not offer errors without a reference either.
+    harness.get_by_label("View mode").click();
+    harness.run_steps(3);
+    harness.get_by_label("Uncertainty");
+    // Only the panel of that name.
+    assert_eq!(harness.query_all_by_label("Measured error").count(), 1);
+}
+
+#[test]
+fn advanced_settings_unfold_and_tell_the_ray_offset() {
+    let mut harness = plates();
+    harness.get_by_label("Method").click_accesskit();
+    harness.run_steps(20);
+    harness.get_by_label("Ray offset");
+    // The plates are 1 unit across: a millionth of that.
+    harness.get_by_label("1.00e-6 (automatic)");
+}
+
+#[test]
+fn what_a_scene_has_brings_its_controls() {
+    let mut harness = window(Options {
+        source: Some(SceneSource::Builtin("gallery".to_owned())),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    harness.get_by_label("Textures");
+    harness.get_by_label("Backs");
+    let is_grey = harness
+        .state()
+        .state
+        .loaded
+        .as_ref()
+        .map(|loaded| loaded.is_grey);
+    assert_eq!(is_grey, Some(false));
+    perform(&mut harness, Action::Stop);
+}
+
+#[test]
+fn light_of_a_grey_scene_is_one_figure() {
+    // From above, so that the middle of the picture lies on a plate.
+    let figures = |is_grey: bool| {
+        let mut harness = plates();
+        let mut loaded = harness.state_mut().state.loaded.take().expect("a scene");
+        assert!(loaded.is_grey);
+        Arc::get_mut(&mut loaded)
+            .expect("nobody else has it")
+            .is_grey = is_grey;
+        harness.state_mut().state.loaded = Some(loaded);
+        perform(&mut harness, Action::LookFrom(AxisView::Top));
+        harness.run_steps(60);
+        let at = harness.get_by_label("Scene").rect().center();
+        harness.hover_at(at);
+        harness.step();
+        harness.drag_at(at);
+        harness.drop_at(at);
+        wait_for(&mut harness, |app| {
+            app.state
+                .selection
+                .as_ref()
+                .is_some_and(|selection| selection.probe.is_some())
+        });
+        let irradiance = harness
+            .state()
+            .state
+            .selection
+            .as_ref()
+            .and_then(|s| s.probe);
+        let [red, green, blue] = irradiance
+            .expect("waited for")
+            .irradiance
+            .to_array()
+            .map(|x| figure(f64::from(x)));
+        harness
+            .query_all_by_label(&format!("{red}  {green}  {blue}"))
+            .count()
+    };
+    assert!(figures(false) > 0);
+    assert_eq!(figures(true), 0);
+}
+
+#[test]
+fn a_scene_without_emitters_has_nothing_to_scale() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let scene = folder.path().join("dark.obj");
+    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
+    let mut harness = window(Options {
+        source: Some(SceneSource::File(scene)),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    for label in ["Emission scale", "Shadow rays"] {
+        assert!(
+            harness.query_all_by_label(label).next().is_none(),
+            "{label}"
+        );
+    }
+}
+
+#[test]
+fn errors_are_saved_as_a_table_with_the_columns_of_the_report() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let path = folder.path().join("errors.csv");
+    let mut harness = plates();
+    perform(&mut harness, Action::TraceReference);
+    let steps = harness.state().state.settings.max_steps;
+    // One more run, so that there is something to compare.
+    let mut other = harness.state().state.settings.clone();
+    wait_for(&mut harness, |app| app.state.truth.newest_error().is_some());
+    other.seed += 1;
+    perform(&mut harness, Action::Settings(other));
+    wait_for(&mut harness, |app| {
+        app.state.truth.runs.len() == 2
+            && app
+                .state
+                .truth
+                .newest_error()
+                .is_some_and(|(step, ..)| step == steps)
+    });
+    // The button may lie below the fold of the panel.
+    harness.get_by_label("Save CSV…").click_accesskit();
+    harness.run_steps(3);
+    assert!(harness.state().state.panels.table);
+    harness.state_mut().state.panels.table_text = path.display().to_string();
+    harness.run_steps(2);
+    harness.get_by_label("Save").click();
+    harness.run_steps(2);
+    assert!(!harness.state().state.panels.table);
+    wait_for(&mut harness, |app| {
+        let said = app.state.messages.all.last();
+        said.is_some_and(|said| said.severity == Severity::Note && said.text.contains("errors.csv"))
+    });
+    let mut table = csv::Reader::from_path(&path).expect("it was saved");
+    let headers: Vec<String> = table
+        .headers()
+        .expect("a header")
+        .iter()
+        .map(str::to_owned)
+        .collect();
+    for name in [
+        "scene",
+        "run",
+        "step",
+        "time_s",
+        "error_trimmed",
+        "error_rms",
+        "rays",
+        "links",
+    ] {
+        assert!(headers.iter().any(|header| header == name), "{name}");
+    }
+    let column = |name: &str| {
+        headers
+            .iter()
+            .position(|header| header == name)
+            .expect("found")
+    };
+    let (run, step, time, error) = (
+        column("run"),
+        column("step"),
+        column("time_s"),
+        column("error_rms"),
+    );
+    let rows: Vec<csv::StringRecord> = table.records().map(|row| row.expect("a row")).collect();
+    let truth = &harness.state().state.truth;
+    let measured: usize = truth
+        .runs
+        .iter()
+        .map(|run| truth.steps_of(run).count())
+        .sum();
+    assert_eq!(rows.len(), measured);
+    let last = rows.last().expect("rows");
+    let (newest_step, report, _) = truth.newest_error().expect("measured");
+    assert_eq!(last[run], truth.runs[1].name);
+    assert_eq!(last[step].parse::<u32>(), Ok(newest_step));
+    assert_eq!(last[time].parse::<f64>(), Ok(report.solve_s));
+    // The reference grew meanwhile, and the error with it.
+    let error: f64 = last[error].parse().expect("a number");
+    assert!(error > 0.0 && error < 1.0, "{error}");
+}
+
+#[test]
+fn escape_closes_a_dialog_before_it_clears_the_selection() {
+    let mut harness = plates();
+    perform(&mut harness, Action::SelectCluster(0));
+    perform(&mut harness, Action::PictureDialog);
+    harness.get_by_label("Transparent background");
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(3);
+    assert!(!harness.state().state.panels.picture);
+    assert_eq!(harness.state().state.cluster, Some(0));
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(3);
+    assert_eq!(harness.state().state.cluster, None);
+}
+
+#[test]
+fn escape_closes_a_menu_and_nothing_else() {
+    let mut harness = plates();
+    perform(&mut harness, Action::SelectCluster(0));
+    harness.get_by_label("View").click();
+    harness.run_steps(3);
+    harness.get_by_label("Reset layout");
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Reset layout").is_none());
+    assert_eq!(harness.state().state.cluster, Some(0));
+}
+
+#[test]
+fn enter_confirms_a_dialog_and_leaves_the_camera() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let path = folder.path().join("lit.ply");
+    let mut harness = plates();
+    harness.state_mut().state.rig.target.yaw = 1.25;
+    harness.state_mut().state.rig.target.pivot.x = 3.0;
+    perform(&mut harness, Action::MeshDialog);
+    harness.state_mut().state.panels.mesh_text = path.display().to_string();
+    harness.run_steps(2);
+    harness.key_press(egui::Key::Enter);
+    harness.run_steps(2);
+    assert!(!harness.state().state.panels.mesh);
+    wait_for(&mut harness, |_| path.exists());
+    assert_eq!(harness.state().state.rig.target.pivot.x, 3.0);
+}

@@ -1,0 +1,61 @@
+//! Windows without a graphics adapter, for tests of what they show and do.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use egui_kittest::Harness;
+use vecrad::{
+    solver::SolveSettings,
+    viewer::{
+        Options, action::Action, app::App, loader::SceneSource, start::Faults, state::RunStatus,
+    },
+};
+
+/// Longest wait for a small scene on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A window that opens with these options.
+pub(crate) fn window(options: Options) -> Harness<'static, App> {
+    Harness::builder()
+        .with_size([1280.0, 900.0])
+        .build_eframe(move |cc| {
+            App::new(cc, options, Arc::new(Faults::default())).expect("threads can be had")
+        })
+}
+
+/// A window that lights the two plates: a moment's work.
+pub(crate) fn plates() -> Harness<'static, App> {
+    let mut harness = window(Options {
+        source: Some(SceneSource::Builtin("plates".to_owned())),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    harness
+}
+
+/// Frames until something holds.
+pub(crate) fn wait_for(harness: &mut Harness<'static, App>, holds: impl Fn(&App) -> bool) {
+    let begin = Instant::now();
+    while !holds(harness.state()) {
+        assert!(
+            begin.elapsed() < PATIENCE,
+            "{:?}",
+            harness.state().state.run.status
+        );
+        std::thread::sleep(Duration::from_millis(10));
+        harness.step();
+    }
+    harness.run_steps(3);
+}
+
+/// Do what the user would have asked for.
+pub(crate) fn perform(harness: &mut Harness<'static, App>, action: Action) {
+    let ctx = harness.ctx.clone();
+    harness.state_mut().perform(&ctx, action);
+    harness.run_steps(2);
+}
