@@ -71,6 +71,12 @@ impl Closure {
         deviation: 0.0,
     };
 
+    /// Anything between nothing and all.
+    const UNKNOWN: Self = Self {
+        share: 0.0,
+        deviation: f32::INFINITY,
+    };
+
     /// From how many of some rays met a lit side.
     fn of(hits: u32, rays: usize) -> Self {
         // Half a hit and half a miss more, so that no finite number of rays proves a certainty.
@@ -132,6 +138,17 @@ impl Closures {
             element = hierarchy.mesh.elements[element].parent as usize;
         }
         element
+    }
+
+    /// Where nothing blocks: of a closed surface all are 1; in the open they are not known, and form factors are left as
+    /// they are.
+    pub(super) fn in_clear(hierarchy: &Hierarchy, is_closed: bool) -> Self {
+        let closure = if is_closed {
+            Closure::CLOSED
+        } else {
+            Closure::UNKNOWN
+        };
+        Self(vec![closure; hierarchy.patches.len()])
     }
 
     /// Whether nothing was probed yet.

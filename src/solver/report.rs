@@ -68,7 +68,7 @@ impl Solver {
     /// Sums of form factors: what leaves receive when everything sends 1.
     fn fill_row_sums(&self, report: &mut StepReport) {
         let (mut least, mut most, mut sum) = (f32::INFINITY, 0.0f32, 0.0f64);
-        for leaf in self.hierarchy.mesh.leaves() {
+        for leaf in self.hierarchy.mesh.held_leaves() {
             let row = self.linked[leaf].w;
             least = least.min(row);
             most = most.max(row);

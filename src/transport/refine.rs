@@ -92,6 +92,10 @@ pub struct Refiner<'a, F> {
     pub cancelled: &'a (dyn Fn() -> bool + Sync),
     /// How many links there may be.
     pub budget: LinkBudget,
+    /// Whether only elements are linked, no clusters.
+    pub is_by_patch: bool,
+    /// Whether nothing blocks and elements are divided where light is found to bend, not for their links.
+    pub follows_light: bool,
 }
 
 /// Counts links as they are made, on all threads.
@@ -116,7 +120,7 @@ impl LinkBudget {
 }
 
 /// What becomes of a pair.
-enum Decision {
+pub(super) enum Decision {
     Drop,
     Keep(Link),
     DivideSource,
@@ -143,7 +147,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         (self.cancelled)() || self.budget.is_spent()
     }
 
-    fn hierarchy(&self) -> &'a Hierarchy {
+    pub(super) fn hierarchy(&self) -> &'a Hierarchy {
         self.judge.kernel.hierarchy
     }
 
@@ -293,6 +297,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         out: &mut Refinement,
     ) -> Decision {
         let weight = self.weight(receiver);
+        if let Some(decision) = self.decide_by_plan(source, receiver, weight) {
+            return decision;
+        }
         if source == receiver {
             return self.decide_self(source, weight, known, out);
         }
@@ -423,7 +430,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         (share as f32).sqrt()
     }
 
-    fn random(&self, source: NodeId, receiver: NodeId) -> Random {
+    pub(super) fn random(&self, source: NodeId, receiver: NodeId) -> Random {
         Random::new(
             self.seed,
             (u64::from(receiver.0) << 32) | u64::from(source.0),

@@ -1,0 +1,201 @@
+//! What can face what: tests of planes against the boxes of the light tree, before any light is computed.
+//!
+//! Two patches exchange light only where each has a part before the plane of the other. What no chain of such pairs
+//! joins to an emitter stays dark, whatever stands between. And where everything that light is computed for lies on one
+//! side of the plane of each triangle, nothing stands between anything: the triangle can at most touch a line of sight.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{Patch, PatchTree};
+use crate::{geometry::centroid, scene::Scene};
+
+/// What is nearer to a plane than this lies in it, in frame units. Positions are rounded to 4e-6 there and normals tilted
+/// by 6e-8, over 100 units: below 2e-5 flat walls would rise over themselves. Rays start at twice this distance, so they
+/// cannot tell either. What it leaves out is the light between surfaces that rise over each other by less than a
+/// two-millionth of the scene.
+const IN_PLANE: f32 = 5e-5;
+
+/// Nodes of the tree that are looked at for one patch. Fewer, and patches that nothing lights are kept; more, and scenes of
+/// many sheets wait.
+const MOST_VISITS: u32 = 128;
+
+/// Rounds of the flood. Light that needs more chained pairs is taken to reach everything: usual scenes need three.
+const MOST_ROUNDS: u32 = 32;
+
+/// Of so many triangles one is looked at first, for one that stands between others: most scenes have many.
+const FIRST_LOOK: usize = 64;
+
+/// A plane, and the side before it.
+#[derive(Clone, Copy)]
+struct Plane {
+    point: Vec3,
+    normal: Vec3,
+}
+
+impl Plane {
+    fn of(scene: &Scene, patch: &Patch) -> Self {
+        Self {
+            point: centroid(scene.corners(patch.triangle)),
+            normal: patch.normal,
+        }
+    }
+
+    fn behind(self) -> Self {
+        Self {
+            normal: -self.normal,
+            ..self
+        }
+    }
+
+    /// Whether any part of a patch rises before the plane.
+    fn sees(self, scene: &Scene, patch: &Patch) -> bool {
+        let height = |corner: Vec3| (corner - self.point).dot(self.normal);
+        let corners = scene.corners(patch.triangle);
+        corners.into_iter().any(|corner| height(corner) > IN_PLANE)
+    }
+
+    /// Whether a box may.
+    fn sees_box(self, min: Vec3, max: Vec3) -> bool {
+        let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
+        (middle - self.point).dot(self.normal) + half.dot(self.normal.abs()) > IN_PLANE
+    }
+}
+
+/// Some patches, and the clusters that hold any of them.
+struct Marked {
+    patches: Vec<bool>,
+    clusters: Vec<bool>,
+}
+
+impl PatchTree {
+    /// Which patches light may be exchanged with: those that no chain of patches that face each other joins to an emitter
+    /// are false, and so are emitters that nothing faces. Conservative: true where it takes long to tell.
+    pub fn lit(&self, scene: &Scene) -> Vec<bool> {
+        let emits = |patch: &Patch| patch.emission != Vec3::ZERO;
+        let all = self.marked(|_| true);
+        let mut lit: Vec<bool> = self
+            .patches
+            .par_iter()
+            .map(|patch| emits(patch) && self.faces_any(scene, patch, &all))
+            .collect();
+        let mut senders = self.marked(|index| lit[index]);
+        let mut dark: Vec<usize> = (0..lit.len()).filter(|&index| !lit[index]).collect();
+        for _ in 0..MOST_ROUNDS {
+            let (reached, rest): (Vec<usize>, Vec<usize>) = dark
+                .into_par_iter()
+                .partition(|&index| self.faces_any(scene, &self.patches[index], &senders));
+            for &index in &reached {
+                lit[index] = true;
+            }
+            dark = rest;
+            if dark.is_empty() || reached.is_empty() {
+                return lit;
+            }
+            let mut sends = vec![false; lit.len()];
+            for index in reached {
+                sends[index] = self.patches[index].reflectance != Vec3::ZERO;
+            }
+            senders = self.marked(|index| sends[index]);
+        }
+        vec![true; lit.len()]
+    }
+
+    fn marked(&self, is_marked: impl Fn(usize) -> bool) -> Marked {
+        let patches: Vec<bool> = (0..self.patches.len()).map(is_marked).collect();
+        let mut clusters = vec![false; self.clusters.len()];
+        for (index, cluster) in self.clusters.iter().enumerate().rev() {
+            clusters[index] = if cluster.is_leaf() {
+                patches[cluster.patches()].contains(&true)
+            } else {
+                let first = cluster.first_child as usize;
+                clusters[first] || clusters[first + 1]
+            };
+        }
+        Marked { patches, clusters }
+    }
+
+    /// Whether a patch faces one of the marked patches, or it would take long to tell.
+    fn faces_any(&self, scene: &Scene, patch: &Patch, marked: &Marked) -> bool {
+        let plane = Plane::of(scene, patch);
+        let mut visits = 0;
+        let mut pending = vec![0usize];
+        while let Some(index) = pending.pop() {
+            let cluster = &self.clusters[index];
+            if !marked.clusters[index] || !plane.sees_box(cluster.min, cluster.max) {
+                continue;
+            }
+            visits += 1;
+            if visits > MOST_VISITS {
+                return true;
+            }
+            if !cluster.is_leaf() {
+                pending.extend([0, 1].map(|child| cluster.first_child as usize + child));
+                continue;
+            }
+            let faces = |other: usize| {
+                let other = &self.patches[other];
+                plane.sees(scene, other) && Plane::of(scene, other).sees(scene, patch)
+            };
+            if cluster
+                .patches()
+                .any(|other| marked.patches[other] && faces(other))
+            {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether no triangle of the scene can stand between two patches of the tree: none has parts of them on both sides.
+    pub fn is_clear(&self, scene: &Scene) -> bool {
+        let blocks = |&triangle: &u32| {
+            let corners = scene.corners(crate::scene::TriangleId(triangle));
+            let area_vector = scene.surfaces[triangle as usize].area_vector;
+            let plane = Plane {
+                point: centroid(corners),
+                normal: area_vector.as_dvec3().normalize_or_zero().as_vec3(),
+            };
+            self.rises(scene, plane) && self.rises(scene, plane.behind())
+        };
+        let count = scene.triangles.len() as u32;
+        let first: Vec<u32> = (0..count).step_by(FIRST_LOOK).collect();
+        !first.par_iter().any(blocks) && !(0..count).into_par_iter().any(|at| blocks(&at))
+    }
+
+    /// Whether any held patch has a part before a plane.
+    fn rises(&self, scene: &Scene, plane: Plane) -> bool {
+        let mut pending = vec![0usize];
+        while let Some(index) = pending.pop() {
+            let cluster = &self.clusters[index];
+            if !plane.sees_box(cluster.min, cluster.max) {
+                continue;
+            }
+            if !cluster.is_leaf() {
+                pending.extend([0, 1].map(|child| cluster.first_child as usize + child));
+            } else if self.patches[cluster.patches()]
+                .iter()
+                .any(|patch| plane.sees(scene, patch))
+            {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether the held patches close a surface: each edge between two points belongs to two of them that run along it in
+    /// opposite senses.
+    pub fn is_closed(&self, scene: &Scene) -> bool {
+        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(self.held().len() * 3);
+        for patch in &self.patches[self.held()] {
+            let [a, b, c] = scene.triangles[patch.triangle.index()].corners;
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                edges.push((from.min(to), from.max(to), (from < to) != patch.is_back));
+            }
+        }
+        edges.par_sort_unstable();
+        edges
+            .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
+            .all(|run| matches!(run, [(.., false), (.., true)]))
+    }
+}
