@@ -162,7 +162,7 @@ impl DirectField {
     }
 
     /// Direct irradiance at a corner of a leaf.
-    fn corner(&self, vertex: u32) -> Vec4 {
+    pub(super) fn corner(&self, vertex: u32) -> Vec4 {
         self.vertices
             .get(vertex as usize)
             .copied()

@@ -4,8 +4,10 @@
 //! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::{
+    Solver,
     adapt::{Limits, SPREAD_SHARE, share_root},
     direct::{Lights, Receiver},
     reconstruct::INSET,
@@ -51,5 +53,48 @@ impl Lights {
         let spread = corners.max_element() - corners.min_element();
         let mean = self.mean_power(hierarchy).max(f32::MIN_POSITIVE);
         (bend + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
+    }
+}
+
+impl Solver {
+    /// By how much the radiosity of each leaf varies over it (half the range of its corners, luminance), as direct light is
+    /// now and linked light was when it was last gathered. Of leaves divided since, the parts vary by half.
+    pub(super) fn radiosity_spreads(&self) -> Vec<f32> {
+        let range = |corners: [f32; 3]| {
+            let [least, most] =
+                [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
+            most - least
+        };
+        let hierarchy = &self.hierarchy;
+        let elements = &hierarchy.mesh.elements;
+        let mut linked = vec![0.0; elements.len()];
+        for light in &self.leaves {
+            linked[light.element as usize] = range(light.corners.map(luminance));
+        }
+        for index in 0..elements.len() {
+            for child in elements[index].children() {
+                linked[child] = f32::max(linked[child], linked[index] * 0.5);
+            }
+        }
+        let spread = |index: usize| {
+            let direct = self.direct.as_ref().map_or(0.0, |field| {
+                range(
+                    elements[index]
+                        .vertices
+                        .map(|vertex| luminance(field.corner(vertex))),
+                )
+            });
+            let reflectance = luminance(hierarchy.patch_of(index).reflectance.extend(0.0));
+            0.5 * reflectance * (linked[index] + direct)
+        };
+        let held = (0..elements.len()).into_par_iter();
+        held.map(|index| {
+            if elements[index].is_leaf() {
+                spread(index)
+            } else {
+                0.0
+            }
+        })
+        .collect()
     }
 }

@@ -395,6 +395,11 @@ impl Solver {
         while passes < MOST_PASSES {
             let is_first = self.links.is_empty();
             let most_links = self.most_links();
+            let spreads = if self.plan.follows_light {
+                self.radiosity_spreads()
+            } else {
+                Vec::new()
+            };
             let refinement = {
                 let powers = PatchSums::of_power(&self.hierarchy, &self.power);
                 let sampler = PairSampler {
@@ -423,6 +428,7 @@ impl Solver {
                     budget: LinkBudget::new(most_links),
                     is_by_patch: self.plan.is_by_patch,
                     follows_light: self.plan.follows_light,
+                    spreads: &spreads,
                 };
                 refiner.refine(is_first)
             };

@@ -5,14 +5,16 @@
 //! factor varies, which matters only for what it reflects: what is shown is evaluated at its corners. So a pair can be
 //! kept that bounds from spheres would divide again and again, and elements are left to be divided where light bends.
 
+use glam::Vec3;
+
 use super::{
     Judgement, Link, PairSampler,
     kernel::element_form_factor,
     luminance,
-    refine::{Decision, Refiner},
+    refine::{Decision, Refinement, Refiner},
 };
 use crate::{
-    geometry::{Random, point_irradiance},
+    geometry::{Random, centroid, point_irradiance},
     hierarchy::{Hierarchy, Kind, NodeId},
 };
 
@@ -30,9 +32,14 @@ const FAR_CHANGE: f32 = 4.0;
 /// Where on the way to its corners a receiver is looked at, beside its centroid.
 const TOWARDS_CORNER: f32 = 0.6;
 
-/// Share of the change over the receiver that counts as error: what one part gets too little another gets too much, so
-/// that only near by it is seen in what they reflect. Smaller blurs corners, larger links what is not seen.
-const CHANGE_SHARE: f32 = 0.25;
+/// Where a form factor changes by more than this share of its mean, more points are taken: it is peaked where receiver and
+/// source touch, and a few points inside miss some of that.
+const PEAKED: f32 = 0.5;
+
+/// Errors in view are estimates, where those of other pairs are bounds that are hardly ever reached: to be as good, pairs
+/// must keep this share of the threshold. Larger, and light from uneven walls smears into the corners of a room; smaller,
+/// and time goes into what is not seen.
+const ESTIMATE_SHARE: f32 = 0.02;
 
 /// The unoccluded form factor from points of a receiver to a source.
 struct InView {
@@ -42,6 +49,14 @@ struct InView {
 }
 
 impl InView {
+    /// Of a pair that has a link: near its source a leaf may see as much more as it sees on average.
+    fn known(form_factor: f32) -> Self {
+        Self {
+            mean: form_factor,
+            change: form_factor,
+        }
+    }
+
     fn between(hierarchy: &Hierarchy, source: usize, receiver: usize) -> Self {
         let (from, to) = (
             &hierarchy.mesh.elements[source],
@@ -57,13 +72,29 @@ impl InView {
                 change: middle * (FAR_CHANGE * to.radius / distance).min(1.0),
             };
         }
-        let corners = hierarchy.mesh.corners(receiver);
-        let around = corners.map(|corner| at(to.centroid.lerp(corner, TOWARDS_CORNER)));
-        let least = around.into_iter().fold(middle, f32::min);
-        let most = around.into_iter().fold(middle, f32::max);
+        let [a, b, c] = hierarchy.mesh.corners(receiver);
+        let around = |corners: [Vec3; 3]| {
+            let middle = centroid(corners);
+            corners.map(|corner| at(middle.lerp(corner, TOWARDS_CORNER)))
+        };
+        let coarse = around([a, b, c]);
+        let least = coarse.into_iter().fold(middle, f32::min);
+        let most = coarse.into_iter().fold(middle, f32::max);
+        let mean = (middle + coarse.iter().sum::<f32>()) * 0.25;
+        let change = most - least;
+        if change <= PEAKED * mean {
+            return Self { mean, change };
+        }
+        // Four quarters, each by its own points.
+        let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
+        let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
+        let sum: f32 = quarters
+            .into_iter()
+            .map(|quarter| at(centroid(quarter)) + around(quarter).iter().sum::<f32>())
+            .sum();
         Self {
-            mean: (middle + around.iter().sum::<f32>()) * 0.25,
-            change: most - least,
+            mean: sum / 16.0,
+            change,
         }
     }
 }
@@ -74,7 +105,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         &self,
         source: NodeId,
         receiver: NodeId,
+        known: Option<&Link>,
         weight: f32,
+        out: &mut Refinement,
     ) -> Option<Decision> {
         let kinds = [source, receiver].map(|node| self.hierarchy().kind(node));
         match kinds {
@@ -87,7 +120,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 match self.judge.judge(source, receiver, &mut random) {
                     Judgement::Nothing => Some(Decision::Drop),
                     Judgement::Transfer { bound, .. } => {
-                        Some(self.decide_in_view(from, to, weight, bound))
+                        Some(self.decide_in_view([from, to], known, weight, bound, out))
                     }
                 }
             }
@@ -95,30 +128,52 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 
-    /// What becomes of two elements in full view of each other.
-    fn decide_in_view(&self, from: usize, to: usize, weight: f32, bound: f32) -> Decision {
+    /// What becomes of two elements in full view of each other; `known` is their link if they have one.
+    fn decide_in_view(
+        &self,
+        [from, to]: [usize; 2],
+        known: Option<&Link>,
+        weight: f32,
+        bound: f32,
+        out: &mut Refinement,
+    ) -> Decision {
         let hierarchy = self.hierarchy();
         let (source, receiver) = (&hierarchy.mesh.elements[from], &hierarchy.mesh.elements[to]);
-        let tables = self.judge.kernel.tables;
-        let seen = InView::between(hierarchy, from, to);
-        let mean = luminance(tables.elements[from]);
-        let spread = (luminance(tables.brightest_in_elements[from]) - mean).max(0.0);
+        let seen = match known {
+            // What a leaf receives stays as it is, and only the source may have become uneven.
+            Some(link) if receiver.is_leaf() => InView::known(link.form_factor),
+            _ => InView::between(hierarchy, from, to),
+        };
         let reflected = luminance(hierarchy.patch_of(to).reflectance.extend(0.0));
-        let of_source = spread * (seen.mean + seen.change);
-        let of_receiver = CHANGE_SHARE * reflected * mean * seen.change;
-        let exceeds = |error: f32| error * weight > self.threshold;
+        let mean = luminance(self.judge.kernel.tables.elements[from]);
+        let of_source = self.unevenness(from) * (seen.mean + seen.change);
+        let of_receiver = reflected * mean * seen.change;
+        let exceeds = |error: f32| error * weight > ESTIMATE_SHARE * self.threshold;
         if !source.is_leaf() && exceeds(of_source) {
-            Decision::DivideSource
-        } else if !receiver.is_leaf() && exceeds(of_receiver) {
-            Decision::DivideReceiver
-        } else {
-            Decision::Keep(Link {
-                source: NodeId((hierarchy.clusters.len() + from) as u32),
-                visibility: 1.0,
-                error: bound,
-                form_factor: seen.mean,
-            })
+            return Decision::DivideSource;
         }
+        if !receiver.is_leaf() && exceeds(of_receiver) {
+            return Decision::DivideReceiver;
+        }
+        if exceeds(of_source) && source.area_vector.length() * 0.25 >= self.min_area {
+            out.wanted.push(from as u32);
+        }
+        Decision::Keep(Link {
+            source: NodeId((hierarchy.clusters.len() + from) as u32),
+            visibility: 1.0,
+            error: bound,
+            form_factor: seen.mean,
+        })
+    }
+
+    /// By how much the radiosity of an element is above its mean somewhere.
+    fn unevenness(&self, element: usize) -> f32 {
+        let tables = self.judge.kernel.tables;
+        if self.hierarchy().mesh.elements[element].is_leaf() {
+            return self.spreads.get(element).copied().unwrap_or(0.0);
+        }
+        let brightest = luminance(tables.brightest_in_elements[element]);
+        (brightest - luminance(tables.elements[element])).max(0.0)
     }
 }
 

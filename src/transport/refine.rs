@@ -96,6 +96,8 @@ pub struct Refiner<'a, F> {
     pub is_by_patch: bool,
     /// Whether nothing blocks and elements are divided where light is found to bend, not for their links.
     pub follows_light: bool,
+    /// By how much the radiosity of each leaf varies over it (luminance); needed where `follows_light`.
+    pub spreads: &'a [f32],
 }
 
 /// Counts links as they are made, on all threads.
@@ -297,7 +299,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         out: &mut Refinement,
     ) -> Decision {
         let weight = self.weight(receiver);
-        if let Some(decision) = self.decide_by_plan(source, receiver, weight) {
+        if let Some(decision) = self.decide_by_plan(source, receiver, known, weight, out) {
             return decision;
         }
         if source == receiver {
