@@ -345,7 +345,7 @@ pub enum KeepFlag {
     Rays,
     /// Elements where light does not bend and nothing casts a shadow
     Elements,
-    /// Links of clusters where there are few patches
+    /// Links of clusters where nothing casts a shadow and there are few patches
     Clusters,
 }
 

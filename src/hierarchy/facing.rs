@@ -199,3 +199,118 @@ impl PatchTree {
             .all(|run| matches!(run, [(.., false), (.., true)]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Material, MaterialId, SceneBuilder, SceneOptions, Sides};
+
+    const LIGHT: u32 = 0;
+    const WHITE: u32 = 1;
+    const BLACK: u32 = 2;
+
+    /// Parallelograms by corner and two edges; the front looks along the edges' product.
+    fn scene(sides: Sides, faces: &[(u32, [f64; 3], [f64; 3], [f64; 3])]) -> Scene {
+        let mut builder = SceneBuilder::default();
+        let half = Vec3::splat(0.5);
+        builder.push_material(Material::plain("light", half, Vec3::ONE));
+        builder.push_material(Material::plain("white", half, Vec3::ZERO));
+        builder.push_material(Material::plain("black", Vec3::ZERO, Vec3::ZERO));
+        for &(material, corner, u, v) in faces {
+            let [corner, u, v] = [corner, u, v].map(DVec3::from_array);
+            let corners = [corner, corner + u, corner + u + v, corner + v];
+            let [a, b, c, d] = corners.map(|corner| builder.push_position(corner));
+            builder.push_triangle([a, b, c], MaterialId(material));
+            builder.push_triangle([a, c, d], MaterialId(material));
+        }
+        let options = SceneOptions {
+            sides,
+            ..SceneOptions::default()
+        };
+        builder.finish(&options).unwrap()
+    }
+
+    fn tree(scene: &Scene) -> PatchTree {
+        PatchTree::build(scene, &|| false).unwrap()
+    }
+
+    /// For each parallelogram, whether light may reach its front.
+    fn fronts(scene: &Scene) -> Vec<bool> {
+        let tree = tree(scene);
+        let lit = tree.lit(scene);
+        let mut fronts = vec![false; scene.triangles.len() / 2];
+        for (patch, is_lit) in tree.patches.iter().zip(lit) {
+            fronts[patch.triangle.index() / 2] |= is_lit && !patch.is_back;
+        }
+        fronts
+    }
+
+    const X: [f64; 3] = [1.0, 0.0, 0.0];
+    const Y: [f64; 3] = [0.0, 1.0, 0.0];
+    const Z: [f64; 3] = [0.0, 0.0, 1.0];
+
+    /// A lamp at the left looks right at a wall; a third face sees the wall only.
+    fn chain(wall: u32) -> Scene {
+        scene(
+            Sides::One,
+            &[
+                (LIGHT, [0.0, 0.0, 0.0], Y, Z),
+                (wall, [2.0, 0.0, 0.0], Z, Y),
+                (WHITE, [-2.0, 0.0, 0.0], Y, Z),
+                (WHITE, [-4.0, 0.0, 0.0], Z, Y),
+            ],
+        )
+    }
+
+    #[test]
+    fn light_goes_on_from_white_walls_and_not_from_black_ones() {
+        // The third face looks right, at the back of the lamp and at the wall; the fourth looks away from all.
+        assert_eq!(fronts(&chain(WHITE)), [true, true, true, false]);
+        assert_eq!(fronts(&chain(BLACK)), [true, true, false, false]);
+    }
+
+    #[test]
+    fn an_emitter_that_nothing_faces_is_not_lit() {
+        let faces = [
+            (LIGHT, [0.0, 0.0, 0.0], Y, Z),
+            (WHITE, [-2.0, 0.0, 0.0], Y, Z),
+        ];
+        assert_eq!(fronts(&scene(Sides::One, &faces)), [false, false]);
+    }
+
+    #[test]
+    fn the_outside_of_a_box_is_dark_and_its_inside_clear_and_closed() {
+        let one = [1.0, 1.0, 1.0];
+        let back = |[x, y, z]: [f64; 3]| [-x, -y, -z];
+        let walls = [
+            (LIGHT, [0.0; 3], X, Y),
+            (WHITE, [0.0; 3], Y, Z),
+            (WHITE, [0.0; 3], Z, X),
+            (WHITE, one, back(Y), back(X)),
+            (WHITE, one, back(Z), back(Y)),
+            (WHITE, one, back(X), back(Z)),
+        ];
+        let room = scene(Sides::Two, &walls);
+        let both = tree(&room);
+        let lit = both.lit(&room);
+        let dark: Vec<bool> = lit.iter().map(|lit| !lit).collect();
+        for (patch, &is_dark) in both.patches.iter().zip(&dark) {
+            assert_eq!(patch.is_back, is_dark);
+        }
+        assert!(!both.is_closed(&room), "two sides share each edge");
+        let inside = both.without(&room, &dark, &|| false).unwrap();
+        assert_eq!(inside.held(), 0..12);
+        assert_eq!(inside.patches.len(), 24);
+        assert!(inside.is_clear(&room) && inside.is_closed(&room));
+
+        let open = scene(Sides::One, &walls[1..]);
+        assert!(tree(&open).is_clear(&open) && !tree(&open).is_closed(&open));
+
+        // A speck in the middle has parts of the room on both sides.
+        let speck = (BLACK, [0.5, 0.5, 0.5], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]);
+        let furnished = scene(Sides::One, &[&walls[..], &[speck]].concat());
+        assert!(!tree(&furnished).is_clear(&furnished));
+    }
+}

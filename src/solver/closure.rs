@@ -55,6 +55,10 @@ const LEAST_ROW: f32 = 0.3;
 /// larger, and coarse links stay too bright.
 const SURPLUS: f32 = 0.1;
 
+/// How far a closure that was not found by rays may be off. Smaller, and it is trusted more than a few points of a patch
+/// tell; larger, and coarse links stay as wrong as they are.
+const ESTIMATE_DEVIATION: f32 = 0.01;
+
 /// How much of a cell's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Closure {
@@ -66,13 +70,13 @@ pub(super) struct Closure {
 
 impl Closure {
     /// Surrounded by lit surfaces.
-    const CLOSED: Self = Self {
+    pub(super) const CLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
     };
 
-    /// Anything between nothing and all.
-    const UNKNOWN: Self = Self {
+    /// Anything between nothing and all: form factors are left as they are.
+    pub(super) const UNKNOWN: Self = Self {
         share: 0.0,
         deviation: f32::INFINITY,
     };
@@ -140,15 +144,23 @@ impl Closures {
         element
     }
 
-    /// Where nothing blocks: of a closed surface all are 1; in the open they are not known, and form factors are left as
-    /// they are.
-    pub(super) fn in_clear(hierarchy: &Hierarchy, is_closed: bool) -> Self {
-        let closure = if is_closed {
-            Closure::CLOSED
-        } else {
-            Closure::UNKNOWN
-        };
+    /// The same closure of all patches.
+    pub(super) fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
         Self(vec![closure; hierarchy.patches.len()])
+    }
+
+    /// Closures of all patches that are the sums of their form factors as `row` estimates them.
+    pub(super) fn estimated(hierarchy: &Hierarchy, row: impl Fn(usize) -> f32 + Sync) -> Self {
+        let closure = |patch: usize| Closure {
+            share: row(patch).clamp(0.0, 1.0),
+            deviation: ESTIMATE_DEVIATION,
+        };
+        Self(
+            (0..hierarchy.patches.len())
+                .into_par_iter()
+                .map(closure)
+                .collect(),
+        )
     }
 
     /// Whether nothing was probed yet.

@@ -7,10 +7,11 @@
 mod adapt;
 mod anderson;
 mod budget;
+mod clear;
 mod closure;
 mod direct;
 mod display;
-mod even;
+
 mod gather;
 mod inspect;
 mod inspection;
@@ -188,9 +189,12 @@ impl Solver {
 
     /// Probe closures, on the first mesh.
     fn probe_closures(&mut self, cancel: &Cancel) -> Option<()> {
+        if !self.closures.is_empty() {
+            return Some(());
+        }
         if self.plan.is_clear {
-            self.closures = Closures::in_clear(&self.hierarchy, self.plan.is_closed);
-        } else if self.closures.is_empty() {
+            self.closures = self.closures_in_clear();
+        } else {
             let seed = self.settings.seed;
             let (closures, shot) = closure::closures(&self.hierarchy, &self.rays, seed, cancel)?;
             self.closures = closures;

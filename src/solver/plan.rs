@@ -9,8 +9,10 @@
 //! | `unlit` | patches | no chain of patches that face each other leads to an emitter | none: they stay as dark as they are |
 //! | `rays` | the ray tree and all rays | no triangle has parts of the scene on both sides | none: no ray would be blocked |
 //! | `elements` | elements, links | as `rays`: light has no shadows, and bends only where it is seen to | that of the tolerances |
-//! | `clusters` | links of clusters | few patches: all pairs are cheaper than good clusters | none: pairs of patches are exact |
+//! | `clusters` | links of clusters | as `rays`, and few patches: all pairs of them are exact and cheap | that of the tolerances |
 //!
+//! Looked at and not left out, since it does not pay: rays of single pairs whose shaft is empty, channels of grey scenes,
+//! clusters of small scenes with shadows.
 //! Beside these, some things are left out by loading, whatever is kept; they are listed after the plan.
 
 use std::sync::Arc;
@@ -36,7 +38,7 @@ pub enum Omission {
     Rays,
     /// Elements where light does not bend, where nothing casts a shadow.
     Elements,
-    /// Clusters, where there are few patches.
+    /// Clusters, where there are few patches and nothing stands between them.
     Clusters,
 }
 
@@ -146,11 +148,11 @@ impl Plan {
         if may_omit(Omission::Rays) && tree.is_clear(scene) {
             plan.omit_rays(scene, &tree);
             if may_omit(Omission::Elements) {
-                plan.omit_elements();
+                plan.omit_elements(&tree);
             }
-        }
-        if may_omit(Omission::Clusters) && tree.held().len() <= FEW_PATCHES {
-            plan.omit_clusters(&tree);
+            if may_omit(Omission::Clusters) && tree.held().len() <= FEW_PATCHES {
+                plan.omit_clusters(&tree);
+            }
         }
         Arc::make_mut(&mut plan.left_out).extend(left_out_by_loading(scene));
         Some((plan, tree))
@@ -207,12 +209,15 @@ impl Plan {
         );
     }
 
-    fn omit_elements(&mut self) {
+    fn omit_elements(&mut self, tree: &PatchTree) {
         self.follows_light = true;
         self.note(
             Omission::Elements,
-            1,
-            "elements where light does not bend, and links between them".to_owned(),
+            tree.held().len(),
+            format!(
+                "elements of {} patches where light does not bend, and links between them",
+                tree.held().len()
+            ),
             "nothing casts a shadow, and between elements in full view form factors are known exactly",
             "light differs by no more than the tolerances of mesh and links",
         );
@@ -224,7 +229,7 @@ impl Plan {
             Omission::Clusters,
             tree.clusters.len(),
             format!("links of {} clusters", tree.clusters.len()),
-            "there are so few patches that all pairs of them can be linked",
+            "there are so few patches, all in full view, that all pairs of them can be linked",
             "light differs by no more than the tolerance of links",
         );
     }

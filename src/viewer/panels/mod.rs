@@ -4,6 +4,7 @@ pub mod clusters;
 pub mod emission;
 pub mod error;
 pub mod help;
+pub mod left_out;
 pub mod legend;
 pub mod links;
 pub mod menu;

@@ -1,4 +1,5 @@
-//! Where nothing casts a shadow: over which elements the light of sampled emitters is as good as linear.
+//! Where nothing casts a shadow: over which elements the light of sampled emitters is as good as linear, how much light
+//! varies over others, and which part of a view is filled.
 //!
 //! Elements are divided where their corners do not tell what lies between. Shadows could hide from all of them, and so
 //! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
@@ -9,10 +10,14 @@ use rayon::prelude::*;
 use super::{
     Solver,
     adapt::{Limits, SPREAD_SHARE, share_root},
+    closure::{Closure, Closures},
     direct::{Lights, Receiver},
     reconstruct::INSET,
 };
-use crate::{hierarchy::Hierarchy, transport::luminance};
+use crate::{
+    hierarchy::{Hierarchy, Kind, NodeId},
+    transport::luminance,
+};
 
 /// Places on a triangle, barycentric: the middles of its sides and those of its quarters.
 const PLACES: [Vec3; 7] = [
@@ -24,6 +29,17 @@ const PLACES: [Vec3; 7] = [
     Vec3::new(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
     Vec3::new(1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0),
 ];
+
+/// Places at which a closure is summed, barycentric: a rule of degree 2.
+const CLOSURE_PLACES: [Vec3; 3] = [
+    Vec3::new(2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0),
+    Vec3::new(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
+    Vec3::new(1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0),
+];
+
+/// Clusters further away than this many of their radii are read from tables for closures. Nearer, and tables err by more
+/// than a hundredth; further, and single patches are looked at.
+const FAR_RADII: f32 = 6.0;
 
 impl Lights {
     /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
@@ -57,6 +73,44 @@ impl Lights {
 }
 
 impl Solver {
+    /// Closures without rays: 1 on closed surfaces, not needed where all form factors are exact, and else the sums of
+    /// those of what is far enough to be read from tables, or small enough to be exact.
+    pub(super) fn closures_in_clear(&self) -> Closures {
+        let hierarchy = &self.hierarchy;
+        if self.plan.is_closed {
+            return Closures::even(hierarchy, Closure::CLOSED);
+        }
+        if self.plan.is_by_patch {
+            return Closures::even(hierarchy, Closure::UNKNOWN);
+        }
+        Closures::estimated(hierarchy, |patch| {
+            let [a, b, c] = hierarchy.mesh.corners(patch);
+            let normal = hierarchy.patches[patch].normal;
+            let points = CLOSURE_PLACES.map(|at| a * at.x + b * at.y + c * at.z);
+            points
+                .map(|point| self.row(point, normal))
+                .iter()
+                .sum::<f32>()
+                / 3.0
+        })
+    }
+
+    /// Sum of the form factors from a point of unit normal to everything, as if nothing blocked.
+    fn row(&self, point: Vec3, normal: Vec3) -> f32 {
+        let (hierarchy, kernel) = (&self.hierarchy, self.kernel());
+        let mut sum = 0.0;
+        let mut pending = vec![Hierarchy::ROOT];
+        while let Some(node) = pending.pop() {
+            let reach = FAR_RADII * hierarchy.radius(node);
+            let is_far = hierarchy.centroid(node).distance_squared(point) > reach * reach;
+            match hierarchy.kind(node) {
+                Kind::Cluster(_) if !is_far => pending.extend(hierarchy.children(node).map(NodeId)),
+                _ => sum += kernel.irradiance(node, point, normal).w,
+            }
+        }
+        sum
+    }
+
     /// By how much the radiosity of each leaf varies over it (half the range of its corners, luminance), as direct light is
     /// now and linked light was when it was last gathered. Of leaves divided since, the parts vary by half.
     pub(super) fn radiosity_spreads(&self) -> Vec<f32> {
@@ -87,8 +141,8 @@ impl Solver {
             let reflectance = luminance(hierarchy.patch_of(index).reflectance.extend(0.0));
             0.5 * reflectance * (linked[index] + direct)
         };
-        let held = (0..elements.len()).into_par_iter();
-        held.map(|index| {
+        let all = (0..elements.len()).into_par_iter();
+        all.map(|index| {
             if elements[index].is_leaf() {
                 spread(index)
             } else {
