@@ -11,15 +11,18 @@
 //! | `elements` | elements, links | as `rays`: light has no shadows, and bends only where it is seen to | that of the tolerances |
 //! | `clusters` | links of clusters | as `rays`, and few patches: all pairs of them are exact and cheap | that of the tolerances |
 //!
+//! The last two are for the default method and oracle: whoever asks for others wants to see what they do.
+//!
 //! Looked at and not left out, since it does not pay: rays of single pairs whose shaft is empty, channels of grey scenes,
 //! clusters of small scenes with shadows.
+//!
 //! Beside these, some things are left out by loading, whatever is kept; they are listed after the plan.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::SolveSettings;
+use super::{Method, Oracle, SolveSettings};
 use crate::{
     hierarchy::PatchTree,
     scene::{Scene, WarningKind},
@@ -147,10 +150,14 @@ impl Plan {
         }
         if may_omit(Omission::Rays) && tree.is_clear(scene) {
             plan.omit_rays(scene, &tree);
-            if may_omit(Omission::Elements) {
+            // Who asks for the paper's way wants to see what it does.
+            let is_exact_wanted =
+                settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
+            if may_omit(Omission::Elements) && is_exact_wanted {
                 plan.omit_elements(&tree);
             }
-            if may_omit(Omission::Clusters) && tree.held().len() <= FEW_PATCHES {
+            let has_few = tree.held().len() <= FEW_PATCHES;
+            if may_omit(Omission::Clusters) && is_exact_wanted && has_few {
                 plan.omit_clusters(&tree);
             }
         }

@@ -137,7 +137,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         } else {
             Vec::new()
         };
-        let refinement = self.visit(Hierarchy::ROOT, &start);
+        let mut refinement = self.visit(Hierarchy::ROOT, &start);
+        if self.follows_light {
+            // Sources are wanted by each of their receivers.
+            refinement.wanted.sort_unstable();
+            refinement.wanted.dedup();
+        }
         Refinement {
             fits: !self.budget.is_spent(),
             ..refinement
