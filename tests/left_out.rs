@@ -87,7 +87,7 @@ fn an_empty_closed_room_takes_no_ray_and_few_elements_and_is_exact() {
 
 #[test]
 fn without_rays_alone_direct_light_has_the_same_bits_and_all_light_the_same_power() {
-    let others = [Omission::Elements, Omission::Clusters];
+    let others = [Omission::Elements];
     for name in ["plates", "perpendicular-plates"] {
         let scene = scene(name, Sides::One);
         let direct = |kept: &[Omission]| {

@@ -67,12 +67,9 @@ impl PatchTree {
         cancelled: &dyn Fn() -> bool,
     ) -> Option<Self> {
         let of = |is_out: bool| {
-            let flags = left_out.iter();
-            let chosen = self
-                .patches
-                .iter()
-                .zip(flags.map(move |&out| out == is_out));
-            chosen.filter_map(|(patch, is_chosen)| is_chosen.then(|| Item::of(scene, patch)))
+            let flagged = self.patches.iter().zip(left_out);
+            let chosen = flagged.filter(move |(_, flag)| **flag == is_out);
+            chosen.map(|(patch, _)| Item::of(scene, patch))
         };
         // In the order of triangles, as `lit_sides` has them, so that the tree is the one that their scene would have.
         let mut items: Vec<Item> = of(false).collect();

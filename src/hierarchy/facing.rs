@@ -211,8 +211,10 @@ mod tests {
     const WHITE: u32 = 1;
     const BLACK: u32 = 2;
 
-    /// Parallelograms by corner and two edges; the front looks along the edges' product.
-    fn scene(sides: Sides, faces: &[(u32, [f64; 3], [f64; 3], [f64; 3])]) -> Scene {
+    /// A parallelogram: material, corner and two edges; the front looks along the edges' product.
+    type Square = (u32, [f64; 3], [f64; 3], [f64; 3]);
+
+    fn scene(sides: Sides, faces: &[Square]) -> Scene {
         let mut builder = SceneBuilder::default();
         let half = Vec3::splat(0.5);
         builder.push_material(Material::plain("light", half, Vec3::ONE));

@@ -1,5 +1,5 @@
 //! Where nothing casts a shadow: over which elements the light of sampled emitters is as good as linear, how much light
-//! varies over others, and which part of a view is filled.
+//! varies over others, and what is known of closures.
 //!
 //! Elements are divided where their corners do not tell what lies between. Shadows could hide from all of them, and so
 //! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
@@ -14,10 +14,7 @@ use super::{
     direct::{Lights, Receiver},
     reconstruct::INSET,
 };
-use crate::{
-    hierarchy::{Hierarchy, Kind, NodeId},
-    transport::luminance,
-};
+use crate::{hierarchy::Hierarchy, transport::luminance};
 
 /// Places on a triangle, barycentric: the middles of its sides and those of its quarters.
 const PLACES: [Vec3; 7] = [
@@ -29,17 +26,6 @@ const PLACES: [Vec3; 7] = [
     Vec3::new(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
     Vec3::new(1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0),
 ];
-
-/// Places at which a closure is summed, barycentric: a rule of degree 2.
-const CLOSURE_PLACES: [Vec3; 3] = [
-    Vec3::new(2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0),
-    Vec3::new(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
-    Vec3::new(1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0),
-];
-
-/// Clusters further away than this many of their radii are read from tables for closures. Nearer, and tables err by more
-/// than a hundredth; further, and single patches are looked at.
-const FAR_RADII: f32 = 6.0;
 
 impl Lights {
     /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
@@ -73,42 +59,18 @@ impl Lights {
 }
 
 impl Solver {
-    /// Closures without rays: 1 on closed surfaces, not needed where all form factors are exact, and else the sums of
-    /// those of what is far enough to be read from tables, or small enough to be exact.
-    pub(super) fn closures_in_clear(&self) -> Closures {
-        let hierarchy = &self.hierarchy;
-        if self.plan.is_closed {
-            return Closures::even(hierarchy, Closure::CLOSED);
+    /// Closures that need no rays: 1 on closed surfaces, and none where all form factors are exact. Elsewhere they must be
+    /// probed: where walls are white, a leak that is seen by one ray in a thousand decides.
+    pub(super) fn closures_in_clear(&self) -> Option<Closures> {
+        if !self.plan.is_clear {
+            return None;
         }
-        if self.plan.is_by_patch {
-            return Closures::even(hierarchy, Closure::UNKNOWN);
-        }
-        Closures::estimated(hierarchy, |patch| {
-            let [a, b, c] = hierarchy.mesh.corners(patch);
-            let normal = hierarchy.patches[patch].normal;
-            let points = CLOSURE_PLACES.map(|at| a * at.x + b * at.y + c * at.z);
-            points
-                .map(|point| self.row(point, normal))
-                .iter()
-                .sum::<f32>()
-                / 3.0
-        })
-    }
-
-    /// Sum of the form factors from a point of unit normal to everything, as if nothing blocked.
-    fn row(&self, point: Vec3, normal: Vec3) -> f32 {
-        let (hierarchy, kernel) = (&self.hierarchy, self.kernel());
-        let mut sum = 0.0;
-        let mut pending = vec![Hierarchy::ROOT];
-        while let Some(node) = pending.pop() {
-            let reach = FAR_RADII * hierarchy.radius(node);
-            let is_far = hierarchy.centroid(node).distance_squared(point) > reach * reach;
-            match hierarchy.kind(node) {
-                Kind::Cluster(_) if !is_far => pending.extend(hierarchy.children(node).map(NodeId)),
-                _ => sum += kernel.irradiance(node, point, normal).w,
-            }
-        }
-        sum
+        let closure = match (self.plan.is_closed, self.plan.is_by_patch) {
+            (true, _) => Closure::CLOSED,
+            (false, true) => Closure::UNKNOWN,
+            (false, false) => return None,
+        };
+        Some(Closures::even(&self.hierarchy, closure))
     }
 
     /// By how much the radiosity of each leaf varies over it (half the range of its corners, luminance), as direct light is

@@ -55,10 +55,6 @@ const LEAST_ROW: f32 = 0.3;
 /// larger, and coarse links stay too bright.
 const SURPLUS: f32 = 0.1;
 
-/// How far a closure that was not found by rays may be off. Smaller, and it is trusted more than a few points of a patch
-/// tell; larger, and coarse links stay as wrong as they are.
-const ESTIMATE_DEVIATION: f32 = 0.01;
-
 /// How much of a cell's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Closure {
@@ -147,20 +143,6 @@ impl Closures {
     /// The same closure of all patches.
     pub(super) fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
         Self(vec![closure; hierarchy.patches.len()])
-    }
-
-    /// Closures of all patches that are the sums of their form factors as `row` estimates them.
-    pub(super) fn estimated(hierarchy: &Hierarchy, row: impl Fn(usize) -> f32 + Sync) -> Self {
-        let closure = |patch: usize| Closure {
-            share: row(patch).clamp(0.0, 1.0),
-            deviation: ESTIMATE_DEVIATION,
-        };
-        Self(
-            (0..hierarchy.patches.len())
-                .into_par_iter()
-                .map(closure)
-                .collect(),
-        )
     }
 
     /// Whether nothing was probed yet.

@@ -192,14 +192,19 @@ impl Solver {
         if !self.closures.is_empty() {
             return Some(());
         }
-        if self.plan.is_clear {
-            self.closures = self.closures_in_clear();
-        } else {
-            let seed = self.settings.seed;
-            let (closures, shot) = closure::closures(&self.hierarchy, &self.rays, seed, cancel)?;
+        if let Some(closures) = self.closures_in_clear() {
             self.closures = closures;
-            self.ray_count += shot;
+            return Some(());
         }
+        // In the clear the tree serves only this.
+        let rays = match self.rays.is_clear() {
+            true => Arc::new(RayTree::new(&self.scene)),
+            false => self.rays.clone(),
+        };
+        let seed = self.settings.seed;
+        let (closures, shot) = closure::closures(&self.hierarchy, &rays, seed, cancel)?;
+        self.closures = closures;
+        self.ray_count += shot;
         Some(())
     }
 

@@ -149,17 +149,15 @@ impl Plan {
             tree = plan.omit_unlit(scene, tree, cancelled)?;
         }
         if may_omit(Omission::Rays) && tree.is_clear(scene) {
-            plan.omit_rays(scene, &tree);
             // Who asks for the paper's way wants to see what it does.
             let is_exact_wanted =
                 settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
-            if may_omit(Omission::Elements) && is_exact_wanted {
-                plan.omit_elements(&tree);
-            }
             let has_few = tree.held().len() <= FEW_PATCHES;
-            if may_omit(Omission::Clusters) && is_exact_wanted && has_few {
-                plan.omit_clusters(&tree);
-            }
+            plan.is_clear = true;
+            plan.is_closed = tree.is_closed(scene);
+            plan.follows_light = is_exact_wanted && may_omit(Omission::Elements);
+            plan.is_by_patch = is_exact_wanted && has_few && may_omit(Omission::Clusters);
+            plan.note_clear(scene, &tree);
         }
         Arc::make_mut(&mut plan.left_out).extend(left_out_by_loading(scene));
         Some((plan, tree))
@@ -203,42 +201,39 @@ impl Plan {
         tree.without(scene, &dark, cancelled)
     }
 
-    fn omit_rays(&mut self, scene: &Scene, tree: &PatchTree) {
-        self.is_clear = true;
-        self.is_closed = tree.is_closed(scene);
-        let count = scene.triangles.len();
+    /// List what is left out where nothing blocks.
+    fn note_clear(&mut self, scene: &Scene, tree: &PatchTree) {
+        let (triangles, held) = (scene.triangles.len(), tree.held().len());
+        let exception = if self.is_closed || self.is_by_patch {
+            ""
+        } else {
+            ", but for those that look how open the scene is"
+        };
         self.note(
             Omission::Rays,
-            count,
-            format!("the ray tree of {count} triangles and every ray"),
+            triangles,
+            format!("the ray tree of {triangles} triangles and every ray{exception}"),
             "all that is lit lies on one side of each triangle's plane, so nothing can stand between two surfaces",
             "light differs by no more than the noise of those rays",
         );
-    }
-
-    fn omit_elements(&mut self, tree: &PatchTree) {
-        self.follows_light = true;
-        self.note(
-            Omission::Elements,
-            tree.held().len(),
-            format!(
-                "elements of {} patches where light does not bend, and links between them",
-                tree.held().len()
-            ),
-            "nothing casts a shadow, and between elements in full view form factors are known exactly",
-            "light differs by no more than the tolerances of mesh and links",
-        );
-    }
-
-    fn omit_clusters(&mut self, tree: &PatchTree) {
-        self.is_by_patch = true;
-        self.note(
-            Omission::Clusters,
-            tree.clusters.len(),
-            format!("links of {} clusters", tree.clusters.len()),
-            "there are so few patches, all in full view, that all pairs of them can be linked",
-            "light differs by no more than the tolerance of links",
-        );
+        if self.follows_light {
+            self.note(
+                Omission::Elements,
+                held,
+                format!("elements of {held} patches where light does not bend, and links between them"),
+                "nothing casts a shadow, and between elements in full view form factors are known exactly",
+                "light differs by no more than the tolerances of mesh and links",
+            );
+        }
+        if self.is_by_patch {
+            self.note(
+                Omission::Clusters,
+                tree.clusters.len(),
+                format!("links of {} clusters", tree.clusters.len()),
+                "there are so few patches, all in full view, that all pairs of them can be linked",
+                "light differs by no more than the tolerance of links",
+            );
+        }
     }
 
     fn note(

@@ -161,7 +161,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         Decision::Keep(Link {
             source: NodeId((hierarchy.clusters.len() + from) as u32),
             visibility: 1.0,
-            error: bound,
+            // What is seen at a few points tells more than bounds that hold for all.
+            error: bound.min(of_source + mean * seen.change),
             form_factor: seen.mean,
         })
     }
