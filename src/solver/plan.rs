@@ -229,7 +229,10 @@ impl Plan {
             self.note(
                 Omission::Clusters,
                 tree.clusters.len(),
-                format!("links of {} clusters", tree.clusters.len()),
+                format!(
+                    "links of clusters, of which there would be {}",
+                    tree.clusters.len()
+                ),
                 "there are so few patches, all in full view, that all pairs of them can be linked",
                 "light differs by no more than the tolerance of links",
             );
