@@ -2,11 +2,12 @@
 //! Elements are divided where linear interpolation between their corners would miss it.
 
 use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::{
     Cancel,
     direct::{DirectLight, Lights, Receiver},
-    reconstruct::{INSET, project},
+    reconstruct::{INSET, LeafLight, project},
     smooth,
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
@@ -16,7 +17,7 @@ use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
 const LARGEST_SHARE: f64 = 1.0 / 1000.0;
 
 /// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
-const SPREAD_SHARE: f32 = 0.15;
+pub(super) const SPREAD_SHARE: f32 = 0.15;
 
 /// Where all corners of an element lie in shadow, its centroid is sampled if it could get more light than this many
 /// times the tolerance. Smaller costs rays in the shade, larger loses light on narrow faces.
@@ -71,15 +72,24 @@ pub(super) struct DirectField {
     pub(super) is_full: bool,
 }
 
-/// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
-pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
+/// Divide elements that are too large to be trusted with their corners. Returns whether all could be. Where nothing casts
+/// a shadow, `lights` tell over which elements their light does not bend: these stay whole.
+pub(super) fn divide_coarse(
+    hierarchy: &mut Hierarchy,
+    lights: Option<&Lights>,
+    limits: Limits,
+) -> bool {
     let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * limits.min_area);
     loop {
         let elements = &hierarchy.mesh.elements;
-        let wanted: Vec<u32> = hierarchy
+        let large: Vec<usize> = hierarchy
             .mesh
-            .leaves()
+            .held_leaves()
             .filter(|&leaf| elements[leaf].area_vector.length() > largest)
+            .collect();
+        let wanted: Vec<u32> = large
+            .into_par_iter()
+            .filter(|&leaf| lights.is_none_or(|lights| lights.bend_over(hierarchy, leaf, limits)))
             .map(|leaf| leaf as u32)
             .collect();
         if !hierarchy.mesh.fits(&wanted, limits.most_elements) {
@@ -91,8 +101,28 @@ pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
     }
 }
 
+/// Leaves between whose corners the light that they found over links bends, as [`DirectField::adapt`] has it.
+pub(super) fn bent_under(
+    hierarchy: &Hierarchy,
+    found: &[LeafLight],
+    limits: Limits,
+    mean: f32,
+) -> Vec<u32> {
+    let is_bent = |light: &LeafLight| {
+        let element = &hierarchy.mesh.elements[light.element as usize];
+        let corners = light.corners.map(luminance);
+        let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
+        let bend = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
+        let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
+        element.area_vector.length() * 0.25 >= limits.min_area
+            && (bend + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
+    };
+    let bent = found.iter().filter(|light| is_bent(light));
+    bent.map(|light| light.element).collect()
+}
+
 /// Root of an element's share of the area: what an error on it counts.
-fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
+pub(super) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     let area = hierarchy.mesh.elements[element].area_vector.length();
     (area / hierarchy.area as f32).sqrt()
 }
@@ -159,7 +189,7 @@ impl DirectField {
     }
 
     /// Direct irradiance at a corner of a leaf.
-    fn corner(&self, vertex: u32) -> Vec4 {
+    pub(super) fn corner(&self, vertex: u32) -> Vec4 {
         self.vertices
             .get(vertex as usize)
             .copied()
@@ -403,7 +433,7 @@ impl DirectField {
         self.centres.resize(hierarchy.mesh.elements.len(), None);
         let unknown: Vec<usize> = hierarchy
             .mesh
-            .leaves()
+            .held_leaves()
             .filter(|&leaf| {
                 self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
@@ -491,7 +521,7 @@ impl DirectField {
             }
         }
         let mut chosen: Vec<Option<(f32, u32)>> = vec![None; mesh.vertices.len()];
-        for leaf in mesh.leaves() {
+        for leaf in mesh.held_leaves() {
             let normal = hierarchy.patch_of(leaf).normal;
             for vertex in mesh.elements[leaf].vertices.map(|vertex| vertex as usize) {
                 let likeness = normals[vertex].dot(normal);

@@ -38,12 +38,13 @@ pub struct Job {
 impl Job {
     /// Prepare the solver for it, unless cancelled.
     pub fn solver(self, cancel: &Cancel) -> Option<Solver> {
-        let rays = match self.rays {
-            Some(rays) => rays,
-            None if cancel.is_cancelled() => return None,
-            None => Arc::new(RayTree::new(&self.scene)),
-        };
-        Solver::with_rays(self.scene, rays, self.settings, self.memory_limit, cancel)
+        Solver::with_rays(
+            self.scene,
+            self.rays,
+            self.settings,
+            self.memory_limit,
+            cancel,
+        )
     }
 }
 
