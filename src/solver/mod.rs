@@ -9,6 +9,7 @@ mod anderson;
 mod budget;
 mod clear;
 mod closure;
+mod cover;
 mod direct;
 mod display;
 
