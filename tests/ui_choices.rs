@@ -154,7 +154,7 @@ fn a_scene_shows_only_what_it_can_use() {
     for label in ["Link error", "Crease angle", "Ray offset", "Memory limit"] {
         lacks(&harness, label);
     }
-    for label in ["Emission scale", "Shadow rays", "Transported"] {
+    for label in ["Emission scale", "Rays per vertex", "Transported"] {
         assert!(
             harness.query_all_by_label(label).next().is_some(),
             "{label}"
@@ -252,7 +252,7 @@ fn a_scene_without_emitters_has_nothing_to_scale() {
         ..Options::default()
     });
     wait_for(&mut harness, |app| app.state.loaded.is_some());
-    for label in ["Emission scale", "Shadow rays"] {
+    for label in ["Emission scale", "Rays per vertex"] {
         assert!(
             harness.query_all_by_label(label).next().is_none(),
             "{label}"

@@ -74,7 +74,8 @@ pub struct SolveSettings {
     pub epsilon: f32,
     /// Sample pairs p of a link in the `samples` oracle; 1…4096. Cost per link grows with p.
     pub samples: u32,
-    /// Shadow rays per vertex towards the lights; 1…1024. Noise in penumbrae falls as one over its root or better.
+    /// Shadow rays per vertex towards the lights; 1…1024. Where their noise counts for more than a part of
+    /// `mesh_tolerance`, up to 16 times as many are shot. Noise in penumbrae falls as one over the root or better.
     pub shadow_samples: u32,
     /// Elements are not divided below this area, as a fraction of the scene's area; at least 0.
     pub min_area: f32,

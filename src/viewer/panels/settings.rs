@@ -106,8 +106,8 @@ fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
     if state.has_emitters() {
         row::setting(
             ui,
-            "Shadow rays",
-            "Rays from a vertex towards the lights. More makes penumbrae smoother; the time for direct light grows with it.",
+            "Rays per vertex",
+            "Shadow rays from a vertex towards the lights; up to 16 times as many are shot where noise would show. More makes penumbrae smoother; the time for direct light grows with it.",
             &mut settings.shadow_samples,
             &default.shadow_samples,
             |ui, value| {
