@@ -269,7 +269,13 @@ fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result
             }
             Some(Event::Finished(reason)) => break reason,
             Some(Event::Failed(message)) => bail!("the solver failed: {message}"),
-            Some(Event::Started | Event::Paused | Event::Continued | Event::Inspected(_)) => {}
+            Some(
+                Event::Started
+                | Event::Paused
+                | Event::Continued
+                | Event::Relit { .. }
+                | Event::Inspected(_),
+            ) => {}
         }
     };
     progress.finish();

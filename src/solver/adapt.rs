@@ -62,9 +62,9 @@ impl Limits {
 pub(super) struct DirectField {
     pub(super) lights: Lights,
     /// By vertex, where it was sampled; shorter than the vertices where some are new.
-    vertices: Vec<Option<DirectLight>>,
+    pub(super) vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
-    centres: Vec<Option<DirectLight>>,
+    pub(super) centres: Vec<Option<DirectLight>>,
     /// Irradiance to show by vertex; shorter than the vertices where some are new.
     shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
@@ -95,6 +95,16 @@ pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
 fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     let area = hierarchy.mesh.elements[element].area_vector.length();
     (area / hierarchy.area as f32).sqrt()
+}
+
+/// The centroid of an element, as a place to be lit.
+pub(super) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
+    let patch = hierarchy.patch_of(element);
+    Receiver {
+        point: hierarchy.mesh.elements[element].centroid,
+        normal: patch.normal,
+        triangle: patch.triangle,
+    }
 }
 
 impl DirectField {
@@ -412,15 +422,7 @@ impl DirectField {
             .collect();
         let receivers: Vec<Receiver> = unknown
             .iter()
-            .map(|&leaf| {
-                let patch = hierarchy.patch_of(leaf);
-                let point = hierarchy.mesh.elements[leaf].centroid;
-                Receiver {
-                    point,
-                    normal: patch.normal,
-                    triangle: patch.triangle,
-                }
-            })
+            .map(|&leaf| centre_of(hierarchy, leaf))
             .collect();
         let mut lights = vec![DirectLight::default(); receivers.len()];
         let samples = limits.shadow_samples;
@@ -478,7 +480,7 @@ impl DirectField {
 impl DirectField {
     /// Where to sample each corner of a leaf that is wanted: a little inside the leaf whose normal is nearest to the mean
     /// normal about the vertex.
-    fn receivers(
+    pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
         is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,

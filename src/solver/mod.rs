@@ -14,7 +14,9 @@ mod gather;
 mod inspect;
 mod inspection;
 mod iterate;
+mod light_parts;
 mod reconstruct;
+mod relight;
 mod report;
 mod settings;
 mod smooth;
@@ -28,6 +30,7 @@ use std::sync::{
 use glam::{Vec3, Vec4};
 
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
+pub use relight::Relit;
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
@@ -43,6 +46,7 @@ use adapt::DirectField;
 use closure::Closures;
 use direct::Lights;
 use reconstruct::LeafLight;
+use relight::Relighting;
 
 /// A request to stop, seen by everything that runs long. Clones share one flag.
 #[derive(Clone, Debug, Default)]
@@ -108,6 +112,7 @@ pub struct Solver {
     is_full: bool,
     step: u32,
     ray_count: u64,
+    relighting: Relighting,
     snapshot: Snapshot,
 }
 
@@ -149,6 +154,7 @@ impl Solver {
             is_full: false,
             step: 0,
             ray_count: 0,
+            relighting: Relighting::new(&scene),
             snapshot: Snapshot::default(),
             scene,
             settings,
@@ -196,6 +202,7 @@ impl Solver {
             THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
         report.epsilon = self.settings.epsilon * fineness;
         self.is_full = false;
+        self.relighting.begin_step();
         self.probe_closures(cancel)?;
         self.adapt_to_direct(fineness, cancel)?;
         cancel.proceed()?;
@@ -214,6 +221,7 @@ impl Solver {
             return None;
         }
         report.is_final = report.is_full || self.step >= self.settings.max_steps;
+        self.relighting.end_step(&report);
         Some(report)
     }
 

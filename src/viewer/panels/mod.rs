@@ -7,6 +7,7 @@ pub mod error;
 pub mod help;
 pub mod legend;
 pub mod links;
+pub mod materials;
 pub mod menu;
 pub mod mesh;
 pub mod messages;
