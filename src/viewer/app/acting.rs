@@ -5,7 +5,7 @@ use eframe::egui;
 use super::{
     super::{
         action::Action,
-        bindings, clusters,
+        bindings, clusters, light_range,
         materials::Materials,
         navigation::Picked,
         panel_state::PanelState,
@@ -122,7 +122,7 @@ impl App {
                 state.view.auto_exposure = false;
             }
             Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
-            Action::AutoExposure => state.view.auto_exposure = true,
+            Action::AutoExposure => expose(state),
             Action::ToggleToneMap => {
                 use crate::viewer::view::ToneMap;
                 state.view.tone_map = match state.view.tone_map {
@@ -291,6 +291,15 @@ impl App {
                 }
             }
         }
+    }
+}
+
+/// Expose for the present light, and let the exposure follow.
+fn expose(state: &mut State) {
+    state.view.auto_exposure = true;
+    let snapshot = state.run.snapshot.as_deref();
+    if let Some(exposure) = snapshot.and_then(light_range::auto_exposure) {
+        state.view.exposure = exposure;
     }
 }
 

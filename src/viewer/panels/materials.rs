@@ -1,4 +1,6 @@
 //! Lights and materials: each light on or off, brighter, in another colour; each material in another colour.
+//!
+//! The automatic exposure stays where it is while anything is changed, or what is dimmed would look as before.
 
 use eframe::egui;
 use glam::Vec3;
