@@ -303,7 +303,8 @@ impl Solver {
 }
 
 impl Solved {
-    /// The leaves when their elements receive other light over links: within each it varies as before.
+    /// The leaves when their elements receive other light over links: within each it varies as before. Errors stay those
+    /// of the links.
     fn leaves_under(&self, linked: &[Vec4]) -> Vec<LeafLight> {
         self.leaves
             .par_iter()
@@ -321,11 +322,9 @@ impl Solved {
                         .truncate()
                         .extend(light.w)
                 };
-                let by = luminance(now) / luminance(before);
                 LeafLight {
                     corners: leaf.corners.map(under),
                     centre: under(leaf.centre),
-                    error: leaf.error * if by.is_finite() { by } else { 1.0 },
                     ..*leaf
                 }
             })
