@@ -136,12 +136,12 @@ impl Solver {
         Some(report)
     }
 
-    /// The figures of the last step, as a beginning.
+    /// The figures of the last step, as a beginning. Its threshold is that of links which were judged by other light, so
+    /// it is never the last word.
     fn unrefined_report(&self) -> StepReport {
-        let note = "the light was changed on the links that the light before asked for; a further step refines them";
         StepReport {
             sweeps: 0,
-            notes: vec![note.to_owned()],
+            notes: Vec::new(),
             is_final: false,
             is_full: false,
             ..self.relighting.last.clone()

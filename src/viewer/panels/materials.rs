@@ -32,7 +32,7 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
             materials.reset();
         }
         if let Some(secs) = state.run.relit_secs {
-            ui.weak(seconds(secs)).on_hover_text(
+            ui.weak(format!("in {}", seconds(secs))).on_hover_text(
                 "What the last change took to show. It uses the links that there are; continue refines them.",
             );
         }
@@ -53,6 +53,7 @@ fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
     egui::ScrollArea::vertical()
         .id_salt("lights")
         .max_height(MOST_HEIGHT)
+        .min_scrolled_height(MOST_HEIGHT)
         .show_rows(ui, height, lights.len(), |ui, shown| {
             for &index in &lights[shown] {
                 ui.push_id(index, |ui| light_ui(ui, materials, index));
@@ -95,6 +96,7 @@ fn reflectances_ui(ui: &mut egui::Ui, materials: &mut Materials, most: f32) {
     egui::ScrollArea::vertical()
         .id_salt("reflectances")
         .max_height(MOST_HEIGHT)
+        .min_scrolled_height(MOST_HEIGHT)
         .show_rows(ui, height, count, |ui, shown| {
             for index in shown {
                 let default = materials.of_file(index).reflectance;
