@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use crate::{
     export::{ColorOptions, MeshOptions, ToneMap, UpAxis},
     scene::{SceneOptions, Sides},
-    solver::{Direct, Method, Oracle, SolveSettings},
+    solver::{Direct, Keep, Method, Omission, Oracle, SolveSettings},
     worker::RunOptions,
 };
 
@@ -92,6 +92,12 @@ pub struct SettingFlags {
     /// Seed of every random choice
     #[arg(long, value_name = "N", help_heading = "Settings")]
     pub seed: Option<u64>,
+    /// Do not leave this out where the scene does not need it; may be given several times
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Settings")]
+    pub keep: Vec<KeepFlag>,
+    /// Leave nothing out that the scene does not need
+    #[arg(long, conflicts_with = "keep", help_heading = "Settings")]
+    pub keep_all: bool,
 }
 
 impl SettingFlags {
@@ -111,8 +117,17 @@ impl SettingFlags {
             min_area: self.min_area.unwrap_or(preset.min_area),
             max_steps: self.max_steps.unwrap_or(preset.max_steps),
             seed: self.seed.unwrap_or(preset.seed),
+            keep: self.kept(),
             ..preset
         }
+    }
+
+    fn kept(&self) -> Keep {
+        if self.keep_all {
+            return Keep::ALL;
+        }
+        let omissions = self.keep.iter().map(|flag| flag.omission());
+        Keep::from(omissions.collect::<Vec<Omission>>())
     }
 
     /// Whether any of them is given.
@@ -126,6 +141,8 @@ impl SettingFlags {
             || self.min_area.is_some()
             || self.max_steps.is_some()
             || self.seed.is_some()
+            || !self.keep.is_empty()
+            || self.keep_all
     }
 }
 
@@ -315,6 +332,31 @@ impl DirectFlag {
             Self::Auto => Direct::Auto,
             Self::Sampled => Direct::Sampled,
             Self::Linked => Direct::Linked,
+        }
+    }
+}
+
+/// `--keep`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum KeepFlag {
+    /// Surfaces that no light can reach
+    Unlit,
+    /// Rays where nothing can block them
+    Rays,
+    /// Elements where light does not bend and nothing casts a shadow
+    Elements,
+    /// Links of clusters where nothing casts a shadow and there are few patches
+    Clusters,
+}
+
+impl KeepFlag {
+    /// What it names.
+    fn omission(self) -> Omission {
+        match self {
+            Self::Unlit => Omission::Unlit,
+            Self::Rays => Omission::Rays,
+            Self::Elements => Omission::Elements,
+            Self::Clusters => Omission::Clusters,
         }
     }
 }

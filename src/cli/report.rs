@@ -6,7 +6,7 @@ use crate::{
     export::ColorOptions,
     metrics::ErrorMeasures,
     scene::{Frame, Scene, Warning},
-    solver::{SolveSettings, StepReport},
+    solver::{LeftOut, SolveSettings, StepReport},
     worker::StopReason,
 };
 
@@ -18,7 +18,7 @@ pub(super) struct SolveReport {
     pub(super) settings: SolveSettings,
     pub(super) color: ColorOptions,
     /// What was skipped because this scene does not need it, and why.
-    pub(super) left_out: Vec<String>,
+    pub(super) left_out: Vec<LeftOut>,
     pub(super) warnings: Vec<WarningFacts>,
     pub(super) steps: Vec<StepFacts>,
     pub(super) stop_reason: StopReason,

@@ -55,6 +55,9 @@ pub struct SolveArguments {
     #[cfg(feature = "viewer")]
     #[command(flatten)]
     pub picture: super::picture::PictureFlags,
+    /// Say what is left out because this scene does not need it, and why
+    #[arg(long, help_heading = "Output")]
+    pub explain: bool,
     /// No progress line
     #[arg(long, short, help_heading = "Output")]
     pub quiet: bool,
@@ -104,7 +107,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         arguments.setting_flags.settings(),
         arguments.run_flags.options(),
     );
-    let run = drain(&worker, &interrupted, arguments.quiet)?;
+    let run = drain(&worker, &interrupted, arguments)?;
     drop(worker);
     let totals = Totals {
         read_s,
@@ -245,8 +248,12 @@ fn worker(
 }
 
 /// Follow the run to its end.
-fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result<Run> {
-    let mut progress = Progress::new(quiet);
+fn drain(
+    worker: &WorkerHandle,
+    interrupted: &AtomicBool,
+    arguments: &SolveArguments,
+) -> Result<Run> {
+    let mut progress = Progress::new(arguments.quiet);
     let (mut steps, mut prepare_s) = (Vec::new(), 0.0);
     let mut is_stopping = false;
     let stop_reason = loop {
@@ -262,7 +269,12 @@ fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result
         }
         match worker.next_event(POLL) {
             None => progress.show(),
-            Some(Event::Prepared { seconds }) => prepare_s = seconds,
+            Some(Event::Prepared { seconds }) => {
+                prepare_s = seconds;
+                if arguments.explain {
+                    explain(&worker.latest().unwrap_or_default());
+                }
+            }
             Some(Event::Stepped(report)) => {
                 progress.stepped(&report);
                 steps.push(report);
@@ -285,6 +297,16 @@ fn drain(worker: &WorkerHandle, interrupted: &AtomicBool, quiet: bool) -> Result
         stop_reason,
         snapshot: worker.latest().unwrap_or_default(),
     })
+}
+
+/// Say what is left out, one line each.
+fn explain(snapshot: &Snapshot) {
+    if snapshot.left_out.is_empty() {
+        output::say("left out: nothing, this scene needs all of it");
+    }
+    for left_out in snapshot.left_out.iter() {
+        output::say(format_args!("left out: {left_out}"));
+    }
 }
 
 fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<()> {
@@ -337,7 +359,7 @@ fn report(
         scene: SceneFacts::of(scene),
         settings: arguments.setting_flags.settings(),
         color: arguments.run_flags.export(arguments.scene_flags.up).color,
-        left_out: Vec::new(),
+        left_out: run.snapshot.left_out.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),
         stop_reason: run.stop_reason,
         totals: Totals {

@@ -39,6 +39,20 @@ pub struct RayTree {
 }
 
 impl RayTree {
+    /// A tree without triangles: nothing blocks anything, and nothing is met.
+    pub fn clear() -> Self {
+        Self {
+            tree: CwBvh::default(),
+            triangles: Vec::new(),
+            crossings: 0.0,
+        }
+    }
+
+    /// Whether there are no triangles: then no ray need be shot.
+    pub fn is_clear(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
     /// Build the tree over all triangles of a scene.
     pub fn new(scene: &Scene) -> Self {
         let triangles: Vec<RayTriangle> = scene
@@ -79,7 +93,7 @@ impl RayTree {
     pub fn occluded(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> bool {
         let separation = to - from;
         let length = separation.length();
-        if length <= 2.0 * RAY_OFFSET {
+        if self.is_clear() || length <= 2.0 * RAY_OFFSET {
             return false;
         }
         let ray = Ray::new(
@@ -102,6 +116,9 @@ impl RayTree {
     /// The nearest triangle along a ray of unit direction, leaving out the one that it starts on. Of two in one place, back
     /// to back, it is the one whose front is met.
     pub fn closest(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Option<Hit> {
+        if self.is_clear() {
+            return None;
+        }
         let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
         let start = from.map_or(u32::MAX, |id| id.0);
         let mut hit = RayHit::none();

@@ -33,12 +33,63 @@ struct Item {
     centroid: Vec3,
 }
 
-/// Clusters, and patches in the order of the tree; `None` when cancelled.
-pub(super) fn build(
+impl Item {
+    fn of(scene: &Scene, patch: &Patch) -> Self {
+        Self {
+            triangle: patch.triangle,
+            is_back: patch.is_back,
+            centroid: centroid(scene.corners(patch.triangle)),
+        }
+    }
+}
+
+/// Clusters over patches: the light tree before there are elements.
+#[derive(Clone, Debug)]
+pub struct PatchTree {
+    /// The binary tree; the root is first, children come after their parents.
+    pub clusters: Vec<Cluster>,
+    /// Patches in the order of the tree, and after them those that no cluster holds.
+    pub patches: Vec<Patch>,
+}
+
+impl PatchTree {
+    /// The tree over all lit sides of a scene; `None` when cancelled.
+    pub fn build(scene: &Scene, cancelled: &dyn Fn() -> bool) -> Option<Self> {
+        grow(scene, lit_sides(scene), &[], cancelled)
+    }
+
+    /// The tree over the patches that are not left out, of which there is at least one; the others follow in their order.
+    /// `None` when cancelled.
+    pub fn without(
+        &self,
+        scene: &Scene,
+        left_out: &[bool],
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<Self> {
+        let of = |is_out: bool| {
+            let flagged = self.patches.iter().zip(left_out);
+            let chosen = flagged.filter(move |(_, flag)| **flag == is_out);
+            chosen.map(|(patch, _)| Item::of(scene, patch))
+        };
+        // In the order of triangles, as `lit_sides` has them, so that the tree is the one that their scene would have.
+        let mut items: Vec<Item> = of(false).collect();
+        items.sort_unstable_by_key(|item| (item.triangle, item.is_back));
+        grow(scene, items, &of(true).collect::<Vec<Item>>(), cancelled)
+    }
+
+    /// The patches that clusters hold; light is computed for these.
+    pub fn held(&self) -> std::ops::Range<usize> {
+        self.clusters[0].patches()
+    }
+}
+
+/// Divide the items until clusters are small, and put `others` after them.
+fn grow(
     scene: &Scene,
+    mut items: Vec<Item>,
+    others: &[Item],
     cancelled: &dyn Fn() -> bool,
-) -> Option<(Vec<Cluster>, Vec<Patch>)> {
-    let mut items = lit_sides(scene);
+) -> Option<PatchTree> {
     let mut clusters = vec![cluster(0, items.len(), u32::MAX)];
     let mut pending = vec![(0usize, 0u32)];
     while let Some((index, depth)) = pending.pop() {
@@ -58,9 +109,13 @@ pub(super) fn build(
         pending.push((first + 1, depth + 1));
         pending.push((first, depth + 1));
     }
-    let patches: Vec<Patch> = items.iter().map(|item| patch(scene, item)).collect();
+    let patches: Vec<Patch> = items
+        .iter()
+        .chain(others)
+        .map(|item| patch(scene, item))
+        .collect();
     fit_boxes(scene, &patches, &mut clusters);
-    Some((clusters, patches))
+    Some(PatchTree { clusters, patches })
 }
 
 /// Fronts of all triangles and backs of the two-sided ones.

@@ -73,6 +73,8 @@ pub struct Mesh {
     pub vertices: Vec<Vertex>,
     /// All elements; the patches come first, in order.
     pub elements: Vec<Element>,
+    /// Number of the patches for which light is computed; the elements of those that follow are never divided.
+    held: u32,
     /// Midpoint of the edge between two points, lower index first.
     point_between: HashMap<(u32, u32), u32>,
     /// Midpoint vertex of the edge between two vertices, lower index first.
@@ -86,10 +88,11 @@ fn edge(a: u32, b: u32) -> (u32, u32) {
 }
 
 impl Mesh {
-    /// One element per patch; `None` when cancelled.
+    /// One element per patch, of which the first `held` may be divided; `None` when cancelled.
     pub(super) fn new(
         scene: &Scene,
         patches: &[Patch],
+        held: usize,
         crease_degrees: f32,
         cancelled: &dyn Fn() -> bool,
     ) -> Option<Self> {
@@ -106,6 +109,7 @@ impl Mesh {
             points: scene.positions.clone(),
             vertices,
             elements: Vec::with_capacity(patches.len()),
+            held: held as u32,
             point_between: HashMap::new(),
             vertex_between: HashMap::new(),
             leaves_at: HashMap::new(),
@@ -166,6 +170,16 @@ impl Mesh {
         (0..self.elements.len()).filter(|&index| self.elements[index].is_leaf())
     }
 
+    /// The leaves for which light is computed, in order.
+    pub fn held_leaves(&self) -> impl Iterator<Item = usize> + '_ {
+        self.leaves().filter(|&leaf| self.is_held(leaf))
+    }
+
+    /// Whether light is computed for an element.
+    pub fn is_held(&self, element: usize) -> bool {
+        self.elements[element].patch < self.held
+    }
+
     /// Whether so many elements are enough for dividing these, and about as many neighbours as balance asks.
     pub fn fits(&self, wanted: &[u32], most_elements: u64) -> bool {
         wanted.is_empty() || (self.elements.len() + 8 * wanted.len()) as u64 <= most_elements
@@ -181,7 +195,8 @@ impl Mesh {
         let mut pending: Vec<u32> = wanted.to_vec();
         while let Some(index) = pending.pop() {
             let element = self.elements[index as usize];
-            if !element.is_leaf() || element.level >= DEEPEST_LEVEL {
+            if !element.is_leaf() || element.level >= DEEPEST_LEVEL || !self.is_held(index as usize)
+            {
                 continue;
             }
             self.divide_one(index);
@@ -207,7 +222,7 @@ impl Mesh {
 
     fn index_leaves(&mut self) {
         for index in 0..self.elements.len() {
-            if self.elements[index].is_leaf() {
+            if self.elements[index].is_leaf() && self.is_held(index) {
                 for key in self.point_edges(self.elements[index].vertices) {
                     self.leaves_at.entry(key).or_default().push(index as u32);
                 }
@@ -303,8 +318,8 @@ impl Mesh {
             })
     }
 
-    /// The leaves as triangles without T-junctions, each with the element that it lies on: where a neighbour divided
-    /// an edge, the vertex in its middle is used on this side, too. Vertices that this side of a crease lacks are made.
+    /// The leaves as triangles without T-junctions between those that light is computed for, each with the element that
+    /// it lies on: where a neighbour divided an edge, the vertex in its middle is used on this side, too. Vertices that this side of a crease lacks are made.
     pub fn closed_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
         let mut triangles = Vec::with_capacity(self.elements.len());
         for index in 0..self.elements.len() {
@@ -312,6 +327,11 @@ impl Mesh {
                 continue;
             }
             let corners = self.elements[index].vertices;
+            if !self.is_held(index) {
+                // No light, and so none that could differ beside a vertex in the middle of an edge.
+                triangles.push((index as u32, corners));
+                continue;
+            }
             let keys = self.point_edges(corners);
             let middles: [Option<u32>; 3] = std::array::from_fn(|side| {
                 let hangs = self.point_between.contains_key(&keys[side]);

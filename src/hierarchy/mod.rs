@@ -7,11 +7,13 @@
 
 mod build;
 mod directional;
+mod facing;
 mod mesh;
 mod subtrees;
 mod tables;
 mod validate;
 
+pub use build::PatchTree;
 pub use directional::{Moments, Quantity, Reading};
 pub use mesh::{Element, Mesh, Vertex};
 pub use subtrees::Subtrees;
@@ -128,7 +130,7 @@ pub type Children = std::ops::Range<u32>;
 pub struct Hierarchy {
     /// The binary tree; the root is first, children come after their parents.
     pub clusters: Vec<Cluster>,
-    /// The lit sides, in tree order.
+    /// The lit sides, in tree order; those that no cluster holds come last.
     pub patches: Vec<Patch>,
     /// Elements and the vertices that they share.
     pub mesh: Mesh,
@@ -148,8 +150,21 @@ impl Hierarchy {
 
     /// As [`Self::new`], or `None` once `cancelled` says so.
     pub fn build(scene: &Scene, crease_degrees: f32, cancelled: &dyn Fn() -> bool) -> Option<Self> {
-        let (clusters, patches) = build::build(scene, cancelled)?;
-        let mesh = Mesh::new(scene, &patches, crease_degrees, cancelled)?;
+        let tree = PatchTree::build(scene, cancelled)?;
+        Self::of_tree(scene, tree, crease_degrees, cancelled)
+    }
+
+    /// One element for each patch of a tree, or `None` when cancelled. Patches that no cluster holds keep that one: no
+    /// light is computed for them.
+    pub fn of_tree(
+        scene: &Scene,
+        tree: PatchTree,
+        crease_degrees: f32,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<Self> {
+        let held = tree.held().end;
+        let PatchTree { clusters, patches } = tree;
+        let mesh = Mesh::new(scene, &patches, held, crease_degrees, cancelled)?;
         let mut sides = vec![[u32::MAX; 2]; scene.triangles.len()];
         for (index, patch) in patches.iter().enumerate() {
             sides[patch.triangle.index()][usize::from(patch.is_back)] = index as u32;
@@ -168,17 +183,23 @@ impl Hierarchy {
     /// The root cluster.
     pub const ROOT: NodeId = NodeId(0);
 
+    /// The patches that clusters hold. For the others no light is computed.
+    pub fn held(&self) -> std::ops::Range<usize> {
+        self.clusters[0].patches()
+    }
+
     /// The patch that a ray of the given direction meets on a triangle, if that side is lit.
     pub fn patch_met(&self, triangle: TriangleId, direction: Vec3) -> Option<usize> {
         let [front, back] = self.sides[triangle.index()];
         let meets_front = self.patches[front as usize].normal.dot(direction) < 0.0;
         let patch = if meets_front { front } else { back };
-        (patch != u32::MAX).then_some(patch as usize)
+        Some(patch as usize).filter(|patch| self.held().contains(patch))
     }
 
-    /// The clusters that hold a patch, the root first.
+    /// The clusters that hold a patch, the root first; none where it is left out.
     pub fn clusters_over(&self, patch: usize) -> impl Iterator<Item = usize> + '_ {
-        std::iter::successors(Some(0), move |&index: &usize| {
+        let root = self.held().contains(&patch).then_some(0);
+        std::iter::successors(root, move |&index: &usize| {
             let cluster = &self.clusters[index];
             let first = cluster.first_child as usize;
             (!cluster.is_leaf()).then(|| {

@@ -187,6 +187,9 @@ impl SceneBuilder {
     }
 }
 
+/// Why a face is skipped that has the corners of an earlier one.
+pub const DOUBLED: &str = "it lies on another one that looks the same way";
+
 /// Triangles with the shells they form.
 struct ShelledTriangles {
     list: Vec<Triangle>,
@@ -274,7 +277,7 @@ impl SceneBuilder {
         let index = Cell::new(0);
         self.drop_faces(|_| {
             let is_double = coincident.is_double(index.replace(index.get() + 1));
-            is_double.then_some("it lies on another one that looks the same way")
+            is_double.then_some(DOUBLED)
         });
     }
 

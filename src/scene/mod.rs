@@ -22,7 +22,7 @@ mod warning;
 mod whole;
 mod write;
 
-pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
+pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
 pub use relight::Appearance;

@@ -1,12 +1,13 @@
 //! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
 //! Elements are divided where linear interpolation between their corners would miss it.
 
-use glam::{Vec3, Vec4};
+use glam::Vec4;
+use rayon::prelude::*;
 
 use super::{
     Cancel,
     direct::{DirectLight, Lights, Receiver},
-    reconstruct::{INSET, project},
+    reconstruct::{LeafLight, project},
     smooth,
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
@@ -16,21 +17,11 @@ use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
 const LARGEST_SHARE: f64 = 1.0 / 1000.0;
 
 /// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
-const SPREAD_SHARE: f32 = 0.15;
+pub(super) const SPREAD_SHARE: f32 = 0.15;
 
 /// Where all corners of an element lie in shadow, its centroid is sampled if it could get more light than this many
 /// times the tolerance. Smaller costs rays in the shade, larger loses light on narrow faces.
 const HIDDEN_TOLERANCE: f32 = 4.0;
-
-/// Share of the shadow rays that is shot first.
-const PROBING_SHARE: f32 = 0.25;
-
-/// Noise of a point, times the root of its share of the area, that is let be: this share of the tolerance. Larger leaves
-/// blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
-const NOISE_SHARE: f32 = 0.25;
-
-/// Shadow rays of a point at most, in multiples of the usual number.
-const MOST_SAMPLES: u32 = 16;
 
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
@@ -50,14 +41,6 @@ pub(super) struct Limits {
     pub most_elements: u64,
 }
 
-impl Limits {
-    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root.
-    fn is_noisy(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
-        light.tried < MOST_SAMPLES * self.shadow_samples
-            && light.error() * weight > NOISE_SHARE * self.tolerance * mean
-    }
-}
-
 /// Direct light on a mesh.
 pub(super) struct DirectField {
     pub(super) lights: Lights,
@@ -71,15 +54,24 @@ pub(super) struct DirectField {
     pub(super) is_full: bool,
 }
 
-/// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
-pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
+/// Divide elements that are too large to be trusted with their corners. Returns whether all could be. Where nothing casts
+/// a shadow, `lights` tell over which elements their light does not bend: these stay whole.
+pub(super) fn divide_coarse(
+    hierarchy: &mut Hierarchy,
+    lights: Option<&Lights>,
+    limits: Limits,
+) -> bool {
     let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * limits.min_area);
     loop {
         let elements = &hierarchy.mesh.elements;
-        let wanted: Vec<u32> = hierarchy
+        let large: Vec<usize> = hierarchy
             .mesh
-            .leaves()
+            .held_leaves()
             .filter(|&leaf| elements[leaf].area_vector.length() > largest)
+            .collect();
+        let wanted: Vec<u32> = large
+            .into_par_iter()
+            .filter(|&leaf| lights.is_none_or(|lights| lights.bend_over(hierarchy, leaf, limits)))
             .map(|leaf| leaf as u32)
             .collect();
         if !hierarchy.mesh.fits(&wanted, limits.most_elements) {
@@ -91,8 +83,28 @@ pub(super) fn divide_coarse(hierarchy: &mut Hierarchy, limits: Limits) -> bool {
     }
 }
 
+/// Leaves between whose corners the light that they found over links bends, as [`DirectField::adapt`] has it.
+pub(super) fn bent_under(
+    hierarchy: &Hierarchy,
+    found: &[LeafLight],
+    limits: Limits,
+    mean: f32,
+) -> Vec<u32> {
+    let is_bent = |light: &LeafLight| {
+        let element = &hierarchy.mesh.elements[light.element as usize];
+        let corners = light.corners.map(luminance);
+        let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
+        let bend = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
+        let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
+        element.area_vector.length() * 0.25 >= limits.min_area
+            && (bend + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
+    };
+    let bent = found.iter().filter(|light| is_bent(light));
+    bent.map(|light| light.element).collect()
+}
+
 /// Root of an element's share of the area: what an error on it counts.
-fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
+pub(super) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     let area = hierarchy.mesh.elements[element].area_vector.length();
     (area / hierarchy.area as f32).sqrt()
 }
@@ -169,7 +181,7 @@ impl DirectField {
     }
 
     /// Direct irradiance at a corner of a leaf.
-    fn corner(&self, vertex: u32) -> Vec4 {
+    pub(super) fn corner(&self, vertex: u32) -> Vec4 {
         self.vertices
             .get(vertex as usize)
             .copied()
@@ -202,169 +214,6 @@ impl DirectField {
         let mean = self.mean(hierarchy);
         ray_count += self.settle(rays, hierarchy, limits, mean, cancel)?;
         Some(ray_count)
-    }
-
-    /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
-    fn settle(
-        &mut self,
-        rays: &RayTree,
-        hierarchy: &Hierarchy,
-        limits: Limits,
-        mean: f32,
-        cancel: &Cancel,
-    ) -> Option<u64> {
-        let mut weights = vec![0.0f32; self.vertices.len()];
-        for leaf in hierarchy.mesh.leaves() {
-            let element = &hierarchy.mesh.elements[leaf];
-            for &vertex in &element.vertices {
-                weights[vertex as usize] += element.area_vector.length() / 3.0;
-            }
-        }
-        let scale = 1.0 / (hierarchy.area as f32).sqrt();
-        weights
-            .iter_mut()
-            .for_each(|weight| *weight = weight.sqrt() * scale);
-        let receivers = self.receivers(hierarchy, |vertex, light| {
-            light.is_some_and(|light| limits.is_noisy(&light, weights[vertex], mean))
-        });
-        let before = self.shot(&receivers);
-        let weights: Vec<f32> = receivers
-            .iter()
-            .map(|&(vertex, _)| weights[vertex as usize])
-            .collect();
-        let mut known = self.known(&receivers);
-        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
-        let noisy =
-            |index: usize, light: &DirectLight| limits.is_noisy(light, weights[index], mean);
-        self.double(rays, &places, noisy, limits.seed, &mut known, cancel)?;
-        self.learn(&receivers, known);
-        Some(self.shot(&receivers) - before)
-    }
-
-    /// Double the rays of points for as long as they are too noisy.
-    fn double(
-        &self,
-        rays: &RayTree,
-        receivers: &[Receiver],
-        is_noisy: impl Fn(usize, &DirectLight) -> bool,
-        seed: u64,
-        known: &mut [DirectLight],
-        cancel: &Cancel,
-    ) -> Option<()> {
-        loop {
-            let noisy: Vec<usize> = (0..known.len())
-                .filter(|&index| is_noisy(index, &known[index]))
-                .collect();
-            if noisy.is_empty() {
-                return Some(());
-            }
-            let places: Vec<Receiver> = noisy.iter().map(|&index| receivers[index]).collect();
-            let mut lights: Vec<DirectLight> = noisy.iter().map(|&index| known[index]).collect();
-            self.lights.shoot(
-                rays,
-                &places,
-                |light| 2 * light.tried,
-                seed,
-                &mut lights,
-                cancel,
-            );
-            cancel.proceed()?;
-            for (index, light) in noisy.into_iter().zip(lights) {
-                known[index] = light;
-            }
-        }
-    }
-
-    /// What is known of some vertices.
-    fn known(&self, receivers: &[(u32, Receiver)]) -> Vec<DirectLight> {
-        let known = |&(vertex, _): &(u32, Receiver)| self.vertices[vertex as usize];
-        receivers
-            .iter()
-            .map(|receiver| known(receiver).unwrap_or_default())
-            .collect()
-    }
-
-    /// What is now known of some vertices.
-    fn learn(&mut self, receivers: &[(u32, Receiver)], known: Vec<DirectLight>) {
-        for (&(vertex, _), light) in receivers.iter().zip(known) {
-            self.vertices[vertex as usize] = Some(light);
-        }
-    }
-
-    /// Rays shot from some vertices.
-    fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
-        let shot = |&(vertex, _): &(u32, Receiver)| {
-            self.vertices[vertex as usize].map_or(0, |light| u64::from(light.shot))
-        };
-        receivers.iter().map(shot).sum()
-    }
-
-    /// Sample the corners of leaves that were not sampled yet. Returns the rays shot.
-    ///
-    /// A share of the rays comes first. Where they agree with those of all vertices of the same elements there is no
-    /// shadow border, and they are enough. (To trust a vertex's own rays alone would be biased: where a twentieth of
-    /// the light arrives, most vertices would see none.)
-    pub(super) fn cover(
-        &mut self,
-        rays: &RayTree,
-        hierarchy: &Hierarchy,
-        samples: u32,
-        seed: u64,
-        cancel: &Cancel,
-    ) -> Option<u64> {
-        self.vertices.resize(hierarchy.mesh.vertices.len(), None);
-        let receivers = self.receivers(hierarchy, |_, light| light.is_none());
-        for &(vertex, _) in &receivers {
-            self.vertices[vertex as usize] = Some(DirectLight::default());
-        }
-        let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
-        self.shoot(rays, &receivers, |_| probing, seed, cancel);
-        let disputed = self.disputed(hierarchy);
-        let rest: Vec<(u32, Receiver)> = receivers
-            .iter()
-            .copied()
-            .filter(|&(vertex, _)| disputed[vertex as usize])
-            .collect();
-        self.shoot(rays, &rest, |_| samples, seed, cancel);
-        if cancel.is_cancelled() {
-            for &(vertex, _) in &receivers {
-                self.vertices[vertex as usize] = None;
-            }
-            return None;
-        }
-        Some(self.shot(&receivers))
-    }
-
-    fn shoot(
-        &mut self,
-        rays: &RayTree,
-        receivers: &[(u32, Receiver)],
-        wanted: impl Fn(&DirectLight) -> u32 + Sync,
-        seed: u64,
-        cancel: &Cancel,
-    ) {
-        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
-        let mut known = self.known(receivers);
-        self.lights
-            .shoot(rays, &places, wanted, seed, &mut known, cancel);
-        self.learn(receivers, known);
-    }
-
-    /// Which vertices share an element with one whose rays had another outcome.
-    fn disputed(&self, hierarchy: &Hierarchy) -> Vec<bool> {
-        let mut disputed = vec![false; self.vertices.len()];
-        for leaf in hierarchy.mesh.leaves() {
-            let corners = hierarchy.mesh.elements[leaf]
-                .vertices
-                .map(|vertex| vertex as usize);
-            let [a, b, c] = corners.map(|vertex| self.vertices[vertex].unwrap_or_default());
-            if !(a.agrees_with(&b) && b.agrees_with(&c) && c.agrees_with(&a)) {
-                for vertex in corners {
-                    disputed[vertex] = true;
-                }
-            }
-        }
-        disputed
     }
 
     fn mean(&self, hierarchy: &Hierarchy) -> f32 {
@@ -413,7 +262,7 @@ impl DirectField {
         self.centres.resize(hierarchy.mesh.elements.len(), None);
         let unknown: Vec<usize> = hierarchy
             .mesh
-            .leaves()
+            .held_leaves()
             .filter(|&leaf| {
                 self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
@@ -474,54 +323,5 @@ impl DirectField {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
             + size_of_val(self.shown.as_slice())
-    }
-}
-
-impl DirectField {
-    /// Where to sample each corner of a leaf that is wanted: a little inside the leaf whose normal is nearest to the mean
-    /// normal about the vertex.
-    pub(super) fn receivers(
-        &self,
-        hierarchy: &Hierarchy,
-        is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,
-    ) -> Vec<(u32, Receiver)> {
-        let mesh = &hierarchy.mesh;
-        let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
-        for leaf in mesh.leaves() {
-            for &vertex in &mesh.elements[leaf].vertices {
-                normals[vertex as usize] += mesh.elements[leaf].area_vector;
-            }
-        }
-        let mut chosen: Vec<Option<(f32, u32)>> = vec![None; mesh.vertices.len()];
-        for leaf in mesh.leaves() {
-            let normal = hierarchy.patch_of(leaf).normal;
-            for vertex in mesh.elements[leaf].vertices.map(|vertex| vertex as usize) {
-                let likeness = normals[vertex].dot(normal);
-                let is_best = chosen[vertex].is_none_or(|(best, _)| likeness > best);
-                if is_best && is_wanted(vertex, self.vertices[vertex]) {
-                    chosen[vertex] = Some((likeness, leaf as u32));
-                }
-            }
-        }
-        let receiver = |(vertex, choice): (usize, Option<(f32, u32)>)| {
-            let (_, leaf) = choice?;
-            let patch = hierarchy.patch_of(leaf as usize);
-            let centroid = mesh.elements[leaf as usize].centroid;
-            let point = mesh.position(vertex as u32).lerp(centroid, INSET);
-            let normal = normals[vertex].try_normalize().unwrap_or(patch.normal);
-            Some((
-                vertex as u32,
-                Receiver {
-                    point,
-                    normal,
-                    triangle: patch.triangle,
-                },
-            ))
-        };
-        chosen
-            .into_iter()
-            .enumerate()
-            .filter_map(receiver)
-            .collect()
     }
 }

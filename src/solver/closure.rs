@@ -66,9 +66,15 @@ pub(super) struct Closure {
 
 impl Closure {
     /// Surrounded by lit surfaces.
-    const CLOSED: Self = Self {
+    pub(super) const CLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
+    };
+
+    /// Anything between nothing and all: form factors are left as they are.
+    pub(super) const UNKNOWN: Self = Self {
+        share: 0.0,
+        deviation: f32::INFINITY,
     };
 
     /// From how many of some rays met a lit side.
@@ -132,6 +138,11 @@ impl Closures {
             element = hierarchy.mesh.elements[element].parent as usize;
         }
         element
+    }
+
+    /// The same closure of all patches.
+    pub(super) fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
+        Self(vec![closure; hierarchy.patches.len()])
     }
 
     /// Whether nothing was probed yet.

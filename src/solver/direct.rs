@@ -68,7 +68,11 @@ impl Lights {
         let is_sampled: Vec<bool> = hierarchy
             .patches
             .iter()
-            .map(|patch| patch.emission != Vec3::ZERO && power(patch) >= least)
+            .enumerate()
+            .map(|(index, patch)| {
+                let is_seen = hierarchy.held().contains(&index);
+                is_seen && patch.emission != Vec3::ZERO && power(patch) >= least
+            })
             .collect();
         let sampled = hierarchy
             .patches
@@ -135,6 +139,19 @@ impl Lights {
         self.emitters.iter().map(|emitter| emitter.triangle)
     }
 
+    /// Whether all emission that light is computed from is sampled.
+    pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
+        let mut held = hierarchy.held();
+        held.all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
+    }
+
+    /// Luminance of the power of the emitters per area of the scene: the mean irradiance if all of it arrives.
+    pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
+        let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
+        let sum: f64 = self.emitters.iter().map(power).sum();
+        (sum / hierarchy.area.max(f64::MIN_POSITIVE)) as f32
+    }
+
     /// The patches that are sampled.
     pub(super) fn sampled_patches(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.is_sampled.len()).filter(|&patch| self.is_sampled[patch])
@@ -181,6 +198,10 @@ impl Lights {
     ) {
         light.exact = self.unoccluded(receiver, sums);
         light.tried = samples.end.max(light.tried);
+        if rays.is_clear() {
+            light.arrive_whole();
+            return;
+        }
         let Some(&total) = sums.last().filter(|&&total| total > 0.0) else {
             return;
         };
@@ -220,7 +241,7 @@ impl Lights {
     }
 
     /// Irradiance without occlusion; `sums` becomes the running sums of its luminance over the emitters.
-    fn unoccluded(&self, receiver: &Receiver, sums: &mut Vec<f32>) -> Vec4 {
+    pub(super) fn unoccluded(&self, receiver: &Receiver, sums: &mut Vec<f32>) -> Vec4 {
         let (mut exact, mut total) = (Vec4::ZERO, 0.0);
         sums.clear();
         for emitter in &self.emitters {
@@ -300,11 +321,17 @@ impl DirectLight {
         }
         let total = luminance(mixed.exact);
         if total > 0.0 {
-            let by_ray = mixed.shot as f32 / total;
+            // Of what arrives whole without a ray only the ratio counts.
+            let by_ray = mixed.shot.max(1) as f32 / total;
             mixed.sent *= by_ray;
             mixed.arrived *= by_ray;
         }
         mixed
+    }
+
+    /// Nothing blocks: no ray is needed to know that everything arrives.
+    fn arrive_whole(&mut self) {
+        (self.sent, self.arrived) = (Vec4::ONE, Vec4::ONE);
     }
 
     /// Whether all rays of both points had the same outcome. Points that no light can reach agree with all.

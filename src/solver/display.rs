@@ -41,6 +41,7 @@ impl Solver {
             mesh,
             light: Arc::new(light),
             clusters: Arc::new(clusters),
+            left_out: self.plan.left_out.clone(),
         };
         Some(())
     }

@@ -103,7 +103,11 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Optio
         leaf_of[cluster.patches()].fill(index as u32);
     }
     cancel.proceed()?;
+    let held = hierarchy.held();
     let project = |patch: usize| {
+        if !held.contains(&patch) {
+            return Vec4::ZERO;
+        }
         incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
     };
     let pushed = (0..hierarchy.patches.len())

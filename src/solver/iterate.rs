@@ -77,8 +77,8 @@ enum Ending {
 }
 
 impl Solver {
-    /// Gather, push and pull until the light settles. Where it grows instead, rows are bounded; where even that does not
-    /// help, the light from before stays.
+    /// Gather, push and pull until the light settles. Where it grows instead, rows are bounded, and light gets through as
+    /// area does; where even that does not help, the light from before stays.
     pub(super) fn iterate(&mut self, report: &mut StepReport, cancel: &Cancel) -> Option<()> {
         let before = self.linked.clone();
         for bounds_rows in [false, true] {
@@ -94,6 +94,7 @@ impl Solver {
                 Ending::Growing => {
                     self.linked.clone_from(&before);
                     self.pull();
+                    self.links.level(&self.hierarchy);
                     report.notes.push(if bounds_rows {
                         "the light still grows: that of the last step stays".to_owned()
                     } else {

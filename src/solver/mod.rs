@@ -7,14 +7,18 @@
 mod adapt;
 mod anderson;
 mod budget;
+mod clear;
 mod closure;
+mod cover;
 mod direct;
 mod display;
+
 mod gather;
 mod inspect;
 mod inspection;
 mod iterate;
 mod light_parts;
+mod plan;
 mod reconstruct;
 mod relight;
 mod report;
@@ -30,6 +34,7 @@ use std::sync::{
 use glam::{Vec3, Vec4};
 
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
+pub use plan::{Keep, LeftOut, Omission};
 pub use relight::Relit;
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
@@ -45,6 +50,7 @@ use crate::{
 use adapt::DirectField;
 use closure::Closures;
 use direct::Lights;
+use plan::Plan;
 use reconstruct::LeafLight;
 use relight::Relighting;
 
@@ -94,7 +100,9 @@ const AMBIENT_SHARE: f32 = 0.1;
 pub struct Solver {
     scene: Arc<Scene>,
     settings: SolveSettings,
+    plan: Plan,
     memory_limit: Option<u64>,
+    /// Blocks nothing where the plan says so.
     rays: Arc<RayTree>,
     hierarchy: Hierarchy,
     areas: PatchSums,
@@ -117,7 +125,7 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// Prepare a solve: hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
+    /// Prepare a solve: plan, hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
     /// Returns `None` when cancelled on the way.
     pub fn new(
         scene: Arc<Scene>,
@@ -125,22 +133,27 @@ impl Solver {
         memory_limit: Option<u64>,
         cancel: &Cancel,
     ) -> Option<Self> {
-        cancel.proceed()?;
-        let rays = Arc::new(RayTree::new(&scene));
-        Self::with_rays(scene, rays, settings, memory_limit, cancel)
+        Self::with_rays(scene, None, settings, memory_limit, cancel)
     }
 
-    /// As [`Self::new`], with the scene's ray tree.
+    /// As [`Self::new`], with the scene's ray tree where there is one already.
     pub fn with_rays(
         scene: Arc<Scene>,
-        rays: Arc<RayTree>,
+        rays: Option<Arc<RayTree>>,
         settings: SolveSettings,
         memory_limit: Option<u64>,
         cancel: &Cancel,
     ) -> Option<Self> {
         cancel.proceed()?;
         let is_cancelled = || cancel.is_cancelled();
-        let hierarchy = Hierarchy::build(&scene, settings.crease_degrees, &is_cancelled)?;
+        let (plan, tree) = Plan::make(&scene, &settings, &is_cancelled)?;
+        let hierarchy = Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &is_cancelled)?;
+        cancel.proceed()?;
+        let rays = match rays {
+            _ if plan.is_clear => Arc::new(RayTree::clear()),
+            Some(rays) => rays,
+            None => Arc::new(RayTree::new(&scene)),
+        };
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
         let mut solver = Self {
             closures: Closures::default(),
@@ -158,6 +171,7 @@ impl Solver {
             snapshot: Snapshot::default(),
             scene,
             settings,
+            plan,
             memory_limit,
             rays,
             hierarchy,
@@ -171,7 +185,7 @@ impl Solver {
     /// Sample direct light on the first mesh, so that there is something to see before the first link.
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(1.0);
-        adapt::divide_coarse(&mut self.hierarchy, limits);
+        self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
             let (count, seed) = (limits.shadow_samples, limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
@@ -182,12 +196,22 @@ impl Solver {
 
     /// Probe closures, on the first mesh.
     fn probe_closures(&mut self, cancel: &Cancel) -> Option<()> {
-        if self.closures.is_empty() {
-            let seed = self.settings.seed;
-            let (closures, shot) = closure::closures(&self.hierarchy, &self.rays, seed, cancel)?;
-            self.closures = closures;
-            self.ray_count += shot;
+        if !self.closures.is_empty() {
+            return Some(());
         }
+        if let Some(closures) = self.closures_in_clear() {
+            self.closures = closures;
+            return Some(());
+        }
+        // In the clear the tree serves only this.
+        let rays = match self.rays.is_clear() {
+            true => Arc::new(RayTree::new(&self.scene)),
+            false => self.rays.clone(),
+        };
+        let seed = self.settings.seed;
+        let (closures, shot) = closure::closures(&self.hierarchy, &rays, seed, cancel)?;
+        self.closures = closures;
+        self.ray_count += shot;
         Some(())
     }
 
@@ -204,6 +228,7 @@ impl Solver {
         self.is_full = false;
         self.relighting.begin_step();
         self.probe_closures(cancel)?;
+        self.adapt_to_linked(fineness);
         self.adapt_to_direct(fineness, cancel)?;
         cancel.proceed()?;
         self.pull();
@@ -312,13 +337,35 @@ impl Solver {
     /// Make direct light known at all vertices, and divide elements where it bends.
     fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(fineness);
-        self.is_full |= !adapt::divide_coarse(&mut self.hierarchy, limits);
+        self.is_full |= !self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
             self.is_full |= field.is_full;
         }
         self.extend_to_new_elements();
         Some(())
+    }
+
+    /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
+    fn divide_coarse(&mut self, limits: adapt::Limits) -> bool {
+        let lights = self.direct.as_ref().map(|field| &field.lights);
+        let lights = lights.filter(|_| self.plan.follows_light);
+        adapt::divide_coarse(&mut self.hierarchy, lights, limits)
+    }
+
+    /// Where nothing else divides them, divide elements over which the light of the last step bends.
+    fn adapt_to_linked(&mut self, fineness: f32) {
+        if !self.plan.follows_light {
+            return;
+        }
+        let (limits, mean) = (self.direct_limits(fineness), self.mean_irradiance);
+        let wanted = adapt::bent_under(&self.hierarchy, &self.leaves, limits, mean);
+        let fits = self.hierarchy.mesh.fits(&wanted, limits.most_elements);
+        self.is_full |= !fits;
+        if fits {
+            self.hierarchy.mesh.divide(&wanted);
+            self.extend_to_new_elements();
+        }
     }
 
     fn direct_limits(&self, fineness: f32) -> adapt::Limits {
@@ -366,6 +413,11 @@ impl Solver {
         while passes < MOST_PASSES {
             let is_first = self.links.is_empty();
             let most_links = self.most_links();
+            let spreads = if self.plan.follows_light {
+                self.radiosity_spreads()
+            } else {
+                Vec::new()
+            };
             let refinement = {
                 let powers = PatchSums::of_power(&self.hierarchy, &self.power);
                 let sampler = PairSampler {
@@ -392,6 +444,9 @@ impl Solver {
                     seed: self.settings.seed,
                     cancelled: &|| cancel.is_cancelled(),
                     budget: LinkBudget::new(most_links),
+                    is_by_patch: self.plan.is_by_patch,
+                    follows_light: self.plan.follows_light,
+                    spreads: &spreads,
                 };
                 refiner.refine(is_first)
             };
@@ -409,7 +464,9 @@ impl Solver {
             }
             passes += 1;
             // Where links did not fit, threads stopped at different places: their rays are not counted.
-            self.ray_count += refinement.ray_count;
+            if !self.plan.is_clear {
+                self.ray_count += refinement.ray_count;
+            }
             self.links = LinkStore::from_runs(
                 self.hierarchy.node_count(),
                 &refinement.runs,

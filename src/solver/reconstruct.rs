@@ -288,6 +288,12 @@ impl VertexMeans {
                 weight[vertex as usize] += area;
             }
         }
+        // Of patches that no light reaches it is known that they receive nothing.
+        for patch in hierarchy.held().end..hierarchy.patches.len() {
+            for &vertex in &hierarchy.mesh.elements[patch].vertices {
+                weight[vertex as usize] += hierarchy.patches[patch].area;
+            }
+        }
         for index in (0..count).filter(|&index| weight[index] > 0.0) {
             irradiance[index] /= weight[index];
             error[index] /= weight[index];

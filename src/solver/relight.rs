@@ -6,6 +6,8 @@
 //! before, and corners of elements take their share as they did in the light that was solved last, until
 //! [`Solver::finish_relighting`] gathers for each of them: that takes several times as long as all sweeps together.
 //! Links stay those that the light before asked for: a step that follows refines them for the new one.
+//! What the plan left out stays out: it goes by what the scene says, so a surface that is painted may not light what was
+//! dark for being seen from black ones only.
 
 use std::sync::Arc;
 
@@ -288,8 +290,9 @@ impl Solver {
 
     /// Emitted power by colour.
     fn emitted(&self) -> DVec3 {
-        let patches = self.hierarchy.patches.iter();
+        let patches = &self.hierarchy.patches[self.hierarchy.held()];
         patches
+            .iter()
             .map(|patch| patch.emission.as_dvec3() * f64::from(patch.area))
             .sum()
     }

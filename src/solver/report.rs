@@ -67,16 +67,18 @@ impl Solver {
 
     /// Sums of form factors: what leaves receive when everything sends 1.
     fn fill_row_sums(&self, report: &mut StepReport) {
-        let (mut least, mut most, mut sum) = (f32::INFINITY, 0.0f32, 0.0f64);
-        for leaf in self.hierarchy.mesh.leaves() {
+        let (mut least, mut most) = (f32::INFINITY, 0.0f32);
+        let (mut sum, mut whole) = (0.0f64, 0.0f64);
+        for leaf in self.hierarchy.mesh.held_leaves() {
             let row = self.linked[leaf].w;
             least = least.min(row);
             most = most.max(row);
-            sum +=
-                f64::from(row) * f64::from(self.hierarchy.mesh.elements[leaf].area_vector.length());
+            let area = f64::from(self.hierarchy.mesh.elements[leaf].area_vector.length());
+            sum += f64::from(row) * area;
+            whole += area;
         }
         report.row_sum_min = least.min(most);
         report.row_sum_max = most;
-        report.row_sum_mean = (sum / self.hierarchy.area.max(f64::MIN_POSITIVE)) as f32;
+        report.row_sum_mean = (sum / whole.max(f64::MIN_POSITIVE)) as f32;
     }
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::plan::Keep;
+
 /// How a cluster's directional power and area are represented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -88,6 +90,8 @@ pub struct SolveSettings {
     pub tolerance: f32,
     /// Seed of every random choice.
     pub seed: u64,
+    /// What is computed even where the scene does not need it.
+    pub keep: Keep,
 }
 
 impl SolveSettings {
@@ -119,6 +123,7 @@ impl SolveSettings {
             max_steps: 5,
             tolerance: 1e-3,
             seed: 1,
+            keep: Keep::NONE,
         }
     }
 

@@ -7,6 +7,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use serde::Serialize;
 
+use super::LeftOut;
+
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DisplayMesh {
@@ -83,6 +85,8 @@ pub struct Snapshot {
     pub light: Arc<VertexLight>,
     /// The cluster tree, children after parents; patches and elements left out.
     pub clusters: Arc<Vec<ClusterBox>>,
+    /// What the scene does not need and was left out.
+    pub left_out: Arc<Vec<LeftOut>>,
 }
 
 impl Snapshot {

@@ -78,6 +78,19 @@ impl LinkStore {
         &self.links
     }
 
+    /// Let all light through as the area does: then the sums of form factors bound what any surface receives. Between
+    /// elements both are the same already.
+    pub fn level(&mut self, hierarchy: &Hierarchy) {
+        let first_element = hierarchy.clusters.len();
+        for (receiver, range) in self.offsets.windows(2).enumerate() {
+            for link in &mut self.links[range[0] as usize..range[1] as usize] {
+                if receiver.min(link.source.index()) < first_element {
+                    link.visibility = link.form_factor;
+                }
+            }
+        }
+    }
+
     /// Number of links.
     pub fn len(&self) -> usize {
         self.links.len()

@@ -1,5 +1,6 @@
 //! Node pairs: what a source sends to a point, who sees whom, which pairs are good enough, and the links that stay.
 
+mod clear;
 mod kernel;
 mod link;
 mod oracle;

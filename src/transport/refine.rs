@@ -92,6 +92,12 @@ pub struct Refiner<'a, F> {
     pub cancelled: &'a (dyn Fn() -> bool + Sync),
     /// How many links there may be.
     pub budget: LinkBudget,
+    /// Whether only elements are linked, no clusters.
+    pub is_by_patch: bool,
+    /// Whether nothing blocks and elements are divided where light is found to bend, not for their links.
+    pub follows_light: bool,
+    /// By how much the radiosity of each leaf varies over it (luminance); needed where `follows_light`.
+    pub spreads: &'a [f32],
 }
 
 /// Counts links as they are made, on all threads.
@@ -116,7 +122,7 @@ impl LinkBudget {
 }
 
 /// What becomes of a pair.
-enum Decision {
+pub(super) enum Decision {
     Drop,
     Keep(Link),
     DivideSource,
@@ -131,7 +137,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         } else {
             Vec::new()
         };
-        let refinement = self.visit(Hierarchy::ROOT, &start);
+        let mut refinement = self.visit(Hierarchy::ROOT, &start);
+        if self.follows_light {
+            // Sources are wanted by each of their receivers.
+            refinement.wanted.sort_unstable();
+            refinement.wanted.dedup();
+        }
         Refinement {
             fits: !self.budget.is_spent(),
             ..refinement
@@ -143,7 +154,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         (self.cancelled)() || self.budget.is_spent()
     }
 
-    fn hierarchy(&self) -> &'a Hierarchy {
+    pub(super) fn hierarchy(&self) -> &'a Hierarchy {
         self.judge.kernel.hierarchy
     }
 
@@ -293,6 +304,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         out: &mut Refinement,
     ) -> Decision {
         let weight = self.weight(receiver);
+        if let Some(decision) = self.decide_by_plan(source, receiver, known, weight, out) {
+            return decision;
+        }
         if source == receiver {
             return self.decide_self(source, weight, known, out);
         }
@@ -423,7 +437,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         (share as f32).sqrt()
     }
 
-    fn random(&self, source: NodeId, receiver: NodeId) -> Random {
+    pub(super) fn random(&self, source: NodeId, receiver: NodeId) -> Random {
         Random::new(
             self.seed,
             (u64::from(receiver.0) << 32) | u64::from(source.0),

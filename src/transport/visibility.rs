@@ -248,6 +248,9 @@ impl PairSampler<'_> {
         ray_count: u32,
         random: &mut Random,
     ) -> (f32, f32) {
+        if self.rays.is_clear() {
+            return (1.0, 1.0);
+        }
         let (mut light, mut area) = (Share::default(), Share::default());
         let mut all = Share::default();
         for _ in 0..ray_count {
@@ -288,6 +291,9 @@ impl PairSampler<'_> {
         ray_count: u32,
         random: &mut Random,
     ) -> f32 {
+        if self.rays.is_clear() {
+            return self.form_factor_in_clear(source, receiver, random);
+        }
         let mut met = 0;
         for _ in 0..ray_count {
             let from = self.sample(receiver, random);

@@ -17,7 +17,7 @@ pub enum Effect {
 
 /// What changing `old` to `new` does. Field by field:
 ///
-/// * `method`, `oracle`, `direct`, `push`, `shadow_samples`, `crease_degrees`, `seed`: restart, since links, samples or
+/// * `method`, `oracle`, `direct`, `push`, `shadow_samples`, `crease_degrees`, `seed`, `keep`: restart, since links, samples or
 ///   vertices that exist were made by the old value;
 /// * `samples`: restarts where the oracle uses it, else continues;
 /// * `epsilon`, `min_area`, `mesh_tolerance`, `tolerance`: lower refines, higher continues;
@@ -33,6 +33,7 @@ pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
         || old.shadow_samples != new.shadow_samples
         || old.crease_degrees != new.crease_degrees
         || old.seed != new.seed
+        || old.keep != new.keep
         || (old.samples != new.samples && new.oracle == Oracle::Samples);
     let refines = new.epsilon < old.epsilon
         || new.min_area < old.min_area
@@ -51,7 +52,7 @@ pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::Method;
+    use crate::solver::{Keep, Method};
 
     fn effect(change: impl Fn(&mut SolveSettings)) -> Effect {
         let old = SolveSettings::normal();
@@ -65,6 +66,7 @@ mod tests {
         assert_eq!(effect(|_| {}), Effect::Nothing);
         assert_eq!(effect(|s| s.method = Method::SixFace), Effect::Restarts);
         assert_eq!(effect(|s| s.seed += 1), Effect::Restarts);
+        assert_eq!(effect(|s| s.keep = Keep::ALL), Effect::Restarts);
         assert_eq!(effect(|s| s.crease_degrees = 60.0), Effect::Restarts);
         assert_eq!(effect(|s| s.samples = 9), Effect::Continues);
         assert_eq!(effect(|s| s.epsilon *= 0.5), Effect::Refines);

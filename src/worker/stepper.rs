@@ -46,16 +46,18 @@ pub struct Job {
 impl Job {
     /// Prepare the solver for it, unless cancelled.
     pub fn solver(self, cancel: &Cancel) -> Option<Solver> {
-        let rays = match self.rays {
-            Some(rays) => rays,
-            None if cancel.is_cancelled() => return None,
-            None => Arc::new(RayTree::new(&self.scene)),
-        };
-        let scene = match self.appearances {
-            Some(appearances) => Arc::new(self.scene.relit(&appearances)),
-            None => self.scene,
-        };
-        Solver::with_rays(scene, rays, self.settings, self.memory_limit, cancel)
+        let mut solver = Solver::with_rays(
+            self.scene,
+            self.rays,
+            self.settings,
+            self.memory_limit,
+            cancel,
+        )?;
+        if let Some(appearances) = self.appearances {
+            // What may be left out is told from the scene as it was read: what is off may be switched on.
+            solver.relight(&appearances, cancel)?;
+        }
+        Some(solver)
     }
 }
 

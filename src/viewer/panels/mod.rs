@@ -5,6 +5,7 @@ pub mod dialog;
 pub mod emission;
 pub mod error;
 pub mod help;
+pub mod left_out;
 pub mod legend;
 pub mod links;
 pub mod materials;

@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::{count, figure, row, seconds};
+use super::{count, figure, left_out, row, seconds};
 use crate::viewer::state::State;
 
 /// Show the counts.
@@ -100,6 +100,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
             );
         }
     });
+    left_out::left_out_ui(ui, state);
     frame_ui(ui, state);
     if !state.adapter_name.is_empty() {
         ui.add_space(2.0);

@@ -1,0 +1,321 @@
+//! The plan of a solve: what this scene does not need, and why.
+//!
+//! Made once, between loading and solving, by looking at the scene. What is decided here is data that the rooms obey:
+//! the tree holds no patch that is left out, the ray tree of a clear scene blocks nothing, and so on.
+//! In the order of the list:
+//!
+//! | name | left out | where | harm |
+//! |---|---|---|---|
+//! | `unlit` | patches | no chain of patches that face each other leads to an emitter | none: they stay as dark as they are |
+//! | `rays` | the ray tree and all rays | no triangle has parts of the scene on both sides | none: no ray would be blocked |
+//! | `elements` | elements, links | as `rays`: light has no shadows, and bends only where it is seen to | that of the tolerances |
+//! | `clusters` | links of clusters | as `rays`, and few patches: all pairs of them are exact and cheap | that of the tolerances |
+//!
+//! The last two are for the default method and oracle: whoever asks for others wants to see what they do.
+//!
+//! Looked at and not left out, since it does not pay: rays of single pairs whose shaft is empty, channels of grey scenes,
+//! clusters of small scenes with shadows.
+//!
+//! Beside these, some things are left out by loading, whatever is kept; they are listed after the plan.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Method, Oracle, SolveSettings};
+use crate::{
+    hierarchy::PatchTree,
+    scene::{Scene, WarningKind},
+};
+
+/// Patches of a scene that is solved patch by patch, at most: their pairs are fewer than the links of usual scenes.
+const FEW_PATCHES: usize = 256;
+
+/// What may be left out of a solve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Omission {
+    /// Patches that no light can reach, and emitters that nothing sees.
+    Unlit,
+    /// Rays, where nothing can stand between two surfaces.
+    Rays,
+    /// Elements where light does not bend, where nothing casts a shadow.
+    Elements,
+    /// Clusters, where there are few patches and nothing stands between them.
+    Clusters,
+}
+
+impl Omission {
+    /// All of them, in the order of the plan.
+    pub const ALL: [Self; 4] = [Self::Unlit, Self::Rays, Self::Elements, Self::Clusters];
+
+    /// As flags and reports call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unlit => "unlit",
+            Self::Rays => "rays",
+            Self::Elements => "elements",
+            Self::Clusters => "clusters",
+        }
+    }
+}
+
+/// What must not be left out. As a list of names in files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(from = "Vec<Omission>", into = "Vec<Omission>")]
+pub struct Keep(u8);
+
+impl Keep {
+    /// Everything: nothing is left out.
+    pub const ALL: Self = Self((1 << Omission::ALL.len()) - 1);
+
+    /// Nothing: all is left out that can be.
+    pub const NONE: Self = Self(0);
+
+    /// Whether this is kept.
+    pub const fn has(self, omission: Omission) -> bool {
+        self.0 & (1 << omission as u8) != 0
+    }
+}
+
+impl From<Vec<Omission>> for Keep {
+    fn from(kept: Vec<Omission>) -> Self {
+        let add = |bits: u8, omission: Omission| bits | (1 << omission as u8);
+        Self(kept.into_iter().fold(0, add))
+    }
+}
+
+impl From<Keep> for Vec<Omission> {
+    fn from(keep: Keep) -> Self {
+        let kept = Omission::ALL.into_iter();
+        kept.filter(|&omission| keep.has(omission)).collect()
+    }
+}
+
+/// One thing that was left out, for people.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// What it is called; where it is the name of an [`Omission`], it can be kept.
+    pub name: &'static str,
+    /// How many of it.
+    pub count: u64,
+    /// What was left out.
+    pub what: String,
+    /// Why it is not needed.
+    pub reason: String,
+    /// How far the light may differ from that with it.
+    pub bound: &'static str,
+}
+
+impl std::fmt::Display for LeftOut {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            name,
+            what,
+            reason,
+            bound,
+            ..
+        } = self;
+        write!(out, "{name}: {what}, since {reason}; {bound}")
+    }
+}
+
+/// What a solve obeys.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plan {
+    /// Nothing blocks: there is no ray to shoot.
+    pub(super) is_clear: bool,
+    /// The patches fill the view of each other, so that form factors add to 1.
+    pub(super) is_closed: bool,
+    /// Elements are divided where light bends, and nowhere else.
+    pub(super) follows_light: bool,
+    /// Only elements exchange light.
+    pub(super) is_by_patch: bool,
+    /// The list.
+    pub(super) left_out: Arc<Vec<LeftOut>>,
+}
+
+impl Plan {
+    /// Look at a scene, and plant the tree that is needed; `None` when cancelled.
+    pub(super) fn make(
+        scene: &Scene,
+        settings: &SolveSettings,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<(Self, PatchTree)> {
+        let may_omit = |omission| !settings.keep.has(omission);
+        let mut plan = Self::default();
+        let mut tree = PatchTree::build(scene, cancelled)?;
+        if may_omit(Omission::Unlit) {
+            tree = plan.omit_unlit(scene, tree, cancelled)?;
+        }
+        if may_omit(Omission::Rays) && tree.is_clear(scene) {
+            // Who asks for the paper's way wants to see what it does.
+            let is_exact_wanted =
+                settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
+            let has_few = tree.held().len() <= FEW_PATCHES;
+            plan.is_clear = true;
+            plan.is_closed = tree.is_closed(scene);
+            plan.follows_light = is_exact_wanted && may_omit(Omission::Elements);
+            plan.is_by_patch = is_exact_wanted && has_few && may_omit(Omission::Clusters);
+            plan.note_clear(scene, &tree);
+        }
+        Arc::make_mut(&mut plan.left_out).extend(left_out_by_loading(scene));
+        Some((plan, tree))
+    }
+
+    fn omit_unlit(
+        &mut self,
+        scene: &Scene,
+        tree: PatchTree,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<PatchTree> {
+        let lit = tree.lit(scene);
+        // Without any light there is nothing to spare.
+        if lit.iter().all(|&is_lit| is_lit) || !lit.contains(&true) {
+            return Some(tree);
+        }
+        let dark: Vec<bool> = lit.into_iter().map(|is_lit| !is_lit).collect();
+        let patches = || tree.patches.iter().zip(&dark).filter(|(_, dark)| **dark);
+        let emits = |patch: &crate::hierarchy::Patch| patch.emission != glam::Vec3::ZERO;
+        let unseen = patches().filter(|(patch, _)| emits(patch)).count();
+        self.note(
+            Omission::Unlit,
+            patches().count(),
+            format!(
+                "{} of {} sides of triangles take no part",
+                patches().count(),
+                tree.patches.len()
+            ),
+            "no chain of surfaces that face each other leads from an emitter to them",
+            "nothing changes: they are as dark with it",
+        );
+        if unseen > 0 {
+            self.note(
+                Omission::Unlit,
+                unseen,
+                format!("{unseen} emitting sides light nothing"),
+                "no surface lies before them that faces them",
+                "nothing changes: they shine as they are",
+            );
+        }
+        tree.without(scene, &dark, cancelled)
+    }
+
+    /// List what is left out where nothing blocks.
+    fn note_clear(&mut self, scene: &Scene, tree: &PatchTree) {
+        let (triangles, held) = (scene.triangles.len(), tree.held().len());
+        let exception = if self.is_closed || self.is_by_patch {
+            ""
+        } else {
+            ", but for those that look how open the scene is"
+        };
+        self.note(
+            Omission::Rays,
+            triangles,
+            format!("the ray tree of {triangles} triangles and every ray{exception}"),
+            "all that is lit lies on one side of each triangle's plane, so nothing can stand between two surfaces",
+            "light differs by no more than the noise of those rays",
+        );
+        if self.follows_light {
+            self.note(
+                Omission::Elements,
+                held,
+                format!("elements of {held} patches where light does not bend, and links between them"),
+                "nothing casts a shadow, and between elements in full view form factors are known exactly",
+                "light differs by no more than the tolerances of mesh and links",
+            );
+        }
+        if self.is_by_patch {
+            self.note(
+                Omission::Clusters,
+                tree.clusters.len(),
+                format!(
+                    "links of clusters, of which there would be {}",
+                    tree.clusters.len()
+                ),
+                "there are so few patches, all in full view, that all pairs of them can be linked",
+                "light differs by no more than the tolerance of links",
+            );
+        }
+    }
+
+    fn note(
+        &mut self,
+        omission: Omission,
+        count: usize,
+        what: String,
+        reason: &str,
+        bound: &'static str,
+    ) {
+        Arc::make_mut(&mut self.left_out).push(LeftOut {
+            name: omission.name(),
+            count: count as u64,
+            what,
+            reason: reason.to_owned(),
+            bound,
+        });
+    }
+}
+
+/// What the reader of the scene left out already.
+fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
+    let backs = scene
+        .triangles
+        .iter()
+        .filter(|face| !face.two_sided)
+        .count();
+    let skipped = scene
+        .warnings
+        .iter()
+        .filter(|warning| warning.kind == WarningKind::FaceSkipped);
+    let doubles: usize = skipped
+        .filter(|warning| warning.message.ends_with(crate::scene::DOUBLED))
+        .map(|warning| warning.count)
+        .sum();
+    let entries = [
+        (
+            "backs",
+            backs,
+            "backs of triangles",
+            "they belong to closed shells or have a twin that looks the other way, or --sides one was asked for",
+            "nothing changes: nobody is inside",
+        ),
+        (
+            "doubles",
+            doubles,
+            "triangles",
+            "each lies on another one that looks the same way",
+            "light would be there twice",
+        ),
+    ];
+    let found = entries.into_iter().filter(|entry| entry.1 > 0);
+    found
+        .map(|(name, count, what, reason, bound)| LeftOut {
+            name,
+            count: count as u64,
+            what: format!("{count} {what}"),
+            reason: reason.to_owned(),
+            bound,
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_survives_a_file_and_unknown_names_do_not() {
+        for kept in [vec![], vec![Omission::Rays], Omission::ALL.to_vec()] {
+            let keep = Keep::from(kept.clone());
+            assert_eq!(Vec::from(keep), kept);
+            let text = serde_json::to_string(&keep).unwrap();
+            assert_eq!(serde_json::from_str::<Keep>(&text).unwrap(), keep);
+            for omission in Omission::ALL {
+                assert_eq!(keep.has(omission), kept.contains(&omission));
+            }
+        }
+        assert_eq!(Keep::from(Omission::ALL.to_vec()), Keep::ALL);
+        assert!(serde_json::from_str::<Keep>(r#"["light"]"#).is_err());
+    }
+}

@@ -1,0 +1,205 @@
+//! Pairs in scenes that need less: those of few patches, and those where nothing blocks.
+//!
+//! Where nothing blocks, the form factor between two elements is known exactly, however near they are. What is left to
+//! err is that the source is not evenly bright, which its own elements tell, and that the receiver's part of the form
+//! factor varies, which matters only for what it reflects: what is shown is evaluated at its corners. So a pair can be
+//! kept that bounds from spheres would divide again and again, and elements are left to be divided where light bends.
+
+use glam::Vec3;
+
+use super::{
+    Judgement, Link, PairSampler,
+    kernel::element_form_factor,
+    luminance,
+    refine::{Decision, Refinement, Refiner},
+};
+use crate::{
+    geometry::{Random, centroid, point_irradiance},
+    hierarchy::{Hierarchy, Kind, NodeId},
+};
+
+/// Points of a receiver at which form factors of clusters are summed. One would miss how uneven they are near an edge; many
+/// cost time for links that later steps divide.
+const POINTS: u32 = 4;
+
+/// Beyond this many radii of both, form factors are those of the centroids: they vary by less than half.
+const NEAR: f32 = 2.0;
+
+/// Relative change of a form factor per radius of the receiver over the distance: of the two cosines one, and of the
+/// squared distance two.
+const FAR_CHANGE: f32 = 4.0;
+
+/// Where on the way to its corners a receiver is looked at, beside its centroid.
+const TOWARDS_CORNER: f32 = 0.6;
+
+/// Where a form factor changes by more than this share of its mean, more points are taken: it is peaked where receiver and
+/// source touch, and a few points inside miss some of that.
+const PEAKED: f32 = 0.5;
+
+/// Errors in view are estimates, where those of other pairs are bounds that are hardly ever reached: to be as good, pairs
+/// must keep this share of the threshold. Larger, and light from uneven walls smears into the corners of a room; smaller,
+/// and time goes into what is not seen.
+const ESTIMATE_SHARE: f32 = 0.02;
+
+/// The unoccluded form factor from points of a receiver to a source.
+struct InView {
+    mean: f32,
+    /// Largest minus smallest.
+    change: f32,
+}
+
+impl InView {
+    /// Of a pair that has a link: near its source a leaf may see as much more as it sees on average.
+    fn known(form_factor: f32) -> Self {
+        Self {
+            mean: form_factor,
+            change: form_factor,
+        }
+    }
+
+    fn between(hierarchy: &Hierarchy, source: usize, receiver: usize) -> Self {
+        let (from, to) = (
+            &hierarchy.mesh.elements[source],
+            &hierarchy.mesh.elements[receiver],
+        );
+        let normal = hierarchy.patch_of(receiver).normal;
+        let at = |point| element_form_factor(hierarchy, source, point, normal);
+        let middle = at(to.centroid);
+        let distance = from.centroid.distance(to.centroid);
+        if distance > NEAR * (from.radius + to.radius) {
+            return Self {
+                mean: middle,
+                change: middle * (FAR_CHANGE * to.radius / distance).min(1.0),
+            };
+        }
+        let [a, b, c] = hierarchy.mesh.corners(receiver);
+        let around = |corners: [Vec3; 3]| {
+            let middle = centroid(corners);
+            corners.map(|corner| at(middle.lerp(corner, TOWARDS_CORNER)))
+        };
+        let coarse = around([a, b, c]);
+        let least = coarse.into_iter().fold(middle, f32::min);
+        let most = coarse.into_iter().fold(middle, f32::max);
+        let mean = (middle + coarse.iter().sum::<f32>()) * 0.25;
+        let change = most - least;
+        if change <= PEAKED * mean {
+            return Self { mean, change };
+        }
+        // Four quarters, each by its own points.
+        let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
+        let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
+        let sum: f32 = quarters
+            .into_iter()
+            .map(|quarter| at(centroid(quarter)) + around(quarter).iter().sum::<f32>())
+            .sum();
+        Self {
+            mean: sum / 16.0,
+            change,
+        }
+    }
+}
+
+impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
+    /// What becomes of a pair for which the scene needs less than in general; `None` for the others.
+    pub(super) fn decide_by_plan(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        known: Option<&Link>,
+        weight: f32,
+        out: &mut Refinement,
+    ) -> Option<Decision> {
+        let kinds = [source, receiver].map(|node| self.hierarchy().kind(node));
+        match kinds {
+            [Kind::Cluster(_), _] if self.is_by_patch && source != receiver => {
+                Some(Decision::DivideSource)
+            }
+            [_, Kind::Cluster(_)] if self.is_by_patch => Some(Decision::DivideReceiver),
+            [Kind::Element(from), Kind::Element(to)] if self.follows_light && from != to => {
+                let mut random = self.random(source, receiver);
+                match self.judge.judge(source, receiver, &mut random) {
+                    Judgement::Nothing => Some(Decision::Drop),
+                    Judgement::Transfer { bound, .. } => {
+                        Some(self.decide_in_view([from, to], known, weight, bound, out))
+                    }
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// What becomes of two elements in full view of each other; `known` is their link if they have one.
+    fn decide_in_view(
+        &self,
+        [from, to]: [usize; 2],
+        known: Option<&Link>,
+        weight: f32,
+        bound: f32,
+        out: &mut Refinement,
+    ) -> Decision {
+        let hierarchy = self.hierarchy();
+        let (source, receiver) = (&hierarchy.mesh.elements[from], &hierarchy.mesh.elements[to]);
+        let seen = match known {
+            // What a leaf receives stays as it is, and only the source may have become uneven.
+            Some(link) if receiver.is_leaf() => InView::known(link.form_factor),
+            _ => InView::between(hierarchy, from, to),
+        };
+        let reflected = luminance(hierarchy.patch_of(to).reflectance.extend(0.0));
+        let mean = luminance(self.judge.kernel.tables.elements[from]);
+        let of_source = self.unevenness(from) * (seen.mean + seen.change);
+        let of_receiver = reflected * mean * seen.change;
+        let exceeds = |error: f32| error * weight > ESTIMATE_SHARE * self.threshold;
+        if !source.is_leaf() && exceeds(of_source) {
+            return Decision::DivideSource;
+        }
+        if !receiver.is_leaf() && exceeds(of_receiver) {
+            return Decision::DivideReceiver;
+        }
+        if exceeds(of_source) && source.area_vector.length() * 0.25 >= self.min_area {
+            out.wanted.push(from as u32);
+        }
+        Decision::Keep(Link {
+            source: NodeId((hierarchy.clusters.len() + from) as u32),
+            visibility: 1.0,
+            // What is seen at a few points tells more than bounds that hold for all.
+            error: bound.min(of_source + mean * seen.change),
+            form_factor: seen.mean,
+        })
+    }
+
+    /// By how much the radiosity of an element is above its mean somewhere.
+    fn unevenness(&self, element: usize) -> f32 {
+        let tables = self.judge.kernel.tables;
+        if self.hierarchy().mesh.elements[element].is_leaf() {
+            return self.spreads.get(element).copied().unwrap_or(0.0);
+        }
+        let brightest = luminance(tables.brightest_in_elements[element]);
+        (brightest - luminance(tables.elements[element])).max(0.0)
+    }
+}
+
+impl PairSampler<'_> {
+    /// Mean form factor from a receiver to a source where nothing blocks: the exact form factors of all patches of the
+    /// source from a few points.
+    pub(super) fn form_factor_in_clear(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        random: &mut Random,
+    ) -> f32 {
+        let hierarchy = self.hierarchy;
+        let elements = match hierarchy.kind(source) {
+            Kind::Cluster(index) => hierarchy.clusters[index].patches(),
+            Kind::Element(index) => index..index + 1,
+        };
+        let mut sum = 0.0;
+        for _ in 0..POINTS {
+            let (point, normal) = self.point_on(receiver, random);
+            let seen = elements
+                .clone()
+                .map(|element| point_irradiance(point, normal, hierarchy.mesh.corners(element)));
+            sum += seen.sum::<f32>().min(1.0);
+        }
+        sum / POINTS as f32
+    }
+}

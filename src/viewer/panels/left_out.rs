@@ -1,0 +1,24 @@
+//! What the scene does not need and was left out, folded.
+
+use eframe::egui;
+
+use crate::viewer::state::State;
+
+/// Show the list, where there is one.
+pub fn left_out_ui(ui: &mut egui::Ui, state: &State) {
+    let Some(snapshot) = &state.run.snapshot else {
+        return;
+    };
+    if snapshot.left_out.is_empty() {
+        return;
+    }
+    egui::CollapsingHeader::new(format!("Left out ({})", snapshot.left_out.len()))
+        .id_salt("left out")
+        .show(ui, |ui| {
+            for left_out in snapshot.left_out.iter() {
+                ui.label(&left_out.what)
+                    .on_hover_text(format!("{}; {}", left_out.reason, left_out.bound));
+                ui.weak(format!("since {}", left_out.reason));
+            }
+        });
+}
