@@ -293,7 +293,7 @@ impl Controller {
                 self.outbox.publish(generation, snapshot);
                 run.is_rough = relit.is_rough;
                 run.ask_again();
-                let report = run.complete(relit.report);
+                let report = run.dated(relit.report);
                 let seconds = Some(trip.spent.as_secs_f64());
                 self.outbox
                     .send(generation, Event::Relit { report, seconds });
@@ -307,7 +307,7 @@ impl Controller {
             Outcome::RelitFinely(Some(report), snapshot) => {
                 self.outbox.publish(generation, snapshot);
                 run.ask_again();
-                let report = run.complete(report);
+                let report = run.dated(report);
                 let seconds = None;
                 self.outbox
                     .send(generation, Event::Relit { report, seconds });

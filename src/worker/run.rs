@@ -65,6 +65,8 @@ pub(super) struct Run {
     pub before: Duration,
     /// Time spent preparing and stepping.
     pub solving: Duration,
+    /// Running time and time spent, in seconds, at the end of the last step.
+    last_times: (f64, f64),
 }
 
 impl Run {
@@ -88,6 +90,7 @@ impl Run {
             since: Instant::now(),
             before: Duration::ZERO,
             solving: Duration::ZERO,
+            last_times: (0.0, 0.0),
         }
     }
 
@@ -178,16 +181,19 @@ impl Run {
         self.since.checked_add(limit)
     }
 
-    /// Give a report the times of the run.
-    pub(super) fn complete(&self, mut report: StepReport) -> StepReport {
-        report.elapsed_s = (self.before + self.since.elapsed()).as_secs_f64();
-        report.solve_s = self.solving.as_secs_f64();
+    /// Give a report the times of the last step: changing the light is no part of the way there.
+    pub(super) fn dated(&self, mut report: StepReport) -> StepReport {
+        (report.elapsed_s, report.solve_s) = self.last_times;
         report
     }
 
     /// Complete the report of a step, and end the run if it was the last.
     pub(super) fn take_note(&mut self, report: StepReport) -> StepReport {
-        let report = self.complete(report);
+        self.last_times = (
+            (self.before + self.since.elapsed()).as_secs_f64(),
+            self.solving.as_secs_f64(),
+        );
+        let report = self.dated(report);
         if let Some(reason) = self.end_after(&report) {
             // Lower settings that came during the step ask for more.
             let more = self.settings_changed && !reason.can_continue();
