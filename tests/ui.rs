@@ -10,8 +10,9 @@ use std::{
     sync::Arc,
 };
 
-use eframe::egui;
+use eframe::egui::{self, Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
+use glam::Vec3;
 use vecrad::{
     solver::SolveSettings,
     viewer::{
@@ -380,6 +381,53 @@ fn emission_is_scaled_at_once_and_reset() {
     harness.get_by_label("Reset emission scale").click();
     harness.run_steps(3);
     assert_eq!(harness.state().state.view.emission_scale, 1.0);
+}
+
+#[test]
+fn lights_and_materials_are_changed_by_their_controls_and_reset() {
+    let mut harness = plates();
+    let radiance = |harness: &Harness<'static, App>| -> Vec3 {
+        let snapshot = harness.state().state.run.snapshot.clone();
+        let snapshot = snapshot.expect("the plates are lit");
+        let mesh = snapshot.mesh.emission.iter().sum::<Vec3>();
+        mesh + snapshot.light.irradiance.iter().sum::<Vec3>()
+    };
+    let before = radiance(&harness);
+    let lamp = {
+        let state = &harness.state().state;
+        let lamp = state.materials.lights().next().expect("a plate emits");
+        state.materials.now[lamp].name.clone()
+    };
+    harness.get_by_role_and_label(Role::CheckBox, &lamp).click();
+    wait_for(&mut harness, |app| app.state.run.relit_secs.is_some());
+    assert_eq!(radiance(&harness), Vec3::ZERO, "switched off");
+    assert!(harness.state().state.materials.are_changed());
+    assert_eq!(harness.state().state.run.status, RunStatus::Paused);
+    harness.get_by_label("Reset lights and materials").click();
+    wait_for(&mut harness, |app| {
+        let mesh = app.state.run.snapshot.as_ref().map(|shown| &shown.mesh);
+        mesh.is_some_and(|mesh| mesh.emission.iter().any(|light| *light != Vec3::ZERO))
+    });
+    assert!(!harness.state().state.materials.are_changed());
+    assert!((radiance(&harness) / before - 1.0).abs().max_element() < 1e-5);
+}
+
+#[test]
+fn what_is_measured_by_a_reference_goes_with_the_light_it_was_traced_for() {
+    let mut harness = plates();
+    perform(&mut harness, Action::TraceReference);
+    wait_for(&mut harness, |app| app.state.truth.newest_error().is_some());
+    perform(&mut harness, Action::Mode(ViewMode::Error));
+    let mut materials = harness.state().state.materials.clone();
+    materials.now[0].reflectance = Vec3::splat(0.25);
+    perform(&mut harness, Action::Relight(materials));
+    let state = &harness.state().state;
+    assert!(!state.truth.exists() && state.truth.newest_error().is_none());
+    assert_ne!(state.view.mode, ViewMode::Error);
+    let scene = state.lit_scene().expect("there is a scene");
+    assert_eq!(scene.materials[0].reflectance, Vec3::splat(0.25));
+    perform(&mut harness, Action::TraceReference);
+    wait_for(&mut harness, |app| app.state.truth.newest_error().is_some());
 }
 
 #[test]

@@ -254,7 +254,11 @@ fn a_scene_without_emitters_has_nothing_to_scale() {
     wait_for(&mut harness, |app| app.state.loaded.is_some());
     for label in ["Emission scale", "Rays per vertex"] {
         assert!(
-            harness.query_all_by_label(label).next().is_none(),
+            // A figure of the progress has the same name.
+            harness
+                .query_all_by_role_and_label(egui::Role::Slider, label)
+                .next()
+                .is_none(),
             "{label}"
         );
     }

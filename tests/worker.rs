@@ -14,8 +14,8 @@ use std::{
 use glam::{DVec3, Vec3};
 use vecrad::{
     hierarchy::NodeId,
-    scene::{Material, Scene, SceneBuilder, SceneOptions},
-    solver::{Cancel, Inspection, Snapshot, SolveSettings, StepReport, Subject},
+    scene::{Appearance, Material, Scene, SceneBuilder, SceneOptions},
+    solver::{Cancel, Inspection, Relit, Snapshot, SolveSettings, StepReport, Subject},
     worker::{Effect, Event, Generation, Job, RunOptions, Stepper, StopReason, WorkerHandle},
 };
 
@@ -49,6 +49,14 @@ struct Script {
     inspected: AtomicU32,
     /// Steppers that were dropped.
     dropped: AtomicU32,
+    /// Time that changing the light takes, whether cancelled or not.
+    relight_time: Duration,
+    /// Emission that was wished for, each time that the light began to change.
+    relit: Mutex<Vec<f32>>,
+    /// How often a rough light was worked out.
+    finished: AtomicU32,
+    /// Emission that steppers were made for.
+    made_for: Mutex<Vec<Option<f32>>>,
 }
 
 struct FakeSolver {
@@ -103,6 +111,39 @@ impl Stepper for FakeSolver {
     fn change_settings(&mut self, settings: SolveSettings) {
         self.settings = settings;
     }
+
+    fn relight(&mut self, appearances: &[Appearance], _: &Cancel) -> Option<Relit> {
+        self.script.relit.lock().unwrap().push(wish_in(appearances));
+        thread::sleep(self.script.relight_time);
+        Some(Relit {
+            report: StepReport {
+                step: self.step,
+                ..StepReport::default()
+            },
+            is_rough: true,
+        })
+    }
+
+    fn finish_relighting(&mut self, _: &Cancel) -> Option<StepReport> {
+        self.script.finished.fetch_add(1, Ordering::SeqCst);
+        Some(StepReport {
+            step: self.step,
+            ..StepReport::default()
+        })
+    }
+}
+
+/// An emission as a wish.
+fn wish(emission: f32) -> Arc<[Appearance]> {
+    Arc::new([Appearance {
+        reflectance: Vec3::splat(0.5),
+        emission: Vec3::splat(emission),
+    }])
+}
+
+/// The emission in a wish.
+fn wish_in(appearances: &[Appearance]) -> f32 {
+    appearances[0].emission.x
 }
 
 impl Drop for FakeSolver {
@@ -115,6 +156,8 @@ fn worker(script: &Arc<Script>) -> WorkerHandle {
     let script = script.clone();
     let make = move |job: Job, _: &Cancel| {
         script.made.fetch_add(1, Ordering::SeqCst);
+        let made_for = job.appearances.as_deref().map(wish_in);
+        script.made_for.lock().unwrap().push(made_for);
         Some(Box::new(FakeSolver {
             script: script.clone(),
             settings: job.settings,
@@ -684,4 +727,83 @@ fn a_question_about_an_older_run_is_dropped() {
     let events = wait_for(&worker, is_finished);
     assert!(answers(&events).is_empty(), "{events:?}");
     assert_eq!(script.inspected.load(Ordering::SeqCst), 1);
+}
+
+fn is_relit(event: &Event) -> bool {
+    matches!(event, Event::Relit { .. })
+}
+
+/// The light is changed and all that it left out is worked out.
+fn is_relit_finely(event: &Event) -> bool {
+    matches!(event, Event::Relit { seconds: None, .. })
+}
+
+/// Wait until the light begins to change for the so-manieth time.
+fn wait_for_wishes(script: &Script, count: usize) {
+    let begin = Instant::now();
+    while script.relit.lock().unwrap().len() < count {
+        assert!(begin.elapsed() < PATIENCE, "the light never changed");
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn of_many_wishes_for_light_only_the_last_is_done() {
+    let script = Arc::new(Script {
+        relight_time: Duration::from_millis(200),
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    worker.relight(wish(1.0));
+    wait_for_wishes(&script, 1);
+    for emission in [2.0, 3.0, 4.0] {
+        worker.relight(wish(emission));
+    }
+    wait_for(&worker, is_relit_finely);
+    assert_eq!(*script.relit.lock().unwrap(), [1.0, 4.0]);
+    let finished = script.finished.load(Ordering::SeqCst);
+    assert_eq!(finished, 1, "what is changed again is not worked out");
+}
+
+#[test]
+fn a_finished_run_rests_after_its_light_was_changed_and_can_go_on() {
+    let script = Arc::new(Script::default());
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    worker.relight(wish(2.0));
+    let events = wait_for(&worker, |event| *event == Event::Paused);
+    assert!(is_relit(&events[0]), "{events:?}");
+    worker.resume();
+    wait_for(&worker, is_finished);
+    assert_eq!(*script.begun.lock().unwrap(), [1, 2], "one more step");
+}
+
+#[test]
+fn light_is_changed_at_once_and_the_step_under_way_is_made_again() {
+    let (script, worker) = within_a_step();
+    worker.relight(wish(2.0));
+    wait_for(&worker, is_relit);
+    wait_for_steps(&script, 2);
+    assert_eq!(script.cancelled.load(Ordering::SeqCst), 1);
+    assert_eq!(*script.begun.lock().unwrap(), [1, 1]);
+    assert_eq!(script.made.load(Ordering::SeqCst), 1, "nothing begins anew");
+}
+
+#[test]
+fn changed_light_holds_for_a_new_start_on_the_same_scene_only() {
+    let script = Arc::new(Script::default());
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    worker.relight(wish(2.0));
+    wait_for(&worker, is_relit);
+    worker.reset();
+    wait_for(&worker, is_finished);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    assert_eq!(*script.made_for.lock().unwrap(), [None, Some(2.0), None]);
+    assert_eq!(*script.relit.lock().unwrap(), [2.0], "it is made with it");
 }

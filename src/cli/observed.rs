@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::{
-    scene::Scene,
-    solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
+    scene::{Appearance, Scene},
+    solver::{Cancel, Inspection, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject},
     worker::{Job, MakeStepper, Stepper},
 };
 
@@ -46,5 +46,13 @@ impl Stepper for ObservedSolver {
 
     fn change_settings(&mut self, settings: SolveSettings) {
         self.solver.change_settings(settings);
+    }
+
+    fn relight(&mut self, appearances: &[Appearance], cancel: &Cancel) -> Option<Relit> {
+        self.solver.relight(appearances, cancel)
+    }
+
+    fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        self.solver.finish_relighting(cancel)
     }
 }

@@ -281,7 +281,13 @@ fn drain(
             }
             Some(Event::Finished(reason)) => break reason,
             Some(Event::Failed(message)) => bail!("the solver failed: {message}"),
-            Some(Event::Started | Event::Paused | Event::Continued | Event::Inspected(_)) => {}
+            Some(
+                Event::Started
+                | Event::Paused
+                | Event::Continued
+                | Event::Relit { .. }
+                | Event::Inspected(_),
+            ) => {}
         }
     };
     progress.finish();

@@ -171,6 +171,7 @@ impl SceneBuilder {
             textures: self.textures,
             objects: object_ranges(&self.objects, self.faces.len()),
             warnings: self.warnings,
+            max_reflectance: options.max_reflectance.clamp(0.0, 1.0),
         };
         warn_of_orientation(&mut scene, &triangles.shells, options.sides);
         if !scene.has_emitter() {

@@ -13,6 +13,7 @@ mod lines;
 mod locate;
 mod mtl;
 mod obj;
+mod relight;
 mod sidedness;
 mod source;
 mod texture;
@@ -24,6 +25,7 @@ mod write;
 pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
+pub use relight::Appearance;
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
@@ -151,6 +153,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// What was skipped, cured or clamped on the way in.
     pub warnings: Vec<Warning>,
+    /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
+    pub max_reflectance: f32,
 }
 
 impl Scene {

@@ -47,7 +47,7 @@ pub(super) struct DirectField {
     /// By vertex, where it was sampled; shorter than the vertices where some are new.
     pub(super) vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
-    centres: Vec<Option<DirectLight>>,
+    pub(super) centres: Vec<Option<DirectLight>>,
     /// Irradiance to show by vertex; shorter than the vertices where some are new.
     shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
@@ -107,6 +107,16 @@ pub(super) fn bent_under(
 pub(super) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     let area = hierarchy.mesh.elements[element].area_vector.length();
     (area / hierarchy.area as f32).sqrt()
+}
+
+/// The centroid of an element, as a place to be lit.
+pub(super) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
+    let patch = hierarchy.patch_of(element);
+    Receiver {
+        point: hierarchy.mesh.elements[element].centroid,
+        normal: patch.normal,
+        triangle: patch.triangle,
+    }
 }
 
 impl DirectField {
@@ -261,15 +271,7 @@ impl DirectField {
             .collect();
         let receivers: Vec<Receiver> = unknown
             .iter()
-            .map(|&leaf| {
-                let patch = hierarchy.patch_of(leaf);
-                let point = hierarchy.mesh.elements[leaf].centroid;
-                Receiver {
-                    point,
-                    normal: patch.normal,
-                    triangle: patch.triangle,
-                }
-            })
+            .map(|&leaf| centre_of(hierarchy, leaf))
             .collect();
         let mut lights = vec![DirectLight::default(); receivers.len()];
         let samples = limits.shadow_samples;

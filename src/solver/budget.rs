@@ -29,6 +29,7 @@ impl Solver {
             + size_of_val(self.linked.as_slice())
             + size_of_val(self.leaves.as_slice())
             + self.direct.as_ref().map_or(0, DirectField::memory_bytes)
+            + self.relighting.memory_bytes()
             + self.snapshot.memory_bytes();
         own as u64
     }

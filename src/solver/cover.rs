@@ -195,7 +195,7 @@ impl DirectField {
 
     /// Where to sample each corner of a leaf that is wanted: a little inside the leaf whose normal is nearest to the mean
     /// normal about the vertex.
-    fn receivers(
+    pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
         is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,

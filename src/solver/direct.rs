@@ -92,11 +92,29 @@ impl Lights {
             })
             .collect();
         Self {
-            brightest: emitters
-                .iter()
-                .fold(Vec4::ZERO, |most, emitter| most.max(emitter.radiosity)),
+            brightest: brightest(&emitters),
             emitters,
             is_sampled,
+        }
+    }
+
+    /// The emitters whose triangles `emission` knows, with that emitted radiance.
+    pub(super) fn repainted(&self, emission: impl Fn(TriangleId) -> Option<Vec3>) -> Self {
+        let emitters: Vec<Emitter> = self
+            .emitters
+            .iter()
+            .filter_map(|emitter| {
+                let radiosity = (emission(emitter.triangle)? * PI).extend(0.0);
+                Some(Emitter {
+                    radiosity,
+                    ..*emitter
+                })
+            })
+            .collect();
+        Self {
+            brightest: brightest(&emitters),
+            emitters,
+            is_sampled: self.is_sampled.clone(),
         }
     }
 
@@ -114,6 +132,11 @@ impl Lights {
     /// Whether the emission of a patch is sampled and so must not travel over links.
     pub(super) fn is_sampled(&self, patch: usize) -> bool {
         self.is_sampled[patch]
+    }
+
+    /// The triangles of the emitters.
+    pub(super) fn triangles(&self) -> impl Iterator<Item = TriangleId> + '_ {
+        self.emitters.iter().map(|emitter| emitter.triangle)
     }
 
     /// Whether all emission that light is computed from is sampled.
@@ -234,6 +257,13 @@ impl Lights {
     }
 }
 
+/// Largest radiosity by channel.
+fn brightest(emitters: &[Emitter]) -> Vec4 {
+    emitters
+        .iter()
+        .fold(Vec4::ZERO, |most, emitter| most.max(emitter.radiosity))
+}
+
 impl Emitter {
     /// Irradiance (luminance) at a receiver if the whole emitter stood at one of its points.
     fn transfer(&self, receiver: &Receiver, point: Vec3) -> f32 {
@@ -270,6 +300,33 @@ impl DirectLight {
             self.arrived += color * weight;
             self.visible += 1;
         }
+    }
+
+    /// The light of several parts of the emitters together, the colours of each multiplied by a factor. Of parts that
+    /// are switched off nothing remains but that rays were tried.
+    pub(super) fn mixed(parts: impl Iterator<Item = (Self, Vec4)>) -> Self {
+        let mut mixed = Self::default();
+        for (part, factor) in parts {
+            let exact = part.exact * factor;
+            mixed.tried += part.tried;
+            if luminance(exact) <= 0.0 {
+                continue;
+            }
+            mixed.exact += exact;
+            // As rays of the new colours would have been counted: each with a luminance of about 1.
+            mixed.sent += exact;
+            mixed.arrived += exact * part.fraction();
+            mixed.shot += part.shot;
+            mixed.visible += part.visible;
+        }
+        let total = luminance(mixed.exact);
+        if total > 0.0 {
+            // Of what arrives whole without a ray only the ratio counts.
+            let by_ray = mixed.shot.max(1) as f32 / total;
+            mixed.sent *= by_ray;
+            mixed.arrived *= by_ray;
+        }
+        mixed
     }
 
     /// Nothing blocks: no ray is needed to know that everything arrives.

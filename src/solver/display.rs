@@ -71,20 +71,14 @@ impl Solver {
             } else {
                 Vec::new()
             },
-            reflectance: vec![Vec3::ZERO; count],
-            emission: vec![Vec3::ZERO; count],
             ..DisplayMesh::default()
         };
-        let mut weights = vec![0.0f32; count];
         for (element, vertices) in triangles {
             let patch = self.hierarchy.patch_of(element as usize);
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
             let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
             for vertex in vertices.map(|vertex| vertex as usize) {
                 display.normals[vertex] += patch.normal * weight;
-                display.reflectance[vertex] += patch.reflectance * weight;
-                display.emission[vertex] += patch.emission * weight;
-                weights[vertex] += weight;
             }
             if has_texcoords {
                 self.place_texcoords(patch.triangle, vertices, &mut display);
@@ -97,16 +91,35 @@ impl Solver {
                 .push(self.hierarchy.clusters.len() as u32 + element);
         }
         cancel.proceed()?;
-        for (index, &weight) in weights
-            .iter()
-            .enumerate()
-            .filter(|(_, weight)| **weight > 0.0)
-        {
-            display.normals[index] = display.normals[index].normalize_or_zero();
-            display.reflectance[index] /= weight;
-            display.emission[index] /= weight;
+        for normal in &mut display.normals {
+            *normal = normal.normalize_or_zero();
         }
+        self.color(&mut display);
         Some(display)
+    }
+
+    /// Give the vertices of a display mesh the colours of the patches about them.
+    pub(super) fn color(&self, display: &mut DisplayMesh) {
+        let count = display.positions.len();
+        let base = self.hierarchy.clusters.len() as u32;
+        let mut sums = vec![(Vec3::ZERO, Vec3::ZERO, 0.0f32); count];
+        for (vertices, element) in display.indices.iter().zip(&display.element_of) {
+            let patch = self.hierarchy.patch_of((element - base) as usize);
+            let corners = vertices.map(|vertex| display.positions[vertex as usize]);
+            let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
+            for &vertex in vertices {
+                let (reflectance, emission, weights) = &mut sums[vertex as usize];
+                *reflectance += patch.reflectance * weight;
+                *emission += patch.emission * weight;
+                *weights += weight;
+            }
+        }
+        let mean = |sum: Vec3, weight: f32| if weight > 0.0 { sum / weight } else { sum };
+        let means = sums.iter();
+        let appearances = self.appearances().iter();
+        display.texture_factors = appearances.map(|looks| looks.reflectance).collect();
+        display.reflectance = means.clone().map(|&(sum, _, by)| mean(sum, by)).collect();
+        display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
     }
 
     /// Texture coordinates of vertices on a triangle, by their barycentric coordinates there.

@@ -48,7 +48,7 @@ const UNSCALED_SLACK: f64 = 0.02;
 const GROWING_SWEEPS: u32 = 5;
 
 /// Factor by which all light may exceed what emitters can keep up, for the noise of direct light.
-const CEILING_SLACK: f64 = 1.1;
+pub(super) const CEILING_SLACK: f64 = 1.1;
 
 /// What one sweep did to the light.
 struct Sweep {
@@ -180,7 +180,7 @@ impl Solver {
         self.leaf_sum(|leaf| (a[leaf] - b[leaf]).abs())
     }
 
-    fn leaf_sum(&self, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
+    pub(super) fn leaf_sum(&self, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
         gather::area_sum(&self.hierarchy, of).element_sum()
     }
 
@@ -201,7 +201,7 @@ impl Solver {
     }
 
     /// Power of the emitters that no link carries.
-    fn sampled_power(&self) -> f64 {
+    pub(super) fn sampled_power(&self) -> f64 {
         let Some(field) = &self.direct else {
             return 0.0;
         };
@@ -213,7 +213,7 @@ impl Solver {
     }
 
     /// No more power than this can be under way: what is emitted, if everything reflected as the brightest surface does.
-    fn most_power(&self) -> f64 {
+    pub(super) fn most_power(&self) -> f64 {
         let patches = &self.hierarchy.patches;
         let brightest = patches
             .par_iter()

@@ -17,8 +17,10 @@ mod gather;
 mod inspect;
 mod inspection;
 mod iterate;
+mod light_parts;
 mod plan;
 mod reconstruct;
+mod relight;
 mod report;
 mod settings;
 mod smooth;
@@ -33,6 +35,7 @@ use glam::{Vec3, Vec4};
 
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use plan::{Keep, LeftOut, Omission};
+pub use relight::Relit;
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
@@ -49,6 +52,7 @@ use closure::Closures;
 use direct::Lights;
 use plan::Plan;
 use reconstruct::LeafLight;
+use relight::Relighting;
 
 /// A request to stop, seen by everything that runs long. Clones share one flag.
 #[derive(Clone, Debug, Default)]
@@ -116,6 +120,7 @@ pub struct Solver {
     is_full: bool,
     step: u32,
     ray_count: u64,
+    relighting: Relighting,
     snapshot: Snapshot,
 }
 
@@ -162,6 +167,7 @@ impl Solver {
             is_full: false,
             step: 0,
             ray_count: 0,
+            relighting: Relighting::new(&scene),
             snapshot: Snapshot::default(),
             scene,
             settings,
@@ -220,6 +226,7 @@ impl Solver {
             THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
         report.epsilon = self.settings.epsilon * fineness;
         self.is_full = false;
+        self.relighting.begin_step();
         self.probe_closures(cancel)?;
         self.adapt_to_linked(fineness);
         self.adapt_to_direct(fineness, cancel)?;
@@ -239,6 +246,7 @@ impl Solver {
             return None;
         }
         report.is_final = report.is_full || self.step >= self.settings.max_steps;
+        self.relighting.end_step(&report);
         Some(report)
     }
 

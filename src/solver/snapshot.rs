@@ -22,6 +22,8 @@ pub struct DisplayMesh {
     pub reflectance: Vec<Vec3>,
     /// Emitted radiance at the vertex.
     pub emission: Vec<Vec3>,
+    /// Reflectance by which each material multiplies its texture, or empty where that is as the scene says.
+    pub texture_factors: Vec<Vec3>,
     /// Triangles, counter-clockwise from the lit side.
     pub indices: Vec<[u32; 3]>,
     /// The scene's triangle under each display triangle.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::{
     camera::{AxisView, UpAxis},
     loader::SceneSource,
+    materials::Materials,
     view::ViewMode,
 };
 use crate::{scene::Sides, solver::SolveSettings, worker::RunOptions};
@@ -36,6 +37,8 @@ pub enum Action {
     Settings(SolveSettings),
     /// Put limits in force.
     Options(RunOptions),
+    /// Light the scene with other lights and materials.
+    Relight(Materials),
     /// Read the scene again with other sidedness.
     Sides(Sides),
     /// Show something else.

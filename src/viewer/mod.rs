@@ -16,6 +16,7 @@ pub mod light_range;
 mod line_cache;
 pub mod links;
 pub mod loader;
+pub mod materials;
 pub mod navigation;
 pub mod opening;
 pub mod overlay;

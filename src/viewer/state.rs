@@ -8,6 +8,7 @@ use super::{
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
+    materials::Materials,
     panel_state::PanelState,
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
@@ -16,7 +17,7 @@ use super::{
     view::{ViewMode, ViewSettings},
 };
 use crate::{
-    scene::SceneOptions,
+    scene::{Scene, SceneOptions},
     solver::{Snapshot, SolveSettings, StepReport},
     worker::{Effect, Event, RunOptions, StopReason},
 };
@@ -90,6 +91,8 @@ pub struct Run {
     pub snapshot: Option<Arc<Snapshot>>,
     /// Seconds that preparing took.
     pub prepare_secs: Option<f64>,
+    /// Seconds that changing the light took last.
+    pub relit_secs: Option<f64>,
     /// What the last change of settings did.
     pub last_effect: Option<Effect>,
 }
@@ -102,6 +105,7 @@ impl Run {
                 self.status = RunStatus::Preparing;
                 self.reports.clear();
                 self.prepare_secs = None;
+                self.relit_secs = None;
             }
             Event::Prepared { seconds } => {
                 self.prepare_secs = Some(seconds);
@@ -110,6 +114,12 @@ impl Run {
                 }
             }
             Event::Stepped(report) => self.reports.push(report),
+            Event::Relit { report, seconds } => {
+                self.relit_secs = seconds.or(self.relit_secs);
+                if let Some(last) = self.reports.last_mut() {
+                    *last = report;
+                }
+            }
             // Kept apart: it is of what is selected, not of the run.
             Event::Inspected(_) => {}
             Event::Paused => self.status = RunStatus::Paused,
@@ -214,6 +224,8 @@ pub struct State {
     pub options: RunOptions,
     /// How scenes are read.
     pub scene_options: SceneOptions,
+    /// Its lights and materials, as they were changed.
+    pub materials: Materials,
     /// How the light is shown.
     pub view: ViewSettings,
     /// What the surfaces showed before the key for normals was pressed.
@@ -275,6 +287,22 @@ impl State {
             let mut shown = self.shown_clusters.shown.iter().copied();
             self.cluster = shown.rfind(over).or(self.cluster);
         }
+    }
+
+    /// The scene as it is lit: with lights and materials as they are now.
+    pub fn lit_scene(&self) -> Option<Arc<Scene>> {
+        let scene = &self.loaded.as_ref()?.scene;
+        Some(if self.materials.are_changed() {
+            Arc::new(scene.relit(&self.materials.appearances(scene)))
+        } else {
+            scene.clone()
+        })
+    }
+
+    /// Whether nothing in the scene has a colour, so that one channel tells all.
+    pub fn is_grey(&self) -> bool {
+        let is_grey = self.loaded.as_ref().is_some_and(|loaded| loaded.is_grey);
+        is_grey && (!self.materials.are_changed() || self.materials.are_grey())
     }
 
     /// Whether there are emitters; of no scene nobody knows.

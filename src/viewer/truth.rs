@@ -5,8 +5,9 @@
 
 use std::{collections::BTreeMap, io, sync::Arc};
 
-use super::{loader::LoadedScene, state::Run, view::ViewMode};
+use super::{state::Run, view::ViewMode};
 use crate::{
+    geometry::RayTree,
     metrics::{ErrorMeasures, ReferenceFacts, SceneComparison, Trajectory},
     scene::Scene,
     solver::{Method, Oracle, Snapshot, SolveSettings, StepReport},
@@ -82,12 +83,11 @@ impl Truth {
     /// When the system refuses a thread.
     pub fn start(
         &mut self,
-        loaded: &LoadedScene,
+        (scene, rays): (Arc<Scene>, Arc<RayTree>),
         seed: u64,
         shown: Option<&Arc<Snapshot>>,
         wake: Wake,
     ) -> io::Result<Watch> {
-        let (scene, rays) = (loaded.scene.clone(), loaded.rays.clone());
         self.handle = None;
         self.progress = Arc::default();
         let handle = TruthHandle::spawn(scene, rays, seed, wake)?;
@@ -104,7 +104,7 @@ impl Truth {
     pub fn note(&mut self, event: &Event, run: u64, settings: &SolveSettings) {
         match event {
             Event::Started => self.begin_run(run, settings),
-            Event::Stepped(report) => {
+            Event::Stepped(report) | Event::Relit { report, .. } => {
                 if let Some(run) = self.runs.last_mut() {
                     run.steps.insert(report.step, report.clone());
                     // A run may go on under finer settings.
@@ -146,6 +146,16 @@ impl Truth {
     pub fn forget_earlier(&mut self) {
         while self.runs.len() > 1 {
             self.forget_run(0);
+        }
+    }
+
+    /// Drop the reference and all that was measured by it; the present run goes on without.
+    pub fn forget_reference(&mut self) {
+        self.handle = None;
+        self.progress = Arc::default();
+        self.runs.drain(..self.runs.len().saturating_sub(1));
+        if let Some(run) = self.runs.last_mut() {
+            run.steps.clear();
         }
     }
 

@@ -21,9 +21,12 @@ use super::{
     outbox::Outbox,
     priority::give_way,
     run::{Aim, Run},
-    visit::{Outcome, Returned},
+    visit::{Errand, Outcome, Returned},
 };
-use crate::solver::{Cancel, SolveSettings};
+use crate::{
+    scene::Appearance,
+    solver::{Cancel, SolveSettings},
+};
 
 /// How long a cancelled solve that nobody wants any more is waited for. Shorter, and two solves share the cores for no
 /// reason; longer, and the next scene begins noticeably late.
@@ -90,6 +93,8 @@ struct Away {
     cancel: Cancel,
     /// Whether it is being prepared.
     prepares: bool,
+    /// Whether what it does gives way to light that is changed.
+    gives_way: bool,
     /// When its run was replaced by another.
     unwanted_since: Option<Instant>,
     /// Raised when nobody waits for it any more.
@@ -214,14 +219,18 @@ impl Controller {
             }
         };
         let (cancel, left) = (Cancel::default(), Cancel::default());
+        let visit = run.visit(&self.make, cancel.clone());
         self.away = Some(Away {
             generation: run.generation,
-            cancel: cancel.clone(),
-            prepares: run.stepper.is_none(),
+            cancel,
+            prepares: matches!(visit.errand, Errand::Prepare(..)),
+            gives_way: matches!(
+                visit.errand,
+                Errand::Step(..) | Errand::FinishRelighting(..)
+            ),
             unwanted_since: None,
             left: left.clone(),
         });
-        let visit = run.visit(&self.make, cancel);
         let inbox = self.inbox.clone();
         pool.spawn(move || {
             let mut returned = visit.pay();
@@ -280,6 +289,30 @@ impl Controller {
                     self.outbox.send(generation, Event::Stepped(report));
                 }
             }
+            Outcome::Relit(Some(relit), snapshot) => {
+                self.outbox.publish(generation, snapshot);
+                run.is_rough = relit.is_rough;
+                run.ask_again();
+                let report = run.dated(relit.report);
+                let seconds = Some(trip.spent.as_secs_f64());
+                self.outbox
+                    .send(generation, Event::Relit { report, seconds });
+                if matches!(run.aim, Aim::End(reason) if !reason.can_continue()) {
+                    // There is more to do for the new light, once it is wished for.
+                    run.turn_to(Aim::Rest);
+                }
+            }
+            // Something else was more urgent: it is still to be done.
+            Outcome::Relit(None, _) => run.appearances_changed = true,
+            Outcome::RelitFinely(Some(report), snapshot) => {
+                self.outbox.publish(generation, snapshot);
+                run.ask_again();
+                let report = run.dated(report);
+                let seconds = None;
+                self.outbox
+                    .send(generation, Event::Relit { report, seconds });
+            }
+            Outcome::RelitFinely(None, _) => run.is_rough = true,
             Outcome::Inspected(inspections) => {
                 for inspection in inspections {
                     let event = Event::Inspected(Arc::new(inspection));
@@ -304,6 +337,7 @@ impl Controller {
                         rays: run.rays.clone(),
                         settings,
                         options: run.options.clone(),
+                        appearances: run.appearances.clone(),
                     });
                 }
             }
@@ -328,6 +362,10 @@ impl Controller {
                     run.options = options;
                 }
             }
+            Command::Relight {
+                generation,
+                appearances,
+            } => self.relight(generation, appearances),
             Command::Inspect {
                 generation,
                 subjects,
@@ -369,6 +407,18 @@ impl Controller {
             && !reason.can_continue()
         {
             self.go_on();
+        }
+    }
+
+    /// A step under way is interrupted: it lights materials that look otherwise. Light on its way is not, or nothing would
+    /// show while a slider is dragged; of what is wished meanwhile only the last is done.
+    fn relight(&mut self, generation: Generation, appearances: Arc<[Appearance]>) {
+        let run = self.run.as_mut();
+        if let Some(run) = run.filter(|run| run.generation == generation) {
+            run.relight(appearances);
+            if let Some(away) = self.away.as_ref().filter(|away| away.gives_way) {
+                away.cancel.cancel();
+            }
         }
     }
 

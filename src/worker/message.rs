@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Effect, visit::Returned};
 use crate::{
     geometry::RayTree,
-    scene::Scene,
+    scene::{Appearance, Scene},
     solver::{Inspection, SolveSettings, StepReport, Subject},
 };
 
@@ -81,6 +81,14 @@ pub enum Event {
     },
     /// A step is done; its light is in the slot.
     Stepped(StepReport),
+    /// Materials look otherwise; their light is in the slot. The figures are those of the last step, but for what has
+    /// changed.
+    Relit {
+        /// What is known of the light.
+        report: StepReport,
+        /// Seconds that it took; nothing where what was shown in haste has been worked out.
+        seconds: Option<f64>,
+    },
     /// An answer to [`super::WorkerHandle::inspect`].
     Inspected(Arc<Inspection>),
     /// The run rests until it is continued.
@@ -105,6 +113,8 @@ pub(super) struct Start {
     pub settings: SolveSettings,
     /// How to run.
     pub options: RunOptions,
+    /// How materials look, where not as the scene says.
+    pub appearances: Option<Arc<[Appearance]>>,
 }
 
 /// What the owner asks of the worker.
@@ -133,6 +143,13 @@ pub(super) enum Command {
     },
     /// Other limits.
     Options(RunOptions),
+    /// Materials of a run look so from now on.
+    Relight {
+        /// The run.
+        generation: Generation,
+        /// One for each material.
+        appearances: Arc<[Appearance]>,
+    },
     /// Look into nodes of a run.
     Inspect {
         /// The run that the nodes are of.

@@ -38,7 +38,7 @@ pub use truth::{MeasuredStep, SAMPLE_GOAL, TruthHandle, TruthProgress, VertexErr
 
 use crate::{
     geometry::RayTree,
-    scene::Scene,
+    scene::{Appearance, Scene},
     solver::{Cancel, Snapshot, SolveSettings, Subject},
 };
 use controller::Controller;
@@ -139,8 +139,20 @@ impl WorkerHandle {
             rays,
             settings,
             options,
+            appearances: None,
         }));
         self.generation
+    }
+
+    /// Light the present run with materials that look so, one for each (see [`Scene::allowed`]), as fast as can be:
+    /// nothing is refined until the run goes on, and a run that came to its end rests from then on. What is wished while
+    /// light is on its way waits, and only the last wish is done. [`Event::Relit`] says when. Holds for the runs that
+    /// follow on the same scene, too.
+    pub fn relight(&self, appearances: Arc<[Appearance]>) {
+        self.send(Command::Relight {
+            generation: self.generation,
+            appearances,
+        });
     }
 
     /// Interrupt the step under way and wait. [`Event::Paused`] says when it rests.

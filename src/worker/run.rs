@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    scene::Scene,
+    scene::{Appearance, Scene},
     solver::{Cancel, SolveSettings, StepReport, Subject},
 };
 
@@ -43,6 +43,12 @@ pub(super) struct Run {
     pub settings_changed: bool,
     /// How it is computed.
     pub options: RunOptions,
+    /// How materials look, where not as the scene says. Changed by [`Run::relight`].
+    pub appearances: Option<Arc<[Appearance]>>,
+    /// Whether the solve has not heard of the appearances yet.
+    pub appearances_changed: bool,
+    /// Whether the light that is shown was changed in haste.
+    pub is_rough: bool,
     /// The solve, while it is at home.
     pub stepper: Option<Box<dyn Stepper>>,
     /// Nodes that are inspected, now and after each step. Changed by [`Run::ask`].
@@ -59,6 +65,8 @@ pub(super) struct Run {
     pub before: Duration,
     /// Time spent preparing and stepping.
     pub solving: Duration,
+    /// Running time and time spent, in seconds, at the end of the last step.
+    last_times: (f64, f64),
 }
 
 impl Run {
@@ -71,6 +79,9 @@ impl Run {
             settings: start.settings,
             settings_changed: false,
             options: start.options,
+            appearances: start.appearances,
+            appearances_changed: false,
+            is_rough: false,
             stepper: None,
             subjects: Vec::new(),
             is_asked: false,
@@ -79,12 +90,21 @@ impl Run {
             since: Instant::now(),
             before: Duration::ZERO,
             solving: Duration::ZERO,
+            last_times: (0.0, 0.0),
         }
     }
 
     /// Whether there is something to do with the solve at home.
     pub(super) fn wants_visit(&self) -> bool {
-        self.aim == Aim::Run || (self.is_asked && self.stepper.is_some())
+        self.aim == Aim::Run
+            || ((self.is_asked || self.appearances_changed || self.is_rough)
+                && self.stepper.is_some())
+    }
+
+    /// Materials look so from now on; what was wished before and not done yet is forgotten.
+    pub(super) fn relight(&mut self, appearances: Arc<[Appearance]>) {
+        self.appearances = Some(appearances);
+        self.appearances_changed = true;
     }
 
     /// Inspect these nodes from now on.
@@ -98,12 +118,35 @@ impl Run {
         self.is_asked = !self.subjects.is_empty();
     }
 
-    /// What is to be done next. Questions come first: they are short.
+    /// What is to be done next. Light that was changed comes first, then questions: they are short.
     pub(super) fn visit(&mut self, make: &MakeStepper, cancel: Cancel) -> Visit {
-        let errand = match self.stepper.take() {
+        let changed = self
+            .appearances
+            .clone()
+            .filter(|_| std::mem::take(&mut self.appearances_changed));
+        let errand = match (self.stepper.take(), changed) {
+            (Some(stepper), Some(appearances)) => Errand::Relight(stepper, appearances, cancel),
+            (stepper, _) => self.other_errand(stepper, make, cancel),
+        };
+        Visit {
+            generation: self.generation,
+            errand,
+        }
+    }
+
+    fn other_errand(
+        &mut self,
+        stepper: Option<Box<dyn Stepper>>,
+        make: &MakeStepper,
+        cancel: Cancel,
+    ) -> Errand {
+        match stepper {
             Some(stepper) if self.is_asked => {
                 self.is_asked = false;
                 Errand::Inspect(stepper, self.subjects.clone())
+            }
+            Some(stepper) if std::mem::take(&mut self.is_rough) && self.aim != Aim::Run => {
+                Errand::FinishRelighting(stepper, cancel)
             }
             Some(mut stepper) => {
                 if std::mem::take(&mut self.settings_changed) {
@@ -118,13 +161,10 @@ impl Run {
                     rays: self.rays.clone(),
                     settings: self.settings.clone(),
                     memory_limit: self.options.memory_limit,
+                    appearances: self.appearances.clone(),
                 };
                 Errand::Prepare(make.clone(), job, cancel)
             }
-        };
-        Visit {
-            generation: self.generation,
-            errand,
         }
     }
 
@@ -141,10 +181,19 @@ impl Run {
         self.since.checked_add(limit)
     }
 
+    /// Give a report the times of the last step: changing the light is no part of the way there.
+    pub(super) fn dated(&self, mut report: StepReport) -> StepReport {
+        (report.elapsed_s, report.solve_s) = self.last_times;
+        report
+    }
+
     /// Complete the report of a step, and end the run if it was the last.
-    pub(super) fn take_note(&mut self, mut report: StepReport) -> StepReport {
-        report.elapsed_s = (self.before + self.since.elapsed()).as_secs_f64();
-        report.solve_s = self.solving.as_secs_f64();
+    pub(super) fn take_note(&mut self, report: StepReport) -> StepReport {
+        self.last_times = (
+            (self.before + self.since.elapsed()).as_secs_f64(),
+            self.solving.as_secs_f64(),
+        );
+        let report = self.dated(report);
         if let Some(reason) = self.end_after(&report) {
             // Lower settings that came during the step ask for more.
             let more = self.settings_changed && !reason.can_continue();

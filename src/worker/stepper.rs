@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::{
     geometry::RayTree,
-    scene::Scene,
-    solver::{Cancel, Inspection, Snapshot, SolveSettings, Solver, StepReport, Subject},
+    scene::{Appearance, Scene},
+    solver::{Cancel, Inspection, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject},
 };
 
 /// A solve that advances step by step.
@@ -21,6 +21,12 @@ pub trait Stepper: Send {
 
     /// Go on under settings whose change does not restart (see [`super::effect_of_change`]).
     fn change_settings(&mut self, settings: SolveSettings);
+
+    /// Light materials that look so, one for each, without refining; `None` when cancelled on the way.
+    fn relight(&mut self, appearances: &[Appearance], cancel: &Cancel) -> Option<Relit>;
+
+    /// Work out what a rough relighting left out; `None` when cancelled on the way.
+    fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport>;
 }
 
 /// What a stepper is made from.
@@ -33,18 +39,25 @@ pub struct Job {
     pub settings: SolveSettings,
     /// Bytes that it may hold.
     pub memory_limit: Option<u64>,
+    /// How materials look, where not as the scene says.
+    pub appearances: Option<Arc<[Appearance]>>,
 }
 
 impl Job {
     /// Prepare the solver for it, unless cancelled.
     pub fn solver(self, cancel: &Cancel) -> Option<Solver> {
-        Solver::with_rays(
+        let mut solver = Solver::with_rays(
             self.scene,
             self.rays,
             self.settings,
             self.memory_limit,
             cancel,
-        )
+        )?;
+        if let Some(appearances) = self.appearances {
+            // What may be left out is told from the scene as it was read: what is off may be switched on.
+            solver.relight(&appearances, cancel)?;
+        }
+        Some(solver)
     }
 }
 
@@ -66,5 +79,13 @@ impl Stepper for Solver {
 
     fn change_settings(&mut self, settings: SolveSettings) {
         Self::change_settings(self, settings);
+    }
+
+    fn relight(&mut self, appearances: &[Appearance], cancel: &Cancel) -> Option<Relit> {
+        Self::relight(self, appearances, cancel)
+    }
+
+    fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        Self::finish_relighting(self, cancel)
     }
 }

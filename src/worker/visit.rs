@@ -3,11 +3,15 @@
 use std::{
     any::Any,
     panic::{AssertUnwindSafe, catch_unwind},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use super::{Generation, Job, MakeStepper, Stepper};
-use crate::solver::{Cancel, Inspection, Snapshot, StepReport, Subject};
+use crate::{
+    scene::Appearance,
+    solver::{Cancel, Inspection, Relit, Snapshot, StepReport, Subject},
+};
 
 /// A solve on its way to the pool.
 pub(super) struct Visit {
@@ -23,6 +27,10 @@ pub(super) enum Errand {
     Prepare(MakeStepper, Job, Cancel),
     /// Make one step, unless cancelled.
     Step(Box<dyn Stepper>, Cancel),
+    /// Light materials that look otherwise, unless cancelled.
+    Relight(Box<dyn Stepper>, Arc<[Appearance]>, Cancel),
+    /// Work out what relighting left out, unless cancelled.
+    FinishRelighting(Box<dyn Stepper>, Cancel),
     /// Look into nodes.
     Inspect(Box<dyn Stepper>, Vec<Subject>),
 }
@@ -51,6 +59,10 @@ pub(super) enum Outcome {
     Prepared(Snapshot),
     /// A step is done, or was cancelled.
     Stepped(Option<StepReport>, Snapshot),
+    /// Materials look otherwise, or it was cancelled.
+    Relit(Option<Relit>, Snapshot),
+    /// What relighting left out is there, or it was cancelled.
+    RelitFinely(Option<StepReport>, Snapshot),
     /// Nodes were looked into.
     Inspected(Vec<Inspection>),
 }
@@ -85,6 +97,24 @@ impl Errand {
                 let spent = begin.elapsed();
                 Trip {
                     outcome: Outcome::Stepped(report, stepper.snapshot()),
+                    stepper,
+                    spent,
+                }
+            }
+            Self::Relight(mut stepper, appearances, cancel) => {
+                let relit = stepper.relight(&appearances, &cancel);
+                let spent = begin.elapsed();
+                Trip {
+                    outcome: Outcome::Relit(relit, stepper.snapshot()),
+                    stepper,
+                    spent,
+                }
+            }
+            Self::FinishRelighting(mut stepper, cancel) => {
+                let report = stepper.finish_relighting(&cancel);
+                let spent = begin.elapsed();
+                Trip {
+                    outcome: Outcome::RelitFinely(report, stepper.snapshot()),
                     stepper,
                     spent,
                 }

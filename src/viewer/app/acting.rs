@@ -5,7 +5,8 @@ use eframe::egui;
 use super::{
     super::{
         action::Action,
-        bindings, clusters,
+        bindings, clusters, light_range,
+        materials::Materials,
         navigation::Picked,
         panel_state::PanelState,
         pick, saver,
@@ -45,6 +46,7 @@ impl App {
                 self.state.options = options.clone();
                 self.worker.change_options(options);
             }
+            Action::Relight(materials) => self.relight(materials),
             Action::Sides(sides) => {
                 self.state.scene_options.sides = sides;
                 self.reload();
@@ -120,7 +122,7 @@ impl App {
                 state.view.auto_exposure = false;
             }
             Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
-            Action::AutoExposure => state.view.auto_exposure = true,
+            Action::AutoExposure => expose(state),
             Action::ToggleToneMap => {
                 use crate::viewer::view::ToneMap;
                 state.view.tone_map = match state.view.tone_map {
@@ -197,7 +199,7 @@ impl App {
 
     /// Trace the reference, rest, or go on.
     pub(super) fn trace_reference(&mut self) {
-        let Some(loaded) = &self.state.loaded else {
+        let (Some(loaded), Some(scene)) = (&self.state.loaded, self.state.lit_scene()) else {
             return;
         };
         let (wake, seed) = (self.wake.clone(), self.state.settings.seed);
@@ -209,13 +211,32 @@ impl App {
         // Light of a run before the present one would be measured as the present one's.
         let run = &self.state.run;
         let shown = run.snapshot.as_ref().filter(|_| !run.reports.is_empty());
-        match truth.start(loaded, seed, shown, wake) {
+        match truth.start((scene, loaded.rays.clone()), seed, shown, wake) {
             Ok(watch) => self.worker.watch(Some(watch)),
             Err(error) => {
                 let text = format!("cannot start a thread: {error}");
                 self.state.messages.push(Severity::Error, text);
             }
         }
+    }
+
+    /// Light the scene with other lights and materials. A reference was traced with those before.
+    fn relight(&mut self, materials: Materials) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let appearances = materials.appearances(&loaded.scene);
+        self.state.materials = materials;
+        if self.state.truth.exists() {
+            self.worker.watch(None);
+            self.state.truth.forget_reference();
+            let text = "the reference was of other lights and materials; trace it again for these";
+            self.state.messages.push(Severity::Note, text);
+        }
+        if self.state.view.mode == ViewMode::Error {
+            self.state.view.mode = ViewMode::default();
+        }
+        self.worker.relight(appearances.into());
     }
 
     fn clear_selection(&mut self) {
@@ -270,6 +291,15 @@ impl App {
                 }
             }
         }
+    }
+}
+
+/// Expose for the present light, and let the exposure follow.
+fn expose(state: &mut State) {
+    state.view.auto_exposure = true;
+    let snapshot = state.run.snapshot.as_deref();
+    if let Some(exposure) = snapshot.and_then(light_range::auto_exposure) {
+        state.view.exposure = exposure;
     }
 }
 

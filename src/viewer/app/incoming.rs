@@ -103,7 +103,9 @@ impl App {
         let Some(snapshot) = &self.state.run.snapshot else {
             return;
         };
+        // Lights that are dimmed would look as bright as before.
         if self.state.view.auto_exposure
+            && !self.state.materials.are_changed()
             && let Some(exposure) = light_range::auto_exposure(snapshot)
         {
             self.state.view.exposure = exposure;

@@ -5,6 +5,7 @@ use std::{sync::Arc, thread, time::Instant};
 use super::{
     super::{
         loader::{LoadedScene, Loader, SceneSource},
+        materials::Materials,
         session,
         start::{self, CameraRequest},
         state::Severity,
@@ -60,6 +61,7 @@ impl App {
             self.state.settings.clone(),
             self.state.options.clone(),
         );
+        self.state.materials = Materials::of(&loaded.scene);
         self.state.loaded = Some(Arc::new(loaded));
         // The view of errors is nothing without a reference.
         if self.state.view.mode == ViewMode::Error {

@@ -8,6 +8,7 @@ pub mod help;
 pub mod left_out;
 pub mod legend;
 pub mod links;
+pub mod materials;
 pub mod menu;
 pub mod mesh;
 pub mod messages;

@@ -15,7 +15,7 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let scene = &loaded.scene;
     let pick = &selection.pick;
     let triangle = scene.triangles[pick.triangle.index()];
-    let surface = scene.surfaces[pick.triangle.index()];
+    let surface = state.materials.surface(scene, pick.triangle);
     let world = scene.frame.to_world(pick.point);
     let material = &scene.materials[triangle.material.index()];
     row::figures(ui, "probe", |ui| {
@@ -34,7 +34,7 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             &material.name
         };
         row::figure(ui, "Material", name, "");
-        let is_grey = loaded.is_grey;
+        let is_grey = state.is_grey();
         let (color, channels) = if is_grey {
             (grey as fn(Vec3) -> String, "Of all colours alike")
         } else {

@@ -71,7 +71,7 @@ pub fn fixed(ui: &mut egui::Ui, label: &str, explanation: &str, text: &str) {
 }
 
 /// A small arrow that turns back.
-fn reset_button(ui: &mut egui::Ui, label: &str) -> egui::Response {
+pub(super) fn reset_button(ui: &mut egui::Ui, label: &str) -> egui::Response {
     let size = egui::Vec2::splat(ui.spacing().interact_size.y - 4.0);
     let (rect, response) = ui.allocate_exact_size(size, egui::Sense::click());
     let name = format!("Reset {}", label.to_lowercase());

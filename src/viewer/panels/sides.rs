@@ -3,7 +3,8 @@
 use eframe::egui;
 
 use super::{
-    clusters, emission, error, links, messages, plot, probe, progress, row, settings, statistics,
+    clusters, emission, error, links, materials, messages, plot, probe, progress, row, settings,
+    statistics,
 };
 use crate::viewer::{action::Action, state::State};
 
@@ -37,6 +38,11 @@ fn light_panel(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) 
                             emission::emission_ui(ui, state, actions);
                         }
                     });
+                    if state.loaded.is_some() {
+                        row::section(ui, "Lights and materials", state.has_emitters(), |ui| {
+                            materials::materials_ui(ui, state, actions);
+                        });
+                    }
                 });
         });
 }

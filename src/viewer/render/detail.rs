@@ -24,6 +24,10 @@ pub(super) struct DetailSet {
     sampler: wgpu::Sampler,
     plain: wgpu::BindGroup,
     scene: Option<Arc<Scene>>,
+    /// Its textures, those that were needed.
+    views: Vec<Option<wgpu::TextureView>>,
+    /// What each material multiplies its texture by; empty where that is as the scene says.
+    factors: Vec<Vec3>,
     /// Number of the group of each material.
     group_of: Vec<usize>,
     /// Groups from 1 on.
@@ -56,6 +60,8 @@ impl DetailSet {
             sampler,
             plain,
             scene: None,
+            views: Vec::new(),
+            factors: Vec::new(),
             group_of: Vec::new(),
             textured: Vec::new(),
         }
@@ -74,26 +80,27 @@ impl DetailSet {
         }
     }
 
-    /// Upload the textures of another scene.
-    pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>) {
-        if self
-            .scene
-            .as_ref()
-            .is_some_and(|held| Arc::ptr_eq(held, scene))
-        {
+    /// Upload the textures of another scene, and take other factors over.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>, factors: &[Vec3]) {
+        let is_held = |held: &Arc<Scene>| Arc::ptr_eq(held, scene);
+        if !self.scene.as_ref().is_some_and(is_held) {
+            self.scene = Some(scene.clone());
+            self.views = vec![None; scene.textures.len()];
+        } else if self.factors == factors {
             return;
         }
-        self.scene = Some(scene.clone());
+        self.factors = factors.to_vec();
         self.textured.clear();
         self.group_of = vec![0; scene.materials.len()];
-        let mut views: Vec<Option<wgpu::TextureView>> = vec![None; scene.textures.len()];
-        for (material, group) in scene.materials.iter().zip(&mut self.group_of) {
+        for (index, material) in scene.materials.iter().enumerate() {
             let Some(texture) = material.reflectance_texture else {
                 continue;
             };
-            let view = views[texture.index()]
+            let group = &mut self.group_of[index];
+            let view = self.views[texture.index()]
                 .get_or_insert_with(|| upload(gpu, &scene.textures[texture.index()]));
-            let [r, g, b] = material.reflectance.to_array();
+            let factor = factors.get(index).unwrap_or(&material.reflectance);
+            let [r, g, b] = factor.to_array();
             self.textured.push(bind_group(
                 gpu,
                 &self.layout,

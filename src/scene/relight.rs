@@ -1,0 +1,203 @@
+//! The same triangles under other light: what a material reflects and emits may be changed after a scene was read.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{
+    Material, Scene, Surface, TextureId,
+    texture::{TextureAverage, cured},
+};
+
+/// How a material reflects and emits, without its name and its textures. Linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Appearance {
+    /// Diffuse reflectance (`Kd`); multiplies the texture.
+    pub reflectance: Vec3,
+    /// Emitted radiance (`Ke`), W·sr⁻¹·m⁻²; multiplies the texture.
+    pub emission: Vec3,
+}
+
+impl Appearance {
+    /// That of a material.
+    pub fn of(material: &Material) -> Self {
+        Self {
+            reflectance: material.reflectance,
+            emission: material.emission,
+        }
+    }
+
+    /// With reflectance from 0 to the most there may be, and emission finite and not negative.
+    fn within(self, most: f32) -> Self {
+        let bounded = |x: f32| {
+            if x.is_finite() {
+                x.clamp(0.0, most)
+            } else {
+                0.0
+            }
+        };
+        Self {
+            reflectance: self.reflectance.map(bounded),
+            emission: self.emission.map(cured),
+        }
+    }
+}
+
+impl Scene {
+    /// How each material reflects and emits.
+    pub fn appearances(&self) -> Vec<Appearance> {
+        self.materials.iter().map(Appearance::of).collect()
+    }
+
+    /// What becomes of wished appearances: one for each material, in the ranges that materials have. Materials that
+    /// nothing is wished for stay as they are.
+    pub fn allowed(&self, wished: &[Appearance]) -> Vec<Appearance> {
+        let mut allowed = self.appearances();
+        for (appearance, wish) in allowed.iter_mut().zip(wished) {
+            *appearance = wish.within(self.max_reflectance);
+        }
+        allowed
+    }
+
+    /// The surfaces that the triangles have when materials look so.
+    pub fn surfaces_under(&self, appearances: &[Appearance]) -> Vec<Surface> {
+        let allowed = self.allowed(appearances);
+        let changed: Vec<bool> = allowed
+            .iter()
+            .zip(&self.materials)
+            .map(|(appearance, material)| *appearance != Appearance::of(material))
+            .collect();
+        let averages = self.averages_of(&changed);
+        let most = Vec3::splat(self.max_reflectance);
+        self.surfaces
+            .par_iter()
+            .zip(&self.triangles)
+            .enumerate()
+            .with_min_len(4096)
+            .map(|(index, (surface, triangle))| {
+                let of = triangle.material.index();
+                if !changed[of] {
+                    return *surface;
+                }
+                let mean = |texture: Option<TextureId>| -> Vec3 {
+                    let average = texture.and_then(|texture| averages[texture.index()].as_ref());
+                    match (average, self.texcoords.get(index)) {
+                        (Some(average), Some(uv)) => average.over(*uv),
+                        _ => Vec3::ONE,
+                    }
+                };
+                let (material, appearance) = (&self.materials[of], &allowed[of]);
+                let reflectance = appearance.reflectance * mean(material.reflectance_texture);
+                Surface {
+                    reflectance: reflectance.clamp(Vec3::ZERO, most),
+                    emission: appearance.emission * mean(material.emission_texture),
+                    ..*surface
+                }
+            })
+            .collect()
+    }
+
+    /// Textures of the materials that are `changed`, ready for means over triangles.
+    fn averages_of(&self, changed: &[bool]) -> Vec<Option<TextureAverage<'_>>> {
+        let mut averages: Vec<Option<TextureAverage<'_>>> =
+            self.textures.iter().map(|_| None).collect();
+        for (material, _) in self.materials.iter().zip(changed).filter(|(_, is)| **is) {
+            let textures = [material.reflectance_texture, material.emission_texture];
+            for texture in textures.into_iter().flatten().map(TextureId::index) {
+                averages[texture]
+                    .get_or_insert_with(|| TextureAverage::new(&self.textures[texture]));
+            }
+        }
+        averages
+    }
+
+    /// The scene with materials that look so.
+    pub fn relit(&self, appearances: &[Appearance]) -> Self {
+        let mut relit = Self {
+            surfaces: self.surfaces_under(appearances),
+            ..self.clone()
+        };
+        for (material, appearance) in relit.materials.iter_mut().zip(self.allowed(appearances)) {
+            material.reflectance = appearance.reflectance;
+            material.emission = appearance.emission;
+        }
+        relit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec2};
+
+    use super::*;
+    use crate::scene::{Face, SceneBuilder, SceneOptions, Texture};
+
+    /// A triangle under a grey texture, and one without.
+    fn scene() -> Scene {
+        let mut builder = SceneBuilder::default();
+        builder.textures.push(Texture {
+            name: String::new(),
+            width: 1,
+            height: 1,
+            pixels: vec![Vec3::splat(0.5)],
+        });
+        let textured = builder.push_material(Material {
+            reflectance_texture: Some(TextureId(0)),
+            emission_texture: Some(TextureId(0)),
+            ..Material::plain("textured", Vec3::ZERO, Vec3::ZERO)
+        });
+        let plain = builder.push_material(Material::plain("plain", Vec3::splat(0.4), Vec3::ONE));
+        for corner in [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z] {
+            builder.push_position(corner);
+        }
+        for (corners, material) in [([0, 1, 2], textured), ([0, 1, 3], plain)] {
+            builder.faces.push(Face {
+                corners,
+                texcoords: Some([Vec2::ZERO, Vec2::X, Vec2::Y]),
+                normals: None,
+                material,
+                line: 0,
+            });
+        }
+        builder.finish(&SceneOptions::default()).expect("two faces")
+    }
+
+    fn grey(reflectance: f32, emission: f32) -> Appearance {
+        Appearance {
+            reflectance: Vec3::splat(reflectance),
+            emission: Vec3::splat(emission),
+        }
+    }
+
+    #[test]
+    fn what_was_black_takes_its_texture_along() {
+        let relit = scene().relit(&[grey(0.8, 6.0)]);
+        let [textured, plain] = [relit.surfaces[0], relit.surfaces[1]];
+        assert!((textured.reflectance - 0.4).abs().max_element() < 1e-6);
+        assert!((textured.emission - 3.0).abs().max_element() < 1e-6);
+        assert_eq!(plain, scene().surfaces[1], "nothing was wished for it");
+        assert_eq!(relit.appearances()[0], grey(0.8, 6.0));
+    }
+
+    #[test]
+    fn wishes_end_at_what_materials_can_be() {
+        let scene = scene();
+        let wished = [grey(7.0, -1.0), grey(f32::NAN, f32::INFINITY)];
+        let allowed = scene.allowed(&wished);
+        assert_eq!(allowed[0], grey(scene.max_reflectance, 0.0));
+        assert_eq!(allowed[1], grey(0.0, 0.0));
+        for surface in scene.surfaces_under(&wished) {
+            assert!(surface.reflectance.max_element() <= scene.max_reflectance);
+            assert_eq!(surface.emission, Vec3::ZERO);
+        }
+    }
+
+    #[test]
+    fn back_to_what_the_file_says() {
+        let scene = scene();
+        let dark = scene.relit(&[grey(0.1, 0.0), grey(0.1, 0.0)]);
+        assert!(!dark.has_emitter());
+        let again = dark.relit(&scene.appearances());
+        assert_eq!(again.surfaces, scene.surfaces);
+        assert_eq!(again.materials, scene.materials);
+    }
+}

@@ -1,0 +1,130 @@
+//! Lights and materials: each light on or off, brighter, in another colour; each material in another colour.
+//!
+//! The automatic exposure stays where it is while anything is changed, or what is dimmed would look as before.
+
+use eframe::egui;
+use glam::Vec3;
+
+use super::{row, seconds, settings::slider};
+use crate::viewer::{
+    action::Action,
+    materials::{LightControl, Materials},
+    state::State,
+};
+
+/// Height of the list of lights, and of that of materials, beyond which it scrolls, in points.
+const MOST_HEIGHT: f32 = 240.0;
+
+/// Show the lights and the materials; a wish goes into `actions`.
+pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+    let Some(loaded) = &state.loaded else {
+        return;
+    };
+    let mut materials = state.materials.clone();
+    lights_ui(ui, &mut materials);
+    row::section(ui, "Reflectance", false, |ui| {
+        reflectances_ui(ui, &mut materials, loaded.scene.max_reflectance);
+    });
+    ui.horizontal(|ui| {
+        let reset = egui::Button::new("Reset lights and materials");
+        let reset = ui.add_enabled(materials.are_changed(), reset);
+        if reset.on_hover_text("All as in the file").clicked() {
+            materials.reset();
+        }
+        if let Some(secs) = state.run.relit_secs {
+            ui.weak(format!("in {}", seconds(secs))).on_hover_text(
+                "What the last change took to show. It uses the links that there are; continue refines them.",
+            );
+        }
+    });
+    if materials != state.materials {
+        actions.push(Action::Relight(materials));
+    }
+}
+
+fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
+    let lights: Vec<usize> = materials.lights().collect();
+    if lights.is_empty() {
+        ui.weak("No material emits light.");
+        return;
+    }
+    // Of each light a line with its name and one with its intensity.
+    let height = 2.0 * ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+    egui::ScrollArea::vertical()
+        .id_salt("lights")
+        .max_height(MOST_HEIGHT)
+        .min_scrolled_height(MOST_HEIGHT)
+        .show_rows(ui, height, lights.len(), |ui, shown| {
+            for &index in &lights[shown] {
+                ui.push_id(index, |ui| light_ui(ui, materials, index));
+            }
+        });
+}
+
+fn light_ui(ui: &mut egui::Ui, materials: &mut Materials, index: usize) {
+    let default = materials.of_file(index).light;
+    let material = &mut materials.now[index];
+    let (Some(light), Some(default)) = (&mut material.light, default) else {
+        return;
+    };
+    ui.horizontal(|ui| {
+        color_ui(
+            ui,
+            &format!("Colour of {}", material.name),
+            &mut light.color,
+        );
+        ui.checkbox(&mut light.is_on, &material.name)
+            .on_hover_text("Whether it emits light");
+    });
+    ui.add_enabled_ui(light.is_on, |ui| intensity_ui(ui, light, &default));
+}
+
+fn intensity_ui(ui: &mut egui::Ui, light: &mut LightControl, default: &LightControl) {
+    row::setting(
+        ui,
+        "Intensity",
+        "Times as bright as in the file. Values beyond the slider may be typed.",
+        &mut light.intensity,
+        &default.intensity,
+        |ui, value| ui.add(slider(value, 0.01..=100.0)),
+    );
+}
+
+fn reflectances_ui(ui: &mut egui::Ui, materials: &mut Materials, most: f32) {
+    let height = ui.spacing().interact_size.y;
+    let count = materials.now.len();
+    egui::ScrollArea::vertical()
+        .id_salt("reflectances")
+        .max_height(MOST_HEIGHT)
+        .min_scrolled_height(MOST_HEIGHT)
+        .show_rows(ui, height, count, |ui, shown| {
+            for index in shown {
+                let default = materials.of_file(index).reflectance;
+                let material = &mut materials.now[index];
+                ui.push_id(index, |ui| {
+                    ui.horizontal(|ui| {
+                        let name = format!("Reflectance of {}", material.name);
+                        color_ui(ui, &name, &mut material.reflectance);
+                        material.reflectance = material.reflectance.min(Vec3::splat(most));
+                        ui.label(&material.name);
+                        if material.reflectance != default && row::reset_button(ui, &name).clicked()
+                        {
+                            material.reflectance = default;
+                        }
+                    });
+                });
+            }
+        });
+}
+
+/// A button with a linear colour that opens a picker.
+fn color_ui(ui: &mut egui::Ui, name: &str, color: &mut Vec3) {
+    let mut picked = color.to_array();
+    let response = ui.color_edit_button_rgb(&mut picked);
+    // The picker gives back what it was given but for rounding: only what the user changed counts.
+    if response.changed() {
+        *color = Vec3::from_array(picked).clamp(Vec3::ZERO, Vec3::ONE);
+    }
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ColorWell, true, name));
+    response.on_hover_text(name);
+}

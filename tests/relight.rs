@@ -1,0 +1,404 @@
+//! Light of changed emitters and materials on the links that there are, against fresh solves and against itself.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{f32::consts::PI, sync::Arc};
+
+use glam::{DVec3, Vec3};
+use vecrad::{
+    geometry::area_vector,
+    scene::{Appearance, Material, Scene, SceneBuilder, SceneOptions, Sides, builtin},
+    solver::{Cancel, Direct, Snapshot, SolveSettings, Solver},
+};
+
+/// Settings under which the iteration leaves next to nothing, in two steps.
+fn settings() -> SolveSettings {
+    SolveSettings {
+        tolerance: 1e-6,
+        max_steps: 2,
+        ..SolveSettings::draft()
+    }
+}
+
+fn one_sided() -> SceneOptions {
+    SceneOptions {
+        sides: Sides::One,
+        ..SceneOptions::default()
+    }
+}
+
+fn cornell() -> Arc<Scene> {
+    Arc::new(builtin::builtin("cornell", &one_sided()).unwrap().unwrap())
+}
+
+/// A room of six walls with a warm lamp and a cold one under its ceiling, between which a board hangs.
+fn two_lamps() -> Arc<Scene> {
+    let mut builder = SceneBuilder::default();
+    let mut paint = |name: &str, reflectance: [f32; 3], emission: [f32; 3]| {
+        let [reflectance, emission] = [reflectance, emission].map(Vec3::from_array);
+        builder.push_material(Material::plain(name, reflectance, emission))
+    };
+    let white = paint("white", [0.7, 0.7, 0.7], [0.0; 3]);
+    let red = paint("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let warm = paint("warm", [0.5, 0.5, 0.5], [30.0, 20.0, 10.0]);
+    let cold = paint("cold", [0.5, 0.5, 0.5], [5.0, 10.0, 20.0]);
+    let mut quad = |corners: [[f64; 3]; 4], material| {
+        let [a, b, c, d] = corners.map(|corner| builder.push_position(DVec3::from_array(corner)));
+        builder.push_triangle([a, b, c], material);
+        builder.push_triangle([a, c, d], material);
+    };
+    let (x, y, z) = ([0.0, 4.0], [0.0, 2.5], [0.0, 3.0]);
+    let at = |i: usize, j: usize, k: usize| [x[i], y[j], z[k]];
+    quad([at(0, 0, 0), at(0, 0, 1), at(1, 0, 1), at(1, 0, 0)], white);
+    quad([at(0, 1, 0), at(1, 1, 0), at(1, 1, 1), at(0, 1, 1)], white);
+    quad([at(0, 0, 0), at(1, 0, 0), at(1, 1, 0), at(0, 1, 0)], white);
+    quad([at(0, 0, 1), at(0, 1, 1), at(1, 1, 1), at(1, 0, 1)], white);
+    quad([at(0, 0, 0), at(0, 1, 0), at(0, 1, 1), at(0, 0, 1)], red);
+    quad([at(1, 0, 0), at(1, 0, 1), at(1, 1, 1), at(1, 1, 0)], white);
+    for (left, lamp) in [(0.6, warm), (3.0, cold)] {
+        let right = left + 0.4;
+        let corner = |x: f64, z: f64| [x, 2.4, z];
+        let corners = [
+            corner(left, 1.3),
+            corner(right, 1.3),
+            corner(right, 1.7),
+            corner(left, 1.7),
+        ];
+        quad(corners, lamp);
+    }
+    let board = |y: f64, z: f64| [2.0, y, z];
+    quad(
+        [
+            board(1.0, 0.5),
+            board(2.4, 0.5),
+            board(2.4, 2.5),
+            board(1.0, 2.5),
+        ],
+        red,
+    );
+    quad(
+        [
+            board(1.0, 0.5),
+            board(1.0, 2.5),
+            board(2.4, 2.5),
+            board(2.4, 0.5),
+        ],
+        red,
+    );
+    Arc::new(builder.finish(&one_sided()).unwrap())
+}
+
+fn solved(scene: &Arc<Scene>, settings: SolveSettings) -> Solver {
+    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
+    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    solver
+}
+
+/// The light of a solve after other appearances were wished for; all of it presentable.
+fn relit(solver: &mut Solver, appearances: &[Appearance]) -> Snapshot {
+    let links = solver.links().len();
+    let relit = solver.relight(appearances, &Cancel::default()).unwrap();
+    if relit.is_rough {
+        solver.finish_relighting(&Cancel::default()).unwrap();
+    }
+    assert_eq!(solver.links().len(), links, "links stay");
+    assert!(
+        !relit.report.is_final,
+        "a further step has something to refine"
+    );
+    let snapshot = solver.snapshot();
+    for light in [&snapshot.light.irradiance, &snapshot.light.direct] {
+        assert_eq!(light.len(), snapshot.mesh.positions.len());
+        assert!(
+            light
+                .iter()
+                .all(|x| x.is_finite() && x.min_element() >= 0.0)
+        );
+    }
+    snapshot
+}
+
+/// Radiance of the vertices: what is emitted and what is reflected.
+fn radiance(snapshot: &Snapshot) -> Vec<Vec3> {
+    let (mesh, light) = (&snapshot.mesh, &snapshot.light);
+    (0..mesh.positions.len())
+        .map(|index| mesh.emission[index] + mesh.reflectance[index] * light.irradiance[index] / PI)
+        .collect()
+}
+
+/// Largest difference, relative to the mean of the second.
+fn difference(found: &[Vec3], expected: &[Vec3]) -> f32 {
+    assert_eq!(found.len(), expected.len());
+    let sum: Vec3 = expected.iter().sum();
+    let mean = sum.element_sum() / (3 * expected.len()) as f32;
+    let most = found.iter().zip(expected);
+    most.map(|(a, b)| (*a - *b).abs().max_element())
+        .fold(0.0, f32::max)
+        / mean
+}
+
+/// Root of the mean square of the difference, relative to that of the second.
+fn relative_rms(found: &[Vec3], expected: &[Vec3]) -> f32 {
+    let square = |of: &mut dyn Iterator<Item = Vec3>| of.map(|x| x.length_squared()).sum::<f32>();
+    let between = square(&mut found.iter().zip(expected).map(|(a, b)| *a - *b));
+    (between / square(&mut expected.iter().copied())).sqrt()
+}
+
+/// Mean irradiance over the display mesh, by area.
+fn mean_irradiance(snapshot: &Snapshot) -> DVec3 {
+    let (mesh, light) = (&snapshot.mesh, &snapshot.light);
+    let (mut sum, mut whole) = (DVec3::ZERO, 0.0);
+    for corners in &mesh.indices {
+        let points = corners.map(|corner| mesh.positions[corner as usize]);
+        let area = f64::from(area_vector(points).length());
+        let values = corners.map(|corner| light.irradiance[corner as usize].as_dvec3());
+        sum += values.into_iter().sum::<DVec3>() * (area / 3.0);
+        whole += area;
+    }
+    sum / whole
+}
+
+/// Appearances of a scene with the emission of some materials multiplied.
+fn with_emission(scene: &Scene, factor: impl Fn(&str) -> Vec3) -> Vec<Appearance> {
+    let of = |material: &Material| Appearance {
+        emission: material.emission * factor(&material.name),
+        ..Appearance::of(material)
+    };
+    scene.materials.iter().map(of).collect()
+}
+
+/// Appearances of a scene with the reflectance of one material.
+fn with_reflectance(scene: &Scene, name: &str, reflectance: Vec3) -> Vec<Appearance> {
+    let mut appearances = scene.appearances();
+    let named = scene.materials.iter().position(|m| m.name == name).unwrap();
+    appearances[named].reflectance = reflectance;
+    appearances
+}
+
+#[test]
+fn light_is_in_proportion_to_all_emission() {
+    for direct in [Direct::Sampled, Direct::Linked] {
+        let scene = cornell();
+        let mut solver = solved(
+            &scene,
+            SolveSettings {
+                direct,
+                ..settings()
+            },
+        );
+        let rays = |solver: &mut Solver| {
+            let report = solver.relight(&scene.appearances(), &Cancel::default());
+            report.unwrap().report.shadow_rays
+        };
+        let shot = rays(&mut solver);
+        let before = radiance(&solver.snapshot());
+        for factor in [1e-3, 0.3, 2.0, 1e4] {
+            let wished = with_emission(&scene, |_| Vec3::splat(factor));
+            let found = radiance(&relit(&mut solver, &wished));
+            let expected: Vec<Vec3> = before.iter().map(|light| *light * factor).collect();
+            let error = difference(&found, &expected);
+            assert!(error < 1e-4, "{direct:?}, factor {factor}: {error}");
+        }
+        assert_eq!(rays(&mut solver), shot, "nothing is shot to scale light");
+    }
+}
+
+#[test]
+fn two_lamps_together_are_the_sum_of_each() {
+    let scene = two_lamps();
+    let mut solver = solved(&scene, settings());
+    let mut of = |wished: &[Appearance]| relit(&mut solver, wished).light.irradiance.clone();
+    let only = |kept: &str| {
+        let kept = kept.to_owned();
+        with_emission(&scene, move |name| {
+            Vec3::splat(f32::from(u8::from(name == kept)))
+        })
+    };
+    let (warm, cold) = (of(&only("warm")), of(&only("cold")));
+    let both = of(&scene.appearances());
+    let sum: Vec<Vec3> = warm.iter().zip(&cold).map(|(a, b)| *a + *b).collect();
+    // Clusters stand at their brightest place, which is elsewhere for each lamp: links differ by a part of their own
+    // error, and vertices take the mean with neighbours by how noisy they are. Of a draft that is a few percent.
+    let error = relative_rms(&sum, &both);
+    assert!(error < 0.03, "{error}");
+    let total = |light: &[Vec3]| -> Vec3 { light.iter().sum() };
+    let ratio = total(&sum) / total(&both);
+    assert!((ratio - 1.0).abs().max_element() < 5e-3, "{ratio}");
+    // The shadow of the board is that of one lamp only: each side is lit by its own.
+    assert!(difference(&warm, &both) > 0.3 && difference(&cold, &both) > 0.3);
+}
+
+#[test]
+fn what_is_switched_off_and_on_again_is_as_before() {
+    let scene = two_lamps();
+    let mut solver = solved(&scene, settings());
+    let before = radiance(&solver.snapshot());
+    let dark = with_emission(&scene, |_| Vec3::ZERO);
+    assert!(
+        radiance(&relit(&mut solver, &dark))
+            .iter()
+            .all(|light| *light == Vec3::ZERO)
+    );
+    let error = difference(
+        &radiance(&relit(&mut solver, &scene.appearances())),
+        &before,
+    );
+    assert!(error < 1e-5, "all together: {error}");
+    let half = with_emission(&scene, |name| {
+        Vec3::splat(f32::from(u8::from(name != "warm")))
+    });
+    let both = radiance(&relit(&mut solver, &scene.appearances()));
+    relit(&mut solver, &half);
+    let lit = radiance(&relit(&mut solver, &scene.appearances()));
+    relit(&mut solver, &half);
+    let again = radiance(&relit(&mut solver, &scene.appearances()));
+    // The second time nothing is shot; what remains is what the iteration leaves.
+    let error = difference(&again, &lit);
+    assert!(error < 1e-3, "one by one: {error}");
+    // The first time each lamp is shot by itself: their noise is another.
+    let error = difference(&lit, &both);
+    assert!(error < 0.3, "shot again: {error}");
+}
+
+#[test]
+fn relit_is_as_a_fresh_solve_within_the_error_of_either() {
+    let scene = two_lamps();
+    let changes = [
+        with_emission(&scene, |name| match name {
+            "warm" => Vec3::new(0.1, 0.5, 2.0),
+            _ => Vec3::splat(3.0),
+        }),
+        with_reflectance(&scene, "white", Vec3::new(0.3, 0.5, 0.9)),
+        with_reflectance(&scene, "red", Vec3::ZERO),
+    ];
+    let settings = SolveSettings::draft();
+    for (index, wished) in changes.iter().enumerate() {
+        let mut solver = solved(&scene, settings.clone());
+        let found = mean_irradiance(&relit(&mut solver, wished));
+        let fresh = solved(&Arc::new(scene.relit(wished)), settings.clone());
+        let expected = mean_irradiance(&fresh.snapshot());
+        let error = (found / expected - 1.0).abs().max_element();
+        // The energy of a draft is within 3 %.
+        assert!(error < 0.03, "change {index}: {found} for {expected}");
+        // Going on refines: it stays a solve like any other.
+        let report = solver.step(&Cancel::default()).unwrap();
+        assert!(report.is_final, "the steps were used up before");
+        let refined = mean_irradiance(&solver.snapshot());
+        let error = (refined / expected - 1.0).abs().max_element();
+        assert!(
+            error < 0.03,
+            "change {index} refined: {refined} for {expected}"
+        );
+    }
+}
+
+#[test]
+fn reflectance_is_black_or_ends_at_the_clamp() {
+    let scene = cornell();
+    let mut solver = solved(&scene, settings());
+    let of_all = |reflectance: Vec3| -> Vec<Appearance> {
+        let of = |material: &Material| Appearance {
+            reflectance,
+            ..Appearance::of(material)
+        };
+        scene.materials.iter().map(of).collect()
+    };
+    let black = relit(&mut solver, &of_all(Vec3::ZERO));
+    assert!(black.mesh.reflectance.iter().all(|x| *x == Vec3::ZERO));
+    // Nothing is reflected, so that all light is direct.
+    let most = difference(&black.light.irradiance, &black.light.direct);
+    assert!(most < 1e-5, "{most}");
+    let white = relit(&mut solver, &of_all(Vec3::splat(7.0)));
+    let limit = scene.max_reflectance * (1.0 + 1e-5);
+    assert!(
+        white
+            .mesh
+            .reflectance
+            .iter()
+            .all(|x| x.max_element() <= limit)
+    );
+    assert!(mean_irradiance(&white).min_element() > mean_irradiance(&black).max_element());
+    let broken = relit(&mut solver, &of_all(Vec3::NAN));
+    assert!(broken.mesh.reflectance.iter().all(|x| *x == Vec3::ZERO));
+}
+
+#[test]
+fn the_same_bits_on_any_number_of_threads() {
+    let scene = two_lamps();
+    let wished = [
+        with_emission(&scene, |name| {
+            Vec3::splat(if name == "warm" { 0.2 } else { 1.0 })
+        }),
+        with_reflectance(&scene, "white", Vec3::splat(0.4)),
+    ];
+    let light = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            let mut solver = solved(&scene, settings());
+            wished
+                .each_ref()
+                .map(|wished| relit(&mut solver, wished).light.irradiance.clone())
+        })
+    };
+    assert_eq!(light(1), light(4));
+}
+
+#[test]
+fn before_the_first_step_only_direct_light_changes() {
+    let scene = cornell();
+    let mut solver = Solver::new(scene.clone(), settings(), None, &Cancel::default()).unwrap();
+    let before = radiance(&solver.snapshot());
+    let found = radiance(&relit(
+        &mut solver,
+        &with_emission(&scene, |_| Vec3::splat(2.0)),
+    ));
+    let expected: Vec<Vec3> = before.iter().map(|light| *light * 2.0).collect();
+    assert!(difference(&found, &expected) < 1e-5);
+    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    let mean = mean_irradiance(&solver.snapshot());
+    let fresh = mean_irradiance(&solved(&scene, settings()).snapshot());
+    assert!(
+        (mean / fresh - 2.0).abs().max_element() < 0.02,
+        "{mean} {fresh}"
+    );
+}
+
+#[test]
+fn what_is_cancelled_can_be_asked_again() {
+    let scene = two_lamps();
+    let mut solver = solved(&scene, settings());
+    let wished = with_emission(&scene, |name| {
+        Vec3::splat(if name == "warm" { 0.2 } else { 1.0 })
+    });
+    let cancelled = Cancel::default();
+    cancelled.cancel();
+    let before = solver.snapshot().light.clone();
+    assert!(solver.relight(&wished, &cancelled).is_none());
+    assert_eq!(*solver.snapshot().light, *before);
+    let found = relit(&mut solver, &wished).light.irradiance.clone();
+    let mut other = solved(&scene, settings());
+    assert_eq!(found, relit(&mut other, &wished).light.irradiance);
+}
+
+#[test]
+fn what_is_shown_in_haste_is_nearly_what_is_shown_after() {
+    let scene = two_lamps();
+    let mut solver = solved(&scene, settings());
+    for wished in [
+        with_reflectance(&scene, "white", Vec3::splat(0.3)),
+        with_emission(&scene, |name| {
+            Vec3::splat(f32::from(u8::from(name == "warm")))
+        }),
+    ] {
+        let relit = solver.relight(&wished, &Cancel::default()).unwrap();
+        assert!(relit.is_rough);
+        let rough = solver.snapshot();
+        solver.finish_relighting(&Cancel::default()).unwrap();
+        let fine = solver.snapshot();
+        assert_eq!(rough.light.direct, fine.light.direct);
+        let error = (mean_irradiance(&rough) / mean_irradiance(&fine) - 1.0).abs();
+        assert!(error.max_element() < 0.01, "{error}");
+        let error = difference(&rough.light.irradiance, &fine.light.irradiance);
+        assert!(error < 0.25, "{error}");
+    }
+}
