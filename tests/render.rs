@@ -3,11 +3,13 @@
 #![cfg(feature = "viewer")]
 
 mod display_scenes;
+mod pictures;
 
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use image::RgbaImage;
+use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
     export::{ColorOptions, ToneMap as ExportToneMap},
     scene::{Material, Scene, SceneBuilder, SceneOptions},
@@ -24,8 +26,6 @@ use vecrad::{
 };
 
 const SIZE: [u32; 2] = [128, 128];
-/// Steps of 255 by which a rounded half float may be off after the sRGB curve.
-const TOLERANCE: i32 = 2;
 
 /// A red wall that fills the left half of a picture taken from +z, and a green one in the right half that shows its back.
 fn scene() -> Arc<Scene> {
@@ -100,15 +100,7 @@ fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<
         snapshot,
         errors: None,
     };
-    match headless::picture(subject, &camera(), view, SIZE) {
-        Ok(picture) => Some(picture),
-        Err(HeadlessError::NoAdapter(reason)) => {
-            assert!(std::env::var_os("CI").is_none(), "CI must draw: {reason}");
-            eprintln!("skipped, no graphics adapter: {reason}");
-            None
-        }
-        Err(error) => panic!("{error}"),
-    }
+    unless_no_adapter(headless::picture(subject, &camera(), view, SIZE))
 }
 
 /// The pixel in the middle of the left wall.
@@ -121,14 +113,6 @@ fn left(picture: &RgbaImage) -> [u8; 3] {
 fn right(picture: &RgbaImage) -> [u8; 3] {
     let [r, g, b, _] = picture.get_pixel(88, 64).0;
     [r, g, b]
-}
-
-fn assert_near(seen: [u8; 3], expected: [u8; 3], what: &str) {
-    let near = seen
-        .iter()
-        .zip(expected)
-        .all(|(a, b)| (i32::from(*a) - i32::from(b)).abs() <= TOLERANCE);
-    assert!(near, "{what}: {seen:?} instead of {expected:?}");
 }
 
 #[test]

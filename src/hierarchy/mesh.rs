@@ -170,6 +170,18 @@ impl Mesh {
         (0..self.elements.len()).filter(|&index| self.elements[index].is_leaf())
     }
 
+    /// Area of the leaves about each vertex.
+    pub fn areas_about_vertices(&self) -> Vec<f32> {
+        let mut areas = vec![0.0; self.vertices.len()];
+        for leaf in self.leaves() {
+            let element = &self.elements[leaf];
+            for vertex in element.vertices {
+                areas[vertex as usize] += element.area_vector.length();
+            }
+        }
+        areas
+    }
+
     /// The leaves for which light is computed, in order.
     pub fn held_leaves(&self) -> impl Iterator<Item = usize> + '_ {
         self.leaves().filter(|&leaf| self.is_held(leaf))

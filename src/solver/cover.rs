@@ -75,24 +75,20 @@ impl DirectField {
         mean: f32,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let mut weights = vec![0.0f32; self.vertices.len()];
-        for leaf in hierarchy.mesh.leaves() {
-            let element = &hierarchy.mesh.elements[leaf];
-            for &vertex in &element.vertices {
-                weights[vertex as usize] += element.area_vector.length() / 3.0;
-            }
+        let areas = hierarchy.mesh.areas_about_vertices();
+        let weight = |vertex: usize| (areas[vertex] / (3.0 * hierarchy.area as f32)).sqrt();
+        let is_noisy = |vertex: usize, light: Option<DirectLight>| {
+            light.is_some_and(|light| limits.is_noisy(&light, weight(vertex), mean))
+        };
+        let mut known = self.vertices.iter().enumerate();
+        if !known.any(|(vertex, light)| is_noisy(vertex, *light)) {
+            return Some(0);
         }
-        let scale = 1.0 / (hierarchy.area as f32).sqrt();
-        weights
-            .iter_mut()
-            .for_each(|weight| *weight = weight.sqrt() * scale);
-        let receivers = self.receivers(hierarchy, |vertex, light| {
-            light.is_some_and(|light| limits.is_noisy(&light, weights[vertex], mean))
-        });
+        let receivers = self.receivers(hierarchy, is_noisy);
         let before = self.shot(&receivers);
         let weights: Vec<f32> = receivers
             .iter()
-            .map(|&(vertex, _)| weights[vertex as usize])
+            .map(|&(vertex, _)| weight(vertex as usize))
             .collect();
         let mut known = self.known(&receivers);
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();

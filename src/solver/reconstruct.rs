@@ -325,13 +325,7 @@ pub(super) fn project(
     centres: impl Iterator<Item = (usize, Vec4)>,
 ) {
     let mut moves = vec![(Vec4::ZERO, Vec4::INFINITY, Vec4::NEG_INFINITY); values.len()];
-    let mut weights = vec![0.0f32; values.len()];
-    for leaf in hierarchy.mesh.leaves() {
-        let element = &hierarchy.mesh.elements[leaf];
-        for vertex in element.vertices {
-            weights[vertex as usize] += element.area_vector.length();
-        }
-    }
+    let areas = hierarchy.mesh.areas_about_vertices();
     for (element, centre) in centres {
         let element = &hierarchy.mesh.elements[element];
         let (corners, area) = (element.vertices, element.area_vector.length());
@@ -344,9 +338,9 @@ pub(super) fn project(
             (*lower, *upper) = (lower.min(least), upper.max(most));
         }
     }
-    for ((value, (sum, lower, upper)), weight) in values.iter_mut().zip(moves).zip(weights) {
-        if weight > 0.0 && lower.x <= upper.x {
-            *value = (*value + sum / weight).clamp(lower, upper);
+    for ((value, (sum, lower, upper)), area) in values.iter_mut().zip(moves).zip(areas) {
+        if area > 0.0 && lower.x <= upper.x {
+            *value = (*value + sum / area).clamp(lower, upper);
         }
     }
 }

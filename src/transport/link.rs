@@ -9,7 +9,8 @@ use crate::hierarchy::{Hierarchy, NodeId};
 pub struct Link {
     /// Where the light comes from. Equal to the receiver for the light that a cluster exchanges within itself.
     pub source: NodeId,
-    /// Unoccluded fraction of the light that is transferred, 0…1; more where near nodes exchange more than tables say.
+    /// Unoccluded fraction of the light that is transferred, 0…1.5 as few rays tell it without bias; more where near nodes
+    /// exchange more than tables say.
     pub visibility: f32,
     /// Bound of the error of the irradiance that a face gets over this link (luminance): guaranteed but for visibility,
     /// which adds twice its standard error.
