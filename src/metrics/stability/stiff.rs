@@ -120,9 +120,9 @@ fn white_maze(cancel: &Cancel) -> Result<Finding, Trouble> {
     ]))
 }
 
-/// Share of the light of a bright room that may be mistaken behind a narrow hole: ten times the threshold to which links
+/// Share of the light of a bright room that may be mistaken behind a narrow hole: five times the threshold to which links
 /// are refined, relative to the mean.
-const BLURRED: f64 = 0.02;
+const BLURRED: f64 = 0.01;
 
 fn pin_hole(cancel: &Cancel) -> Result<Finding, Trouble> {
     const REFLECTANCE: f32 = 0.98;
@@ -165,7 +165,11 @@ fn spheres(cancel: &Cancel) -> Result<Finding, Trouble> {
     let lit = solve(
         stability::nested_spheres(REFLECTANCE, 6),
         &one_sided(),
-        &settled(),
+        // Of the links of a draft some 1 % is lost, since nobody scales columns.
+        &SolveSettings {
+            tolerance: 1e-4,
+            ..SolveSettings::normal()
+        },
         cancel,
     )?;
     // The inner sphere sees the outer one only; the outer one sees the inner with F = (r / R)². So with what arrives
