@@ -5,7 +5,7 @@ mod polygon;
 mod rays;
 mod sampling;
 
-pub use polygon::{irradiance_vector, point_irradiance};
+pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance};
 pub use rays::{Hit, RAY_OFFSET, RayTree};
 pub use sampling::{Random, cosine_direction, low_discrepancy_2d, triangle_point};
 

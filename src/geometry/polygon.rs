@@ -76,6 +76,16 @@ pub fn point_irradiance(point: Vec3, normal: Vec3, corners: [Vec3; 3]) -> f32 {
     }
 }
 
+/// Irradiance at `point` with unit `normal` of a flat surface of radiosity 1, given by the edges of its outline in any
+/// order, each wound as seen from its front; 0…1. It may have holes and several parts. The point must lie before its
+/// front, and all of it above the horizon.
+pub fn outline_irradiance(point: Vec3, normal: Vec3, edges: &[[Vec3; 2]]) -> f32 {
+    let terms = edges
+        .iter()
+        .map(|&[from, to]| edge_term(from - point, to - point));
+    (terms.sum::<Vec3>() / TAU).dot(normal).clamp(0.0, 1.0)
+}
+
 /// Whether the point lies before the triangle's front.
 fn sees_front(point: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
     (b - a).cross(c - a).dot(point - a) > 0.0
@@ -86,16 +96,23 @@ fn edge_sum(corners: &[Vec3]) -> Vec3 {
     let mut sum = Vec3::ZERO;
     let mut previous = corners[corners.len() - 1];
     for &corner in corners {
-        // The front faces the point, so its corners run clockwise around the outgoing vector: previous × corner
-        // would point away, corner × previous points towards the polygon.
-        let cross = corner.cross(previous);
-        let sine = cross.length();
-        if sine > 0.0 {
-            sum += cross * (sine.atan2(corner.dot(previous)) / sine);
-        }
+        sum += edge_term(previous, corner);
         previous = corner;
     }
     sum / TAU
+}
+
+/// `θ Γ` of the edge between two corners given relative to the point.
+fn edge_term(from: Vec3, to: Vec3) -> Vec3 {
+    // The front faces the point, so its corners run clockwise around the outgoing vector: from × to would point away,
+    // to × from points towards the polygon.
+    let cross = to.cross(from);
+    let sine = cross.length();
+    if sine > 0.0 {
+        cross * (sine.atan2(to.dot(from)) / sine)
+    } else {
+        Vec3::ZERO
+    }
 }
 
 #[cfg(test)]

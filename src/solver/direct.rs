@@ -9,11 +9,14 @@ use std::{f32::consts::PI, ops::Range};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Cancel, Direct};
+use super::{
+    Cancel, Direct,
+    panel::{Panel, panels},
+};
 use crate::{
     geometry::{Random, RayTree, low_discrepancy_2d, point_irradiance, triangle_point},
     hierarchy::{Hierarchy, Patch},
-    scene::{Scene, TriangleId},
+    scene::{MaterialId, Scene, TriangleId},
     transport::luminance,
 };
 
@@ -26,12 +29,13 @@ const PLACES: f32 = 16_384.0;
 
 /// An emitting patch.
 #[derive(Clone, Copy, Debug)]
-struct Emitter {
-    corners: [Vec3; 3],
-    normal: Vec3,
-    area: f32,
-    triangle: TriangleId,
-    radiosity: Vec4,
+pub(super) struct Emitter {
+    pub corners: [Vec3; 3],
+    pub normal: Vec3,
+    pub area: f32,
+    pub triangle: TriangleId,
+    pub material: MaterialId,
+    pub radiosity: Vec4,
 }
 
 /// Where direct light is wanted.
@@ -47,7 +51,9 @@ pub(super) struct Receiver {
 
 /// The emitters that are sampled.
 pub(super) struct Lights {
+    /// Those of a panel follow each other.
     emitters: Vec<Emitter>,
+    panels: Vec<Panel>,
     /// Largest radiosity of an emitter by channel: no irradiance can be larger.
     brightest: Vec4,
     /// By patch.
@@ -87,13 +93,20 @@ impl Lights {
                     normal: patch.normal,
                     area: patch.area,
                     triangle: patch.triangle,
+                    material: scene.triangles[patch.triangle.index()].material,
                     radiosity: (patch.emission * PI).extend(0.0),
                 }
             })
             .collect();
+        Self::of(&emitters, is_sampled)
+    }
+
+    fn of(emitters: &[Emitter], is_sampled: Vec<bool>) -> Self {
+        let (emitters, panels) = panels(emitters);
         Self {
             brightest: brightest(&emitters),
             emitters,
+            panels,
             is_sampled,
         }
     }
@@ -111,11 +124,7 @@ impl Lights {
                 })
             })
             .collect();
-        Self {
-            brightest: brightest(&emitters),
-            emitters,
-            is_sampled: self.is_sampled.clone(),
-        }
+        Self::of(&emitters, self.is_sampled.clone())
     }
 
     /// Irradiance no larger than any surroundings can give. Of many emitters behind each other, few rays tell badly how
@@ -193,7 +202,7 @@ impl Lights {
         receiver: &Receiver,
         samples: Range<u32>,
         seed: u64,
-        sums: &mut Vec<f32>,
+        sums: &mut Vec<Arriving>,
         light: &mut DirectLight,
     ) {
         light.exact = self.unoccluded(receiver, sums);
@@ -202,9 +211,10 @@ impl Lights {
             light.arrive_whole();
             return;
         }
-        let Some(&total) = sums.last().filter(|&&total| total > 0.0) else {
+        let total = sums.last().map_or(0.0, |last| last.until);
+        if total <= 0.0 {
             return;
-        };
+        }
         // The stream belongs to the place, so that the order of points does not matter, nor the last digit.
         let [x, y, z] = (receiver.point * PLACES)
             .round()
@@ -218,15 +228,29 @@ impl Lights {
         for (stratum, sample) in samples.enumerate() {
             let target = (stratum as f32 + random.uniform()) / count * total;
             let chosen = sums
-                .partition_point(|&sum| sum <= target)
+                .partition_point(|part| part.until <= target)
                 .min(sums.len() - 1);
-            let emitter = &self.emitters[chosen];
-            let share = sums[chosen] - if chosen > 0 { sums[chosen - 1] } else { 0.0 };
+            let before = if chosen > 0 {
+                sums[chosen - 1].until
+            } else {
+                0.0
+            };
+            let (share, panel) = (
+                sums[chosen].until - before,
+                &self.panels[sums[chosen].panel],
+            );
+            let (emitter, area) = match sums[chosen].emitter {
+                Some(emitter) => (&self.emitters[emitter], self.emitters[emitter].area),
+                None => {
+                    let place = (target - before) / share;
+                    (&self.emitters[panel.emitter_at(place)], panel.area())
+                }
+            };
             let at = triangle_point(low_discrepancy_2d(sample, shift));
             let [a, b, c] = emitter.corners;
             let point = a * at.x + b * at.y + c * at.z;
-            // The share is the mean of the transfer over the patch, so the weight is about 1 where the patch is small.
-            let weight = emitter.transfer(receiver, point) / share;
+            // The share is the mean of the transfer over the area, so the weight is about 1 where that is small.
+            let weight = area * emitter.transfer(receiver, point) / share;
             if !(weight.is_finite() && weight > 0.0) {
                 continue;
             }
@@ -240,21 +264,44 @@ impl Lights {
         }
     }
 
-    /// Irradiance without occlusion; `sums` becomes the running sums of its luminance over the emitters.
-    pub(super) fn unoccluded(&self, receiver: &Receiver, sums: &mut Vec<f32>) -> Vec4 {
-        let (mut exact, mut total) = (Vec4::ZERO, 0.0);
+    /// Irradiance without occlusion; `sums` becomes the running sums of its luminance over panels and emitters.
+    pub(super) fn unoccluded(&self, receiver: &Receiver, sums: &mut Vec<Arriving>) -> Vec4 {
+        let (mut exact, mut until) = (Vec4::ZERO, 0.0);
         sums.clear();
-        for emitter in &self.emitters {
-            if emitter.triangle != receiver.triangle {
-                let arrives = emitter.radiosity
-                    * point_irradiance(receiver.point, receiver.normal, emitter.corners);
-                exact += arrives;
-                total += luminance(arrives);
+        let mut add = |panel: usize, emitter: Option<usize>, arrives: Vec4| {
+            exact += arrives;
+            until += luminance(arrives);
+            sums.push(Arriving {
+                until,
+                panel,
+                emitter,
+            });
+        };
+        for (index, panel) in self.panels.iter().enumerate() {
+            if let Some(part) = panel.irradiance(receiver) {
+                let radiosity = self.emitters[panel.emitters.start].radiosity;
+                add(index, None, radiosity * part);
+                continue;
             }
-            sums.push(total);
+            for at in panel.emitters.clone() {
+                let emitter = &self.emitters[at];
+                if emitter.triangle != receiver.triangle {
+                    let part = point_irradiance(receiver.point, receiver.normal, emitter.corners);
+                    add(index, Some(at), emitter.radiosity * part);
+                }
+            }
         }
         exact
     }
+}
+
+/// What arrives from a panel, or from one of its emitters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arriving {
+    /// Luminance of it and of all before it.
+    until: f32,
+    panel: usize,
+    emitter: Option<usize>,
 }
 
 /// Largest radiosity by channel.
@@ -265,13 +312,13 @@ fn brightest(emitters: &[Emitter]) -> Vec4 {
 }
 
 impl Emitter {
-    /// Irradiance (luminance) at a receiver if the whole emitter stood at one of its points.
+    /// Irradiance (luminance) at a receiver per area of the emitter at one of its points.
     fn transfer(&self, receiver: &Receiver, point: Vec3) -> f32 {
         let separation = point - receiver.point;
         let squared = separation.length_squared();
         let cosines =
             separation.dot(receiver.normal).max(0.0) * (-separation.dot(self.normal)).max(0.0);
-        luminance(self.radiosity) * self.area * cosines / (PI * squared * squared)
+        luminance(self.radiosity) * cosines / (PI * squared * squared)
     }
 }
 

@@ -18,6 +18,7 @@ mod inspect;
 mod inspection;
 mod iterate;
 mod light_parts;
+mod panel;
 mod plan;
 mod reconstruct;
 mod relight;

@@ -1,0 +1,374 @@
+//! Emitters that together make one flat lamp.
+//!
+//! The irradiance of a polygon is a sum over its edges, and where two triangles of one radiosity meet in a plane, the
+//! terms of their common edge cancel. So of a lamp of many triangles only the outline counts, as long as all of it lies
+//! above the receiver's horizon.
+
+use std::{collections::HashMap, f32::consts::PI, ops::Range};
+
+use glam::Vec3;
+
+use super::direct::{Emitter, Receiver};
+use crate::geometry::outline_irradiance;
+
+/// Normals whose cosine is at least this belong to one plane.
+const SAME_PLANE: f32 = 1.0 - 1e-6;
+
+/// Within this many radii shadow rays are better spread by the irradiance of each triangle than by area.
+const NEAR: f32 = 2.0;
+
+/// Beyond this many radii a panel counts as a point, as triangles do.
+const FAR: f32 = 128.0;
+
+/// A point that is less high over a panel than this share of its radius is not told from one behind it.
+const LOW: f32 = 1e-3;
+
+/// Edges of which the sine of the angle is no larger run on as one.
+const STRAIGHT: f32 = 1e-5;
+
+/// Emitters of one material and radiosity that lie in one plane and hang together by edges.
+#[derive(Clone, Debug)]
+pub(super) struct Panel {
+    /// Which emitters.
+    pub emitters: Range<usize>,
+    /// Running sums of their areas.
+    areas: Vec<f32>,
+    /// Edges that no two emitters share, in the order of their front's corners.
+    outline: Vec<[Vec3; 2]>,
+    normal: Vec3,
+    centre: Vec3,
+    radius: f32,
+}
+
+impl Panel {
+    /// Area of all emitters.
+    pub(super) fn area(&self) -> f32 {
+        self.areas.last().copied().unwrap_or_default()
+    }
+
+    /// The emitter that holds a place of the area, given from 0 to 1.
+    pub(super) fn emitter_at(&self, place: f32) -> usize {
+        let wanted = place * self.area();
+        let before = self.areas.partition_point(|&area| area <= wanted);
+        self.emitters.start + before.min(self.emitters.len() - 1)
+    }
+
+    /// Irradiance of the whole panel for radiosity 1; `None` where its emitters are better looked at one by one.
+    pub(super) fn irradiance(&self, receiver: &Receiver) -> Option<f32> {
+        if self.emitters.len() == 1 {
+            return None;
+        }
+        let separation = self.centre - receiver.point;
+        let height = -separation.dot(self.normal);
+        if height < -LOW * self.radius {
+            return Some(0.0);
+        }
+        let squared = separation.length_squared();
+        let is_near = squared < (NEAR * self.radius).powi(2);
+        if is_near || height <= LOW * self.radius {
+            return None;
+        }
+        let elevation = separation.dot(receiver.normal);
+        if elevation <= -self.radius {
+            return Some(0.0);
+        }
+        if elevation < self.radius {
+            let is_above =
+                |[start, _]: &[Vec3; 2]| (*start - receiver.point).dot(receiver.normal) >= 0.0;
+            match self.outline.iter().filter(|edge| is_above(edge)).count() {
+                0 => return Some(0.0),
+                count if count < self.outline.len() => return None,
+                _ => {}
+            }
+        }
+        if squared > (FAR * self.radius).powi(2) {
+            return Some(self.area() * height * elevation.max(0.0) / (PI * squared * squared));
+        }
+        Some(outline_irradiance(
+            receiver.point,
+            receiver.normal,
+            &self.outline,
+        ))
+    }
+}
+
+/// Sort emitters so that those of a panel follow each other, and find the panels. Both stay in the order of the first
+/// emitter of each panel.
+pub(super) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
+    let edges = edges(emitters);
+    let (mut roots, mut is_inner) = (
+        (0..emitters.len()).collect::<Vec<usize>>(),
+        vec![[false; 3]; emitters.len()],
+    );
+    for same in edges.chunk_by(|a, b| a.ends == b.ends) {
+        for (at, one) in same.iter().enumerate() {
+            let other = same[at + 1..].iter().find(|other| {
+                one.is_forward != other.is_forward
+                    && !is_inner[other.emitter][other.number]
+                    && emitters[one.emitter].continues(&emitters[other.emitter])
+            });
+            if let Some(other) = other.filter(|_| !is_inner[one.emitter][one.number]) {
+                is_inner[one.emitter][one.number] = true;
+                is_inner[other.emitter][other.number] = true;
+                let pair = [one.emitter, other.emitter].map(|emitter| root(&mut roots, emitter));
+                roots[pair[0].max(pair[1])] = pair[0].min(pair[1]);
+            }
+        }
+    }
+    let mut order: Vec<(usize, usize)> = (0..emitters.len())
+        .map(|emitter| (root(&mut roots, emitter), emitter))
+        .collect();
+    order.sort_unstable();
+    let mut panels = Vec::new();
+    let mut start = 0;
+    for members in order.chunk_by(|a, b| a.0 == b.0) {
+        let end = start + members.len();
+        let inner = members.iter().map(|&(_, emitter)| is_inner[emitter]);
+        let members: Vec<&Emitter> = members
+            .iter()
+            .map(|&(_, emitter)| &emitters[emitter])
+            .collect();
+        panels.push(panel(start..end, &members, inner));
+        start = end;
+    }
+    let sorted = order.iter().map(|&(_, emitter)| emitters[emitter]);
+    (sorted.collect(), panels)
+}
+
+fn panel(
+    range: Range<usize>,
+    members: &[&Emitter],
+    inner: impl Iterator<Item = [bool; 3]>,
+) -> Panel {
+    let mut area = 0.0;
+    let mut middle = Vec3::ZERO;
+    let areas = members
+        .iter()
+        .map(|emitter| {
+            area += emitter.area;
+            middle += emitter.corners.iter().sum::<Vec3>() * (emitter.area / 3.0);
+            area
+        })
+        .collect();
+    let centre = match middle / area {
+        middle if middle.is_finite() => middle,
+        _ => members[0].corners[0],
+    };
+    let edges = members.iter().zip(inner).flat_map(|(emitter, inner)| {
+        let [a, b, c] = emitter.corners;
+        let sides = [[a, b], [b, c], [c, a]].into_iter().zip(inner);
+        sides
+            .filter(|(_, is_inner)| !is_inner)
+            .map(|(side, _)| side)
+    });
+    let outline = straightened(edges.collect());
+    let corners = outline.iter().map(|[start, _]| start.distance(centre));
+    Panel {
+        emitters: range,
+        areas,
+        radius: corners.fold(0.0, f32::max),
+        outline,
+        normal: members[0].normal,
+        centre,
+    }
+}
+
+/// One side of an emitter.
+struct Edge {
+    /// Its ends, the lesser first.
+    ends: [[u32; 3]; 2],
+    /// Whether the emitter has them in this order.
+    is_forward: bool,
+    emitter: usize,
+    number: usize,
+}
+
+/// All sides of all emitters, those between the same points together.
+fn edges(emitters: &[Emitter]) -> Vec<Edge> {
+    let mut edges: Vec<Edge> = Vec::with_capacity(3 * emitters.len());
+    for (index, emitter) in emitters.iter().enumerate() {
+        for number in 0..3 {
+            let [from, to] = [number, (number + 1) % 3].map(|at| key(emitter.corners[at]));
+            edges.push(Edge {
+                ends: [from.min(to), from.max(to)],
+                is_forward: from < to,
+                emitter: index,
+                number,
+            });
+        }
+    }
+    edges.sort_unstable_by_key(|edge| (edge.ends, edge.emitter, edge.number));
+    edges
+}
+
+/// The same outline with fewer edges: those that run on straight become one.
+fn straightened(mut edges: Vec<[Vec3; 2]>) -> Vec<[Vec3; 2]> {
+    let mut starting: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+    for (index, &[start, _]) in edges.iter().enumerate() {
+        starting.entry(key(start)).or_default().push(index);
+    }
+    let mut is_part = vec![false; edges.len()];
+    for index in 0..edges.len() {
+        // Where outlines touch in a corner, nobody can say which edge goes on.
+        while let Some(&[next]) = starting.get(&key(edges[index][1])).map(Vec::as_slice) {
+            let ([start, end], [_, last]) = (edges[index], edges[next]);
+            let (along, on) = (end - start, last - end);
+            let bend = along.cross(on).length();
+            let is_straight =
+                along.dot(on) > 0.0 && bend <= STRAIGHT * along.length() * on.length();
+            if !is_straight || next == index || is_part[index] || is_part[next] {
+                break;
+            }
+            is_part[next] = true;
+            edges[index][1] = last;
+        }
+    }
+    let mut parts = is_part.into_iter();
+    edges.retain(|_| !parts.next().unwrap_or_default());
+    edges
+}
+
+/// What equal points have in common: adding 0 leaves one kind of zero.
+fn key(point: Vec3) -> [u32; 3] {
+    (point + 0.0).to_array().map(f32::to_bits)
+}
+
+fn root(roots: &mut [usize], mut at: usize) -> usize {
+    while roots[at] != at {
+        roots[at] = roots[roots[at]];
+        at = roots[at];
+    }
+    at
+}
+
+impl Emitter {
+    /// Whether two emitters that share an edge are parts of one panel.
+    fn continues(&self, other: &Self) -> bool {
+        self.material == other.material
+            && self.radiosity == other.radiosity
+            && self.normal.dot(other.normal) >= SAME_PLANE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+    use crate::{
+        geometry::{Random, point_irradiance},
+        scene::{MaterialId, TriangleId},
+    };
+
+    /// A lamp of `n` by `n` squares from 0 to 1 in the plane z = 1 that looks down, without those that `is_hole` names.
+    fn lamp(n: usize, is_hole: impl Fn(usize, usize) -> bool) -> Vec<Emitter> {
+        let at = |x: usize, y: usize| Vec3::new(x as f32, y as f32, n as f32) / n as f32;
+        let mut emitters: Vec<Emitter> = Vec::new();
+        for (x, y) in (0..n).flat_map(|x| (0..n).map(move |y| (x, y))) {
+            if is_hole(x, y) {
+                continue;
+            }
+            let [a, b, c, d] = [at(x, y), at(x, y + 1), at(x + 1, y + 1), at(x + 1, y)];
+            for corners in [[a, b, c], [a, c, d]] {
+                emitters.push(Emitter {
+                    corners,
+                    normal: Vec3::NEG_Z,
+                    area: 0.5 / (n * n) as f32,
+                    triangle: TriangleId(emitters.len() as u32),
+                    material: MaterialId(0),
+                    radiosity: Vec4::ONE,
+                });
+            }
+        }
+        emitters
+    }
+
+    #[test]
+    fn of_a_panel_only_the_outline_is_left() {
+        for n in [1, 2, 5, 16] {
+            let (emitters, panels) = panels(&lamp(n, |_, _| false));
+            assert_eq!((panels.len(), panels[0].outline.len()), (1, 4), "{n}");
+            assert_eq!(panels[0].emitters, 0..emitters.len());
+            assert!((panels[0].area() - 1.0).abs() < 1e-5);
+            assert!((panels[0].radius - 0.5f32.sqrt()).abs() < 1e-5);
+        }
+        // A window in the middle has an outline of its own.
+        let (_, holed) = panels(&lamp(5, |x, y| x == 2 && y == 2));
+        assert_eq!((holed.len(), holed[0].outline.len()), (1, 8));
+        // Two halves that do not touch.
+        let (emitters, halves) = panels(&lamp(5, |x, _| x == 2));
+        assert_eq!((halves.len(), emitters.len()), (2, 40));
+        for (index, panel) in halves.iter().enumerate() {
+            assert_eq!(
+                (panel.emitters.clone(), panel.outline.len()),
+                (20 * index..20 * index + 20, 4)
+            );
+        }
+    }
+
+    #[test]
+    fn what_differs_or_bends_is_no_panel() {
+        let mut colors = lamp(1, |_, _| false);
+        colors[1].radiosity = Vec4::splat(2.0);
+        let mut bent = lamp(1, |_, _| false);
+        bent[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize();
+        let mut materials = lamp(1, |_, _| false);
+        materials[1].material = MaterialId(1);
+        // The two sides of one triangle.
+        let mut sides = lamp(1, |_, _| false);
+        let [a, b, c] = sides[0].corners;
+        sides[1] = Emitter {
+            corners: [a, c, b],
+            normal: Vec3::Z,
+            ..sides[0]
+        };
+        for emitters in [colors, bent, materials, sides] {
+            assert_eq!(panels(&emitters).1.len(), 2);
+        }
+    }
+
+    #[test]
+    fn a_panel_gives_as_much_as_its_emitters_or_is_taken_apart() {
+        let (emitters, panels) = panels(&lamp(6, |x, y| x == 1 && y > 3));
+        let mut random = Random::new(3, 0);
+        let mut wholes = 0;
+        for _ in 0..4000 {
+            let mut uniform = |low: f32, high: f32| low + (high - low) * random.uniform();
+            let reach = if uniform(0.0, 1.0) < 0.1 { 300.0 } else { 4.0 };
+            let point = Vec3::from_array([0.0; 3].map(|_| uniform(-reach, reach)));
+            let normal = Vec3::from_array([0.0; 3].map(|_| uniform(-1.0, 1.0)));
+            let receiver = Receiver {
+                point,
+                normal: normal.try_normalize().unwrap_or(Vec3::Z),
+                triangle: TriangleId(1000),
+            };
+            let Some(whole) = panels[0].irradiance(&receiver) else {
+                continue;
+            };
+            wholes += u32::from(whole > 0.0);
+            let parts: f32 = emitters
+                .iter()
+                .map(|emitter| point_irradiance(point, receiver.normal, emitter.corners))
+                .sum();
+            assert!(
+                (whole - parts).abs() < 2e-3 * parts + 2e-7,
+                "{whole} {parts} {receiver:?}"
+            );
+        }
+        assert!(wholes > 500, "{wholes}");
+    }
+
+    #[test]
+    fn places_of_the_area_fall_to_emitters_by_their_area() {
+        let (emitters, panels) = panels(&lamp(3, |_, _| false));
+        let mut counts = vec![0; emitters.len()];
+        for number in 0..1800 {
+            counts[panels[0].emitter_at((number as f32 + 0.5) / 1800.0)] += 1;
+        }
+        assert!(
+            counts.iter().all(|&count| (99..=101).contains(&count)),
+            "{counts:?}"
+        );
+        assert_eq!(panels[0].emitter_at(1.0), emitters.len() - 1);
+    }
+}
