@@ -14,7 +14,7 @@ use eframe::egui::{self, Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use glam::Vec3;
 use vecrad::{
-    solver::SolveSettings,
+    solver::{Oracle, SolveSettings},
     viewer::{
         Options,
         action::Action,
@@ -123,10 +123,24 @@ fn presets_are_chosen_by_their_button() {
     let mut harness = plates();
     harness.get_by_label("Normal").click();
     harness.run_steps(3);
-    assert_eq!(
-        harness.state().state.settings.epsilon,
-        SolveSettings::normal().epsilon
-    );
+    assert_eq!(harness.state().state.settings, SolveSettings::normal());
+    // Another method stays under another quality, and the preset does not pass for the whole of it.
+    let mut other = SolveSettings::draft();
+    other.oracle = Oracle::Samples;
+    other.samples = 9;
+    perform(&mut harness, Action::Settings(other));
+    assert!(harness.query_by_label_contains(" *").is_none());
+    harness.get_by_label("Normal").click();
+    harness.run_steps(3);
+    let by_samples = SolveSettings {
+        oracle: Oracle::Samples,
+        ..SolveSettings::normal()
+    };
+    assert_eq!(harness.state().state.settings, by_samples);
+    harness.get_by_label("Normal *");
+    harness.get_by_label("Draft");
+    perform(&mut harness, Action::Settings(SolveSettings::normal()));
+    harness.get_by_label("Normal");
 }
 
 #[test]

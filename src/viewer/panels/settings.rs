@@ -56,23 +56,36 @@ fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
     ui.horizontal(|ui| {
         let width = (ui.available_width() - 2.0 * ui.spacing().item_spacing.x) / 3.0;
         for (label, preset, explanation) in PRESETS {
-            // A preset sets the quality; seed and method stay as they are.
-            let with_preset = SolveSettings {
-                method: settings.method,
-                oracle: settings.oracle,
-                direct: settings.direct,
-                push: settings.push,
-                seed: settings.seed,
-                ..preset
+            let chosen = with_quality_of(&preset, settings);
+            let is_active = *settings == preset;
+            let (label, explanation) = if *settings == chosen && !is_active {
+                let but = "This quality is set, but something of the method, or the seed, differs from the preset";
+                (format!("{label} *"), format!("{explanation}. {but}"))
+            } else {
+                (label.to_owned(), explanation.to_owned())
             };
-            let button = egui::Button::selectable(*settings == with_preset, label)
+            let button = egui::Button::selectable(is_active, label)
                 .min_size(egui::vec2(width, 24.0))
                 .frame_when_inactive(true);
             if ui.add(button).on_hover_text(explanation).clicked() {
-                *settings = with_preset;
+                *settings = chosen;
             }
         }
     });
+}
+
+/// Settings with the quality of a preset. How light is computed stays, and so does the seed.
+fn with_quality_of(preset: &SolveSettings, settings: &SolveSettings) -> SolveSettings {
+    SolveSettings {
+        method: settings.method,
+        oracle: settings.oracle,
+        direct: settings.direct,
+        push: settings.push,
+        crease_degrees: settings.crease_degrees,
+        seed: settings.seed,
+        keep: settings.keep,
+        ..preset.clone()
+    }
 }
 
 fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
