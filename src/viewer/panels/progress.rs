@@ -15,15 +15,15 @@ use crate::{
 /// Show the run; wishes go into `actions`.
 pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let status = &state.run.status;
-    let steps = state.settings.max_steps.max(1);
+    let steps = state.settings.max_steps;
     let step = state.report().map_or(0, |report| report.step);
     let share = match status {
         RunStatus::Finished(_) => 1.0,
-        _ => step as f32 / steps as f32,
+        _ => step as f32 / steps.max(step + 1) as f32,
     };
     let text = match status {
-        RunStatus::Running => format!("Computing step {} of {steps}", (step + 1).min(steps)),
-        RunStatus::Paused => format!("Paused after step {step} of {steps}"),
+        RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
+        RunStatus::Paused => format!("Paused after {}", place(step, steps)),
         _ => status.label(),
     };
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
@@ -142,6 +142,15 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
     }
 }
 
+/// Where a step stands. Light that is refined after its last step has steps beyond it, counted on.
+fn place(step: u32, steps: u32) -> String {
+    if step > steps {
+        format!("step {step}, refining further")
+    } else {
+        format!("step {step} of {steps}")
+    }
+}
+
 /// Estimated part of the light that has been distributed over the links of a step. Each further sweep changes the light
 /// by at most the contraction times what the one before did, so that all of them together, the last one's residual
 /// among them, change residual / (1 − contraction). `None` where the light does not settle.
@@ -178,6 +187,12 @@ mod tests {
         assert_eq!(transported(&report(0.0, 0.0)), Some(1.0));
         assert_eq!(transported(&report(0.6, 0.9)), Some(0.0));
         assert_eq!(transported(&report(0.1, 1.0)), None);
+    }
+
+    #[test]
+    fn steps_are_counted_on_when_light_is_refined_after_the_last() {
+        assert_eq!(place(5, 5), "step 5 of 5");
+        assert_eq!(place(8, 5), "step 8, refining further");
     }
 
     #[test]
