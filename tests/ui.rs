@@ -14,7 +14,7 @@ use eframe::egui::{self, Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use glam::Vec3;
 use vecrad::{
-    solver::{Oracle, SolveSettings},
+    solver::{Oracle, SolveSettings, StepReport},
     viewer::{
         Options,
         action::Action,
@@ -99,7 +99,7 @@ fn a_finer_threshold_refines_and_another_method_restarts() {
     let mut finer = harness.state().state.settings.clone();
     finer.epsilon *= 0.5;
     perform(&mut harness, Action::Settings(finer.clone()));
-    assert_eq!(harness.state().state.run.last_effect, Some(Effect::Refines));
+    assert_eq!(last_effect(&harness), Some(Effect::Refines));
     wait_for(&mut harness, |app| {
         matches!(app.state.run.status, RunStatus::Finished(_))
             && app.state.run.reports.len() > steps
@@ -111,11 +111,54 @@ fn a_finer_threshold_refines_and_another_method_restarts() {
     let mut other = finer;
     other.seed += 1;
     perform(&mut harness, Action::Settings(other));
+    assert_eq!(last_effect(&harness), Some(Effect::Restarts));
+    assert_told(&harness, "so it began again");
+}
+
+fn last_effect(harness: &Harness<'static, App>) -> Option<Effect> {
+    let change = harness.state().state.run.last_change.as_ref();
+    change.map(|change| change.effect)
+}
+
+/// Whether a sentence stands under the progress, and in the line at the bottom.
+fn assert_told(harness: &Harness<'static, App>, text: &str) {
     assert_eq!(
-        harness.state().state.run.last_effect,
-        Some(Effect::Restarts)
+        harness.query_all_by_label_contains(text).count(),
+        2,
+        "{text}"
     );
-    harness.get_by_label_contains("began the light again");
+}
+
+#[test]
+fn light_that_is_finer_than_asked_for_says_so_where_the_run_is_shown() {
+    let mut harness = plates();
+    let before = harness.get_by_label("Normal").rect();
+    let mut coarser = harness.state().state.settings.clone();
+    coarser.epsilon *= 4.0;
+    let epsilon = coarser.epsilon;
+    perform(&mut harness, Action::Settings(coarser));
+    assert_eq!(last_effect(&harness), Some(Effect::Continues));
+    assert_told(&harness, "Begin again to have it coarser");
+    let sentence = harness.query_all_by_label_contains("Begin again to have it coarser");
+    let progress = harness.get_by_label("Progress").rect().bottom();
+    let highest = sentence
+        .map(|said| said.rect().top())
+        .fold(f32::MAX, f32::min);
+    assert!(progress < highest && highest < before.top());
+    assert_eq!(
+        harness.get_by_label("Normal").rect(),
+        before,
+        "nothing moves"
+    );
+    // What it says can be done.
+    perform(&mut harness, Action::Reset);
+    wait_for(&mut harness, |app| {
+        // The light before was a quarter of that.
+        let is_coarse = |report: &StepReport| report.is_final && report.epsilon > 0.5 * epsilon;
+        matches!(app.state.run.status, RunStatus::Finished(_))
+            && app.state.report().is_some_and(is_coarse)
+    });
+    assert_eq!(last_effect(&harness), None);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::{
         panel_state::PanelState,
         pick, saver,
         session::Recent,
-        state::{RunStatus, Selection, Severity, State},
+        state::{Change, RunStatus, Selection, Severity, State},
         view::ViewMode,
     },
     App,
@@ -30,13 +30,15 @@ impl App {
             Action::Reset => {
                 if self.state.loaded.is_some() {
                     self.state.inspections.close();
+                    self.state.run.last_change = None;
                     self.worker.reset();
                 }
             }
             Action::Settings(settings) => {
                 self.state.settings = settings.clone();
                 let effect = self.worker.change_settings(settings);
-                self.state.run.last_effect = Some(effect);
+                let status = self.state.run.status.clone();
+                self.state.run.last_change = Some(Change { effect, status });
                 if effect == Effect::Restarts {
                     self.state.inspections.close();
                     self.state.cluster = None;

@@ -52,7 +52,7 @@ impl App {
         self.state.cluster = None;
         self.state.inspections.close();
         self.forget_picture();
-        self.state.run.last_effect = None;
+        self.state.run.last_change = None;
         self.worker.watch(None);
         self.state.truth = Truth::default();
         self.worker.start_with_rays(

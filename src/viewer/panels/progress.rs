@@ -7,7 +7,7 @@ use crate::{
     solver::StepReport,
     viewer::{
         action::Action,
-        state::{RunStatus, State},
+        state::{Change, RunStatus, State},
         theme,
     },
 };
@@ -34,7 +34,25 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
             format!("The solver failed: {message}"),
         );
     }
+    change_ui(ui, state);
     figures_ui(ui, state);
+}
+
+/// What the last change of settings did. Its room is always there, so that no slider moves away from the hand.
+fn change_ui(ui: &mut egui::Ui, state: &State) {
+    if state.loaded.is_none() {
+        return;
+    }
+    let room = egui::vec2(
+        ui.available_width(),
+        2.0 * ui.text_style_height(&egui::TextStyle::Body),
+    );
+    ui.allocate_ui(room, |ui| {
+        ui.set_min_size(room);
+        if let Some(text) = state.run.last_change.as_ref().and_then(Change::label) {
+            ui.label(text);
+        }
+    });
 }
 
 fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) {

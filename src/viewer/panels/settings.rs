@@ -9,7 +9,6 @@ use crate::{
     scene::Sides,
     solver::SolveSettings,
     viewer::{action::Action, state::State},
-    worker::Effect,
 };
 
 /// Show the settings; wishes go into `actions`.
@@ -23,20 +22,6 @@ pub fn settings_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
         actions.push(Action::Settings(settings));
     }
     limits_ui(ui, state, actions);
-    if let Some(text) = state.run.last_effect.and_then(effect_text) {
-        ui.add_space(4.0);
-        ui.weak(text);
-    }
-}
-
-/// What the last change did.
-fn effect_text(effect: Effect) -> Option<&'static str> {
-    match effect {
-        Effect::Nothing => None,
-        Effect::Continues => Some("The change holds from the next step on; nothing is lost."),
-        Effect::Refines => Some("The light is refined further; nothing is lost."),
-        Effect::Restarts => Some("The change began the light again."),
-    }
 }
 
 fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {

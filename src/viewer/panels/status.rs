@@ -4,7 +4,7 @@ use eframe::egui::{self, RichText};
 
 use super::{count, figure, seconds};
 use crate::viewer::{
-    state::{Message, RunStatus, Severity, State},
+    state::{Change, Message, RunStatus, Severity, State},
     theme,
 };
 
@@ -48,7 +48,13 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
         Severity::Error => 2,
     };
     let Some(worst) = unseen.iter().max_by_key(rank) else {
-        hint_ui(ui);
+        // The panel of the run may be hidden, or scrolled away.
+        match state.run.last_change.as_ref().and_then(Change::label) {
+            Some(text) => {
+                ui.weak(text);
+            }
+            None => hint_ui(ui),
+        }
         return;
     };
     let color = match worst.severity {
