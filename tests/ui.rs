@@ -162,6 +162,20 @@ fn light_that_is_finer_than_asked_for_says_so_where_the_run_is_shown() {
 }
 
 #[test]
+fn figures_keep_their_rows_while_a_run_begins_again() {
+    let mut harness = plates();
+    let places = |harness: &Harness<'static, App>| {
+        ["Energy balance", "Memory", "Normal"].map(|label| harness.get_by_label(label).rect())
+    };
+    let before = places(&harness);
+    // As it is until the first step is there.
+    harness.state_mut().state.run.reports.clear();
+    harness.run_steps(2);
+    assert_eq!(places(&harness), before);
+    assert!(harness.query_all_by_label("–").count() >= 9);
+}
+
+#[test]
 fn presets_are_chosen_by_their_button() {
     let mut harness = plates();
     harness.get_by_label("Normal").click();

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{
     camera::CameraRig,
+    change::Change,
     clusters::ShownClusters,
     frame_time::FrameTimes,
     inspection::Inspections,
@@ -19,7 +20,7 @@ use super::{
 use crate::{
     scene::{Scene, SceneOptions},
     solver::{Snapshot, SolveSettings, StepReport},
-    worker::{Effect, Event, RunOptions, StopReason},
+    worker::{Event, RunOptions, StopReason},
 };
 
 /// Where a run stands.
@@ -95,35 +96,6 @@ pub struct Run {
     pub relit_secs: Option<f64>,
     /// The last change of settings since the light began.
     pub last_change: Option<Change>,
-}
-
-/// A change of settings.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Change {
-    /// What it does.
-    pub effect: Effect,
-    /// Where the run stood when it came.
-    pub status: RunStatus,
-}
-
-impl Change {
-    /// For people; short, since there is little room where they look.
-    pub fn label(&self) -> Option<&'static str> {
-        let rests = self.status.can_continue();
-        Some(match self.effect {
-            Effect::Nothing => return None,
-            Effect::Continues if rests => "The change holds once the light goes on.",
-            Effect::Continues if self.status.is_busy() => {
-                "The change holds from the next step on; nothing is lost."
-            }
-            Effect::Continues => {
-                "The light is as fine as that already. Begin again to have it coarser and sooner."
-            }
-            Effect::Refines if rests => "Continue refines the light further; nothing is lost.",
-            Effect::Refines => "The light is refined further; nothing is lost.",
-            Effect::Restarts => "What was changed needs new light, so it began again.",
-        })
-    }
 }
 
 impl Run {
@@ -369,18 +341,6 @@ mod tests {
             run.reports.is_empty(),
             "a new run begins with an empty plot"
         );
-    }
-
-    #[test]
-    fn what_a_change_does_depends_on_where_the_run_stood() {
-        let label = |effect, status| Change { effect, status }.label().unwrap_or_default();
-        let done = RunStatus::Finished(StopReason::Converged);
-        assert!(label(Effect::Continues, done.clone()).contains("Begin again"));
-        assert!(label(Effect::Continues, RunStatus::Running).contains("next step"));
-        assert!(label(Effect::Continues, RunStatus::Paused).contains("goes on"));
-        assert!(label(Effect::Refines, RunStatus::Paused).contains("Continue"));
-        assert!(label(Effect::Refines, done.clone()).contains("is refined"));
-        assert_eq!(label(Effect::Nothing, done), "");
     }
 
     #[test]

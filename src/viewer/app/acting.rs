@@ -5,13 +5,15 @@ use eframe::egui;
 use super::{
     super::{
         action::Action,
-        bindings, clusters, light_range,
+        bindings,
+        change::Change,
+        clusters, light_range,
         materials::Materials,
         navigation::Picked,
         panel_state::PanelState,
         pick, saver,
         session::Recent,
-        state::{Change, RunStatus, Selection, Severity, State},
+        state::{RunStatus, Selection, Severity, State},
         view::ViewMode,
     },
     App,

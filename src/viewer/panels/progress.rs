@@ -7,7 +7,8 @@ use crate::{
     solver::StepReport,
     viewer::{
         action::Action,
-        state::{Change, RunStatus, State},
+        change::Change,
+        state::{RunStatus, State},
         theme,
     },
 };
@@ -100,62 +101,66 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
     });
 }
 
+/// The figures of the last step. Before the first, rows stand there without values, so that nothing below moves.
 fn figures_ui(ui: &mut egui::Ui, state: &State) {
-    let Some(report) = state.report() else { return };
+    if state.loaded.is_none() {
+        return;
+    }
+    let report = state.report();
     row::figures(ui, "progress", |ui| {
-        row::figure(
-            ui,
+        let mut row = |name: &str, value: &dyn Fn(&StepReport) -> String, explanation: &str| {
+            let value = report.map_or_else(|| "–".to_owned(), value);
+            row::figure(ui, name, value, explanation);
+        };
+        row(
             "Time",
-            seconds(report.elapsed_s),
+            &|report| seconds(report.elapsed_s),
             "Since the run began, without pauses",
         );
-        row::figure(
-            ui,
+        row(
             "Threshold ε",
-            figure(f64::from(report.epsilon)),
+            &|report| figure(f64::from(report.epsilon)),
             "Of the last step",
         );
-        row::figure(
-            ui,
+        row(
             "Transported",
-            transported(report).map_or_else(|| "–".to_owned(), share_text),
+            &|report| transported(report).map_or_else(|| "–".to_owned(), share_text),
             "Estimated part of the light that has found its place over the links of the last step. The rest, residual / \
              (1 − contraction), is still on its way between surfaces. Finer links change the light, too: that is what \
              the error bound tells",
         );
-        row::figure(
-            ui,
+        row(
             "Residual",
-            figure(f64::from(report.residual)),
+            &|report| figure(f64::from(report.residual)),
             "Change of the last sweep, relative to the total power",
         );
-        row::figure(
-            ui,
+        row(
             "Energy balance",
-            format!("{:.2} %", 100.0 * report.energy_balance),
+            &|report| format!("{:.2} %", 100.0 * report.energy_balance),
             "Light that arrived, of the light that left; 100 % in a closed scene",
         );
-        row::figure(
-            ui,
+        row(
             "Error bound",
-            format!("{} %", figure(f64::from(100.0 * report.estimated_error))),
+            &|report| format!("{} %", figure(f64::from(100.0 * report.estimated_error))),
             "Sum of the intervals of all links, relative to the mean irradiance; far above the real error",
         );
-        row::figure(
-            ui,
+        row(
             "Links",
-            count(report.links),
+            &|report| count(report.links),
             "Pairs of nodes that exchange light",
         );
-        row::figure(ui, "Shadow rays", count(report.shadow_rays), "Shot so far");
-        row::figure(
-            ui,
+        row(
+            "Shadow rays",
+            &|report| count(report.shadow_rays),
+            "Shot so far",
+        );
+        row(
             "Memory",
-            bytes(report.memory_bytes),
+            &|report| bytes(report.memory_bytes),
             "Held by the solver",
         );
     });
-    for note in &report.notes {
+    for note in report.into_iter().flat_map(|report| &report.notes) {
         ui.colored_label(theme::warning(ui.visuals()), note);
     }
 }

@@ -4,7 +4,8 @@ use eframe::egui::{self, RichText};
 
 use super::{count, figure, seconds};
 use crate::viewer::{
-    state::{Change, Message, RunStatus, Severity, State},
+    change::Change,
+    state::{Message, RunStatus, Severity, State},
     theme,
 };
 
