@@ -55,7 +55,7 @@ pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions:
 fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
     item(ui, table, actions, "Open…", Action::OpenDialog);
     if ui.button("Open by path…").clicked() {
-        state.panels.path = true;
+        state.panels.ask_for_path();
         ui.close();
     }
     ui.add_enabled_ui(!state.recent.files.is_empty(), |ui| {
