@@ -141,8 +141,9 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
         row(
             "Error bound",
-            &|report| format!("{} %", figure(f64::from(100.0 * report.estimated_error))),
-            "Sum of the intervals of all links, relative to the mean irradiance; far above the real error",
+            &|report| bound_text(report.estimated_error),
+            "The worst case: the intervals of all links together, relative to the mean irradiance. The real error is far \
+             below. 'Measured error' in the panel on the right tells it, once a reference is traced",
         );
         row(
             "Links",
@@ -182,6 +183,15 @@ fn transported(report: &StepReport) -> Option<f64> {
     (report.contraction < 1.0 && rest.is_finite()).then(|| (1.0 - rest).max(0.0))
 }
 
+/// A bound of the error as per cent, where it says more than that all may be wrong.
+fn bound_text(bound: f32) -> String {
+    if bound < 1.0 {
+        format!("{} %", figure(f64::from(100.0 * bound)))
+    } else {
+        "over 100 %".to_owned()
+    }
+}
+
 /// A share as per cent. Rounded down: all of it is only what is all of it.
 fn share_text(share: f64) -> String {
     format!("{:.2} %", (share * 1e4).floor() / 100.0)
@@ -216,6 +226,13 @@ mod tests {
     fn steps_are_counted_on_when_light_is_refined_after_the_last() {
         assert_eq!(place(5, 5), "step 5 of 5");
         assert_eq!(place(8, 5), "step 8, refining further");
+    }
+
+    #[test]
+    fn a_bound_is_a_figure_only_where_it_bounds() {
+        assert_eq!(bound_text(0.25), "25.0 %");
+        assert_eq!(bound_text(24.99), "over 100 %");
+        assert_eq!(bound_text(f32::INFINITY), "over 100 %");
     }
 
     #[test]
