@@ -84,7 +84,7 @@ fn a_scene_is_read_lit_and_finished() {
             .iter()
             .all(|light| light.is_finite())
     );
-    harness.get_by_label("Reset");
+    harness.get_by_label("Begin again");
     // The heading may lie below the fold of the panel.
     harness.get_by_label("Statistics").click_accesskit();
     harness.run_steps(20);

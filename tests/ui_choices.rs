@@ -432,3 +432,33 @@ fn a_typed_path_is_asked_for_again_until_it_can_be_read() {
     let mut unseen = state.messages.unseen().iter();
     assert!(unseen.all(|message| message.severity != Severity::Error));
 }
+
+#[test]
+fn the_view_menu_tells_what_is_on_and_how_large_text_is() {
+    let mut harness = plates();
+    let open = |harness: &mut Harness<'static, App>| {
+        harness.get_by_label("View").click();
+        harness.run_steps(3);
+    };
+    for is_on in [false, true] {
+        open(&mut harness);
+        let mut entries = harness.query_all_by_label_contains("Cluster boxes");
+        let entry = entries.next().expect("an entry of the menu");
+        let toggled = Some(egui::accesskit::Toggled::from(is_on));
+        assert_eq!(entry.accesskit_node().toggled(), toggled);
+        entry.click();
+        drop(entries);
+        harness.run_steps(3);
+        assert_eq!(harness.state().state.view.clusters.shown, !is_on);
+    }
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Minus);
+    harness.run_steps(3);
+    assert_eq!(harness.ctx.zoom_factor(), 0.9);
+    open(&mut harness);
+    harness.get_by_label_contains("UI scale (90 %)");
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(2);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Num0);
+    harness.run_steps(3);
+    assert_eq!(harness.ctx.zoom_factor(), 1.0);
+}

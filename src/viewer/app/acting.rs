@@ -4,7 +4,7 @@ use eframe::egui;
 
 use super::{
     super::{
-        action::Action,
+        action::{Action, Scale},
         bindings,
         change::Change,
         clusters, light_range,
@@ -90,6 +90,9 @@ impl App {
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!is_full));
             }
             Action::ResetLayout => self.reset_layout(ctx),
+            Action::Scale(Scale::Larger) => egui::gui_zoom::zoom_in(ctx),
+            Action::Scale(Scale::Smaller) => egui::gui_zoom::zoom_out(ctx),
+            Action::Scale(Scale::Whole) => ctx.set_zoom_factor(1.0),
             Action::ClearRecent => self.state.recent = Recent::default(),
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             other => self.change_view(&other),

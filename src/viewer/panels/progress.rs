@@ -25,6 +25,7 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     let text = match status {
         RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
         RunStatus::Paused => format!("Paused after {}", place(step, steps)),
+        RunStatus::Idle if state.loading.is_some() => "Reading the scene".to_owned(),
         _ => status.label(),
     };
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
@@ -93,9 +94,9 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
             Action::Stop,
         );
         button(
-            "Reset",
+            "Begin again",
             *status != RunStatus::Idle,
-            "Begin the light again (Ctrl+R)",
+            "Light the scene anew (Ctrl+R)",
             Action::Reset,
         );
     });

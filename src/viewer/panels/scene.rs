@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, RichText, text::CCursorRange};
 
+use super::counts_in;
 use crate::{
     scene::builtin::builtins,
     viewer::{
@@ -45,7 +46,7 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
             ui.add_space(2.0);
             for builtin in builtins().iter().take(4) {
                 if ui
-                    .link(format!("{}: {}", builtin.name, builtin.summary))
+                    .link(format!("{}: {}", builtin.name, counts_in(builtin.summary)))
                     .clicked()
                 {
                     actions.push(Action::Load(SceneSource::Builtin(builtin.name.to_owned())));
@@ -137,7 +138,7 @@ pub fn builtin_menu(ui: &mut egui::Ui, actions: &mut Vec<Action>) {
     for builtin in builtins() {
         if ui
             .button(builtin.name)
-            .on_hover_text(builtin.summary)
+            .on_hover_text(counts_in(builtin.summary))
             .clicked()
         {
             actions.push(Action::Load(SceneSource::Builtin(builtin.name.to_owned())));

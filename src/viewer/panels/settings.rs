@@ -212,7 +212,7 @@ pub(super) fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> S
         .clamping(egui::SliderClamping::Never)
         .custom_formatter(|value, _| super::figure(value))
         .custom_parser(|text| {
-            let value = text.trim().parse::<f32>().ok()?;
+            let value = super::number(text)? as f32;
             (f32::MIN_POSITIVE..=f32::MAX)
                 .contains(&value)
                 .then_some(f64::from(value))

@@ -22,7 +22,10 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
             RunStatus::Pausing | RunStatus::Paused => theme::warning(ui.visuals()),
             _ => ui.visuals().text_color(),
         };
-        ui.colored_label(color, state.run.status.label());
+        // There is a scene, it is only not there yet.
+        if state.loading.is_none() || state.run.status != RunStatus::Idle {
+            ui.colored_label(color, state.run.status.label());
+        }
         if let Some(report) = state.report() {
             let text = format!(
                 "Step {}   ε {}   Links {}   Vertices {}   {}",
