@@ -11,7 +11,10 @@ use std::{
 };
 
 use eframe::egui;
-use egui_kittest::{Harness, kittest::Queryable as _};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT as _, Queryable as _},
+};
 use vecrad::{
     solver::SolveSettings,
     viewer::{
