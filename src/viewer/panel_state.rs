@@ -53,9 +53,9 @@ impl PanelState {
     }
 
     /// A scene could not be read: where its path was typed, it can be mended.
-    pub fn refuse_path(&mut self, error: &str) {
+    pub fn refuse_path(&mut self, error: Option<String>) {
         if self.path {
-            self.path_error = Some(error.to_owned());
+            self.path_error = error;
             self.path_is_asked = true;
         }
     }

@@ -38,8 +38,11 @@ impl App {
             match outcome {
                 Ok(loaded) => self.show(loaded),
                 Err(error) => {
-                    self.state.panels.refuse_path(&error);
                     self.state.messages.push(Severity::Error, error);
+                    let said = self.state.messages.all.last();
+                    self.state
+                        .panels
+                        .refuse_path(said.map(|said| said.text.clone()));
                 }
             }
         }

@@ -49,12 +49,12 @@ fn change_ui(ui: &mut egui::Ui, state: &State) {
         ui.available_width(),
         2.0 * ui.text_style_height(&egui::TextStyle::Body),
     );
-    ui.allocate_ui(room, |ui| {
-        ui.set_min_size(room);
-        if let Some(text) = state.run.last_change.as_ref().and_then(Change::label) {
-            ui.label(text);
-        }
-    });
+    let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
+    if let Some(text) = state.run.last_change.as_ref().and_then(Change::label) {
+        // Beside the layout: a line that is a little higher moves nothing either.
+        ui.new_child(egui::UiBuilder::new().max_rect(rect))
+            .label(text);
+    }
 }
 
 fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) {
