@@ -54,7 +54,7 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         .allow_drag(false)
         .show_axes([true, true])
         .custom_x_axes(vec![time_axis()])
-        .custom_y_axes(vec![decade_axis(|mark| power_of_ten(mark))])
+        .custom_y_axes(vec![decade_axis(power_of_ten)])
         .x_grid_spacer(time_spacer())
         .y_grid_spacer(decade_spacer())
         .show(ui, |plot| {
