@@ -2,10 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::Arc};
 
-use glam::Vec3;
-use vecrad::scene::{Scene, SceneOptions, WarningKind, read_obj};
+use glam::{DVec3, Vec2, Vec3};
+use vecrad::{
+    scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_obj, write_builtin},
+    solver::{Cancel, Snapshot, SolveSettings, Solver},
+};
 
 /// A triangle whose material names a picture.
 fn read(folder: &Path, picture: &str) -> Scene {
@@ -188,4 +191,126 @@ fn nothing_outside_the_folder_and_no_device_is_read() {
     let said = scene.warnings[0].to_string();
     assert!(said.contains(outside), "{said}");
     assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.5));
+}
+
+/// Two triangles of a textured square, with a line for each texture coordinate, and the corners of each in these.
+fn read_square(folder: &Path, texcoords: &[[f64; 2]], faces: [[usize; 3]; 2]) -> Scene {
+    save(&folder.join("a.png"), 8);
+    fs::write(
+        folder.join("a.mtl"),
+        "newmtl m\nKd 0.5 0.5 0.5\nKe 1 1 1\nmap_Kd a.png\n",
+    )
+    .unwrap();
+    let mut obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n".to_owned();
+    for [u, v] in texcoords {
+        obj += &format!("vt {u} {v}\n");
+    }
+    for (corners, which) in [[1, 2, 3], [1, 3, 4]].into_iter().zip(faces) {
+        let [a, b, c] = [0, 1, 2].map(|k| format!("{}/{}", corners[k], which[k]));
+        obj += &format!("f {a} {b} {c}\n");
+    }
+    fs::write(folder.join("square.obj"), obj).unwrap();
+    read_obj(&folder.join("square.obj"), &SceneOptions::default()).unwrap()
+}
+
+fn lit(scene: &Arc<Scene>) -> Snapshot {
+    let settings = SolveSettings::draft();
+    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
+    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    solver.snapshot()
+}
+
+/// Texture coordinates of a point of a triangle.
+fn texcoord_at(scene: &Scene, triangle: TriangleId, point: Vec3) -> Vec2 {
+    let [a, b, c] = scene.corners(triangle).map(Vec3::as_dvec3);
+    let point = point.as_dvec3();
+    let area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - a);
+    let whole = area(a, b, c);
+    let share = |part: DVec3| (part.dot(whole) / whole.length_squared()) as f32;
+    let uv = scene.texcoords[triangle.index()];
+    uv[0] * share(area(point, b, c))
+        + uv[1] * share(area(a, point, c))
+        + uv[2] * share(area(a, b, point))
+}
+
+/// Every corner of every triangle of the display mesh shows what the scene says of that triangle there, and what is
+/// shown twice is lit once.
+fn assert_whole(scene: &Scene, shown: &Snapshot) {
+    let (mesh, light) = (&shown.mesh, &shown.light);
+    assert_eq!(mesh.texcoords.len(), mesh.positions.len());
+    assert_eq!(light.irradiance.len(), mesh.positions.len());
+    for (corners, &triangle) in mesh.indices.iter().zip(&mesh.triangle_of) {
+        for &corner in corners {
+            let told = mesh.texcoords[corner as usize];
+            let wanted = texcoord_at(scene, TriangleId(triangle), mesh.positions[corner as usize]);
+            assert!(
+                told.abs_diff_eq(wanted, 2e-3),
+                "triangle {triangle}: {told} instead of {wanted}"
+            );
+        }
+    }
+    let own = mesh.positions.len() - mesh.repeated.len();
+    for (place, &repeated) in mesh.repeated.iter().enumerate() {
+        let (one, other) = (own + place, repeated as usize);
+        assert_eq!(mesh.positions[one], mesh.positions[other]);
+        assert_eq!(mesh.normals[one], mesh.normals[other]);
+        assert_eq!(mesh.reflectance[one], mesh.reflectance[other]);
+        assert_eq!(light.irradiance[one], light.irradiance[other]);
+    }
+}
+
+#[test]
+fn a_tiled_floor_comes_back_from_a_file_as_it_was_and_is_shown_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = SceneOptions::default();
+    let path = write_builtin("tiled-room", folder.path()).unwrap();
+    let read = Arc::new(read_obj(&path, &options).unwrap());
+    let original = builtin::builtin("tiled-room", &options).unwrap().unwrap();
+    assert_eq!(read.texcoords, original.texcoords);
+    let shown = lit(&read);
+    assert!(shown.mesh.repeated.is_empty(), "the floor has no seam");
+    assert_whole(&read, &shown);
+}
+
+#[test]
+fn a_picture_that_is_cut_open_is_not_smeared_over_the_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    // The diagonal is at u = 1 for one triangle and at u = 0 for the other.
+    let texcoords = [
+        [1.0, 0.0],
+        [0.5, 0.0],
+        [1.0, 1.0],
+        [0.0, 0.0],
+        [0.0, 1.0],
+        [0.5, 1.0],
+    ];
+    let scene = Arc::new(read_square(
+        folder.path(),
+        &texcoords,
+        [[1, 2, 3], [4, 5, 6]],
+    ));
+    let shown = lit(&scene);
+    assert!(!shown.mesh.repeated.is_empty());
+    assert_whole(&scene, &shown);
+}
+
+#[test]
+fn coordinates_far_from_the_origin_keep_their_digits_and_their_neighbours() {
+    let folder = tempfile::tempdir().unwrap();
+    let (u, v) = (1e9 + 0.75, -3e6 + 0.125);
+    let texcoords = [[u, v], [u + 0.5, v], [u + 0.5, v + 0.5], [u, v + 0.5]];
+    let scene = Arc::new(read_square(
+        folder.path(),
+        &texcoords,
+        [[1, 2, 3], [1, 3, 4]],
+    ));
+    let [one, other] = [scene.texcoords[0], scene.texcoords[1]];
+    assert_eq!([one[0], one[2]], [other[0], other[1]], "they share an edge");
+    assert_eq!(
+        (one[2] - one[0], one[1] - one[0]),
+        (Vec2::splat(0.5), Vec2::new(0.5, 0.0))
+    );
+    // Whole periods may be left out, parts of one may not.
+    assert_eq!(one[0] - one[0].floor(), Vec2::new(0.75, 0.125));
+    assert!(lit(&scene).mesh.repeated.is_empty());
 }

@@ -14,7 +14,7 @@ use eframe::egui::{self, Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use glam::Vec3;
 use vecrad::{
-    solver::SolveSettings,
+    solver::{Oracle, SolveSettings, StepReport},
     viewer::{
         Options,
         action::Action,
@@ -84,7 +84,7 @@ fn a_scene_is_read_lit_and_finished() {
             .iter()
             .all(|light| light.is_finite())
     );
-    harness.get_by_label("Reset");
+    harness.get_by_label("Begin again");
     // The heading may lie below the fold of the panel.
     harness.get_by_label("Statistics").click_accesskit();
     harness.run_steps(20);
@@ -99,7 +99,7 @@ fn a_finer_threshold_refines_and_another_method_restarts() {
     let mut finer = harness.state().state.settings.clone();
     finer.epsilon *= 0.5;
     perform(&mut harness, Action::Settings(finer.clone()));
-    assert_eq!(harness.state().state.run.last_effect, Some(Effect::Refines));
+    assert_eq!(last_effect(&harness), Some(Effect::Refines));
     wait_for(&mut harness, |app| {
         matches!(app.state.run.status, RunStatus::Finished(_))
             && app.state.run.reports.len() > steps
@@ -111,11 +111,68 @@ fn a_finer_threshold_refines_and_another_method_restarts() {
     let mut other = finer;
     other.seed += 1;
     perform(&mut harness, Action::Settings(other));
+    assert_eq!(last_effect(&harness), Some(Effect::Restarts));
+    assert_told(&harness, "so it began again");
+}
+
+fn last_effect(harness: &Harness<'static, App>) -> Option<Effect> {
+    let change = harness.state().state.run.last_change.as_ref();
+    change.map(|change| change.effect)
+}
+
+/// Whether a sentence stands under the progress, and in the line at the bottom.
+fn assert_told(harness: &Harness<'static, App>, text: &str) {
     assert_eq!(
-        harness.state().state.run.last_effect,
-        Some(Effect::Restarts)
+        harness.query_all_by_label_contains(text).count(),
+        2,
+        "{text}"
     );
-    harness.get_by_label_contains("began the light again");
+}
+
+#[test]
+fn light_that_is_finer_than_asked_for_says_so_where_the_run_is_shown() {
+    let mut harness = plates();
+    let before = harness.get_by_label("Normal").rect();
+    let mut coarser = harness.state().state.settings.clone();
+    coarser.epsilon *= 4.0;
+    let epsilon = coarser.epsilon;
+    perform(&mut harness, Action::Settings(coarser));
+    assert_eq!(last_effect(&harness), Some(Effect::Continues));
+    assert_told(&harness, "Begin again to have it coarser");
+    let sentence = harness.query_all_by_label_contains("Begin again to have it coarser");
+    let progress = harness.get_by_label("Progress").rect().bottom();
+    let highest = sentence
+        .map(|said| said.rect().top())
+        .fold(f32::MAX, f32::min);
+    assert!(progress < highest && highest < before.top());
+    assert_eq!(
+        harness.get_by_label("Normal").rect(),
+        before,
+        "nothing moves"
+    );
+    // What it says can be done.
+    perform(&mut harness, Action::Reset);
+    wait_for(&mut harness, |app| {
+        // The light before was a quarter of that.
+        let is_coarse = |report: &StepReport| report.is_final && report.epsilon > 0.5 * epsilon;
+        matches!(app.state.run.status, RunStatus::Finished(_))
+            && app.state.report().is_some_and(is_coarse)
+    });
+    assert_eq!(last_effect(&harness), None);
+}
+
+#[test]
+fn figures_keep_their_rows_while_a_run_begins_again() {
+    let mut harness = plates();
+    let places = |harness: &Harness<'static, App>| {
+        ["Energy balance", "Memory", "Normal"].map(|label| harness.get_by_label(label).rect())
+    };
+    let before = places(&harness);
+    // As it is until the first step is there.
+    harness.state_mut().state.run.reports.clear();
+    harness.run_steps(2);
+    assert_eq!(places(&harness), before);
+    assert!(harness.query_all_by_label("–").count() >= 9);
 }
 
 #[test]
@@ -123,10 +180,24 @@ fn presets_are_chosen_by_their_button() {
     let mut harness = plates();
     harness.get_by_label("Normal").click();
     harness.run_steps(3);
-    assert_eq!(
-        harness.state().state.settings.epsilon,
-        SolveSettings::normal().epsilon
-    );
+    assert_eq!(harness.state().state.settings, SolveSettings::normal());
+    // Another method stays under another quality, and the preset does not pass for the whole of it.
+    let mut other = SolveSettings::draft();
+    other.oracle = Oracle::Samples;
+    other.samples = 9;
+    perform(&mut harness, Action::Settings(other));
+    assert!(harness.query_by_label_contains(" *").is_none());
+    harness.get_by_label("Normal").click();
+    harness.run_steps(3);
+    let by_samples = SolveSettings {
+        oracle: Oracle::Samples,
+        ..SolveSettings::normal()
+    };
+    assert_eq!(harness.state().state.settings, by_samples);
+    harness.get_by_label("Normal *");
+    harness.get_by_label("Draft");
+    perform(&mut harness, Action::Settings(SolveSettings::normal()));
+    harness.get_by_label("Normal");
 }
 
 #[test]

@@ -11,7 +11,10 @@ use std::{
 };
 
 use eframe::egui;
-use egui_kittest::{Harness, kittest::Queryable as _};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT as _, Queryable as _},
+};
 use vecrad::{
     solver::SolveSettings,
     viewer::{
@@ -389,4 +392,76 @@ fn enter_confirms_a_dialog_and_leaves_the_camera() {
     assert!(!harness.state().state.panels.mesh);
     wait_for(&mut harness, |_| path.exists());
     assert_eq!(harness.state().state.rig.target.pivot.x, 3.0);
+}
+
+#[test]
+fn a_typed_path_is_asked_for_again_until_it_can_be_read() {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let scene = folder.path().join("lamp.obj");
+    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
+    let mut harness = plates();
+    harness.state_mut().state.panels.path_text = "/an/older/path.obj".to_owned();
+    harness.get_by_label("File").click();
+    harness.run_steps(3);
+    harness.get_by_label("Open by path…").click();
+    harness.run_steps(4);
+    // Typed at once, without a click, over what was there.
+    let enter = |harness: &mut Harness<'static, App>, text: &str| {
+        harness.event(egui::Event::Text(text.to_owned()));
+        harness.run_steps(2);
+        assert_eq!(harness.state().state.panels.path_text, text);
+        harness.key_press(egui::Key::Enter);
+        harness.run_steps(2);
+        wait_for(harness, |app| app.state.loading.is_none());
+    };
+    enter(&mut harness, "/no/such/lamp.obj");
+    let panels = &harness.state().state.panels;
+    assert!(panels.path && panels.path_error.is_some());
+    let told = harness.query_all_by_label_contains("no such file");
+    assert!(
+        told.count() >= 2,
+        "in the dialog and in the line at the bottom"
+    );
+    enter(&mut harness, &scene.display().to_string());
+    let state = &harness.state().state;
+    assert!(!state.panels.path);
+    assert_eq!(
+        state
+            .loaded
+            .as_ref()
+            .and_then(|loaded| loaded.source.path()),
+        Some(scene.as_path())
+    );
+    let mut unseen = state.messages.unseen().iter();
+    assert!(unseen.all(|message| message.severity != Severity::Error));
+}
+
+#[test]
+fn the_view_menu_tells_what_is_on_and_how_large_text_is() {
+    let mut harness = plates();
+    let open = |harness: &mut Harness<'static, App>| {
+        harness.get_by_label("View").click();
+        harness.run_steps(3);
+    };
+    for is_on in [false, true] {
+        open(&mut harness);
+        let mut entries = harness.query_all_by_label_contains("Cluster boxes");
+        let entry = entries.next().expect("an entry of the menu");
+        let toggled = Some(egui::accesskit::Toggled::from(is_on));
+        assert_eq!(entry.accesskit_node().toggled(), toggled);
+        entry.click();
+        drop(entries);
+        harness.run_steps(3);
+        assert_eq!(harness.state().state.view.clusters.shown, !is_on);
+    }
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Minus);
+    harness.run_steps(3);
+    assert_eq!(harness.ctx.zoom_factor(), 0.9);
+    open(&mut harness);
+    harness.get_by_label_contains("UI scale (90 %)");
+    harness.key_press(egui::Key::Escape);
+    harness.run_steps(2);
+    harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Num0);
+    harness.run_steps(3);
+    assert_eq!(harness.ctx.zoom_factor(), 1.0);
 }

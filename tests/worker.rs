@@ -301,6 +301,39 @@ fn a_run_announces_each_step_and_publishes_its_light_first() {
 }
 
 #[test]
+fn a_run_that_is_refined_after_its_end_continues_its_clock() {
+    let script = Arc::new(Script {
+        step_time: Duration::from_millis(20),
+        steps: 4,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    let settings = short();
+    worker.start(triangle(), settings.clone(), one_thread());
+    let mut events = wait_for(&worker, is_finished);
+    let finer = SolveSettings {
+        epsilon: 0.5 * settings.epsilon,
+        ..settings
+    };
+    assert_eq!(worker.change_settings(finer), Effect::Refines);
+    events.extend(wait_for(&worker, is_finished));
+    let times: Vec<(f64, f64)> = events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Stepped(report) => Some((report.elapsed_s, report.solve_s)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(times.len(), 5);
+    assert!(times.is_sorted_by(|one, next| one.0 < next.0), "{times:?}");
+    // Whatever was computed, the clock ran meanwhile.
+    assert!(
+        times.iter().all(|(elapsed, solved)| elapsed >= solved),
+        "{times:?}"
+    );
+}
+
+#[test]
 fn a_stale_generation_never_shows() {
     let script = Arc::new(Script {
         steps: 3,

@@ -559,6 +559,11 @@ impl Import<'_> {
 /// Reflectance where the file gives none.
 const DEFAULT_REFLECTANCE: Vec3 = Vec3::splat(0.5);
 
+/// Textures repeat, and far from the origin single precision has no digits left for the picture: faces are moved by so
+/// many periods. Fewer, and the coordinates of neighbours are torn apart where nothing asks for it; many more, and the
+/// digits are gone.
+const NEAR_PERIODS: f64 = 256.0;
+
 /// A name short enough for a message.
 fn shortened(name: &str) -> String {
     const LONGEST: usize = 120;
@@ -590,8 +595,7 @@ impl Corners<'_> {
             let value = DVec2::from_slice(self.mesh.texcoords.get(index..index + 2)?);
             *uv = value * scale + offset;
         }
-        // Textures repeat, and far from the origin single precision has no digits left for the picture.
-        let shift = uv[0].floor();
+        let shift = (uv[0] / NEAR_PERIODS).round() * NEAR_PERIODS;
         let uv = uv.map(|uv| (uv - shift).as_vec2());
         uv.iter().all(|uv| uv.is_finite()).then_some(uv)
     }

@@ -7,10 +7,12 @@ use glam::{Vec2, Vec3};
 use super::{
     Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable,
     reconstruct::VertexMeans,
+    seams::{Seams, repeat},
 };
 use crate::{
     geometry::area_vector,
     hierarchy::{Cluster, NodeId},
+    scene::TriangleId,
     transport::luminance,
 };
 
@@ -18,9 +20,9 @@ impl Solver {
     /// Renew the snapshot after a step. The mesh is kept where no element was divided. When cancelled the snapshot stays
     /// as it was.
     pub(super) fn show(&mut self, cancel: &Cancel) -> Option<()> {
-        let shown = self.snapshot.mesh.indices.is_empty();
-        let has_changed =
-            shown || self.snapshot.mesh.positions.len() != self.hierarchy.mesh.vertices.len();
+        let held = &self.snapshot.mesh;
+        let has_changed = held.indices.is_empty()
+            || held.own_vertex_count() != self.hierarchy.mesh.vertices.len();
         cancel.proceed()?;
         let mesh = if has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown()
         {
@@ -33,7 +35,7 @@ impl Solver {
             field.smooth(&self.hierarchy);
         }
         cancel.proceed()?;
-        let light = self.vertex_light();
+        let light = self.vertex_light(&mesh);
         cancel.proceed()?;
         let clusters = self.cluster_boxes(cancel)?;
         self.snapshot = Snapshot {
@@ -60,17 +62,13 @@ impl Solver {
         cancel.proceed()?;
         let mesh = &self.hierarchy.mesh;
         let count = mesh.vertices.len();
-        let has_texcoords = !self.scene.texcoords.is_empty();
+        let mut seams = (!self.scene.texcoords.is_empty()).then(Seams::default);
         let mut display = DisplayMesh {
             positions: (0..count as u32)
                 .map(|vertex| mesh.position(vertex))
                 .collect(),
             normals: vec![Vec3::ZERO; count],
-            texcoords: if has_texcoords {
-                vec![Vec2::ZERO; count]
-            } else {
-                Vec::new()
-            },
+            texcoords: vec![Vec2::NAN; if seams.is_some() { count } else { 0 }],
             ..DisplayMesh::default()
         };
         for (element, vertices) in triangles {
@@ -80,10 +78,15 @@ impl Solver {
             for vertex in vertices.map(|vertex| vertex as usize) {
                 display.normals[vertex] += patch.normal * weight;
             }
-            if has_texcoords {
-                self.place_texcoords(patch.triangle, vertices, &mut display);
-            }
-            display.indices.push(vertices);
+            let shown = match &mut seams {
+                Some(seams) => vertices.map(|vertex| {
+                    let point = display.positions[vertex as usize];
+                    let uv = self.texcoord_at(patch.triangle, point);
+                    seams.vertex_with(vertex, uv, &mut display)
+                }),
+                None => vertices,
+            };
+            display.indices.push(shown);
             display.triangle_of.push(patch.triangle.0);
             display.is_back.push(patch.is_back);
             display
@@ -93,6 +96,11 @@ impl Solver {
         cancel.proceed()?;
         for normal in &mut display.normals {
             *normal = normal.normalize_or_zero();
+        }
+        repeat(&mut display.normals, count, &display.repeated);
+        // Vertices of no triangle.
+        for uv in display.texcoords.iter_mut().filter(|uv| uv.is_nan()) {
+            *uv = Vec2::ZERO;
         }
         self.color(&mut display);
         Some(display)
@@ -108,12 +116,13 @@ impl Solver {
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
             let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
             for &vertex in vertices {
-                let (reflectance, emission, weights) = &mut sums[vertex as usize];
+                let (reflectance, emission, weights) = &mut sums[display.own_vertex(vertex)];
                 *reflectance += patch.reflectance * weight;
                 *emission += patch.emission * weight;
                 *weights += weight;
             }
         }
+        repeat(&mut sums, display.own_vertex_count(), &display.repeated);
         let mean = |sum: Vec3, weight: f32| if weight > 0.0 { sum / weight } else { sum };
         let means = sums.iter();
         let appearances = self.appearances().iter();
@@ -122,27 +131,19 @@ impl Solver {
         display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
     }
 
-    /// Texture coordinates of vertices on a triangle, by their barycentric coordinates there.
-    fn place_texcoords(
-        &self,
-        triangle: crate::scene::TriangleId,
-        vertices: [u32; 3],
-        display: &mut DisplayMesh,
-    ) {
+    /// Texture coordinates of a point on a triangle, by its barycentric coordinates there.
+    fn texcoord_at(&self, triangle: TriangleId, point: Vec3) -> Vec2 {
         let uv = self.scene.texcoords[triangle.index()];
-        let corners = self.scene.corners(triangle);
-        let whole = area_vector(corners);
+        let [a, b, c] = self.scene.corners(triangle);
+        let whole = area_vector([a, b, c]);
         let scale = 1.0 / whole.length_squared().max(f32::MIN_POSITIVE);
-        for vertex in vertices {
-            let point = display.positions[vertex as usize];
-            let [a, b, c] = corners;
-            let u = area_vector([point, b, c]).dot(whole) * scale;
-            let v = area_vector([a, point, c]).dot(whole) * scale;
-            display.texcoords[vertex as usize] = uv[0] * u + uv[1] * v + uv[2] * (1.0 - u - v);
-        }
+        let u = area_vector([point, b, c]).dot(whole) * scale;
+        let v = area_vector([a, point, c]).dot(whole) * scale;
+        let place = uv[0] * u + uv[1] * v + uv[2] * (1.0 - u - v);
+        if place.is_finite() { place } else { uv[0] }
     }
 
-    fn vertex_light(&self) -> VertexLight {
+    fn vertex_light(&self, mesh: &DisplayMesh) -> VertexLight {
         let means = VertexMeans::new(&self.hierarchy, &self.leaves);
         let count = means.irradiance.len();
         let mut light = VertexLight {
@@ -163,6 +164,9 @@ impl Solver {
                 .uncertainty
                 .push(if error.is_finite() { error } else { f32::MAX });
         }
+        repeat(&mut light.irradiance, count, &mesh.repeated);
+        repeat(&mut light.direct, count, &mesh.repeated);
+        repeat(&mut light.uncertainty, count, &mesh.repeated);
         light
     }
 

@@ -23,6 +23,7 @@ mod plan;
 mod reconstruct;
 mod relight;
 mod report;
+mod seams;
 mod settings;
 mod smooth;
 mod snapshot;

@@ -32,6 +32,8 @@ pub struct DisplayMesh {
     pub is_back: Vec<bool>,
     /// The element under each display triangle, as a node of the hierarchy.
     pub element_of: Vec<u32>,
+    /// The last vertices repeat these, with the texture coordinates of the other side of a seam.
+    pub repeated: Vec<u32>,
 }
 
 /// Light at the vertices of a [`DisplayMesh`], linear RGB; all finite and not negative.
@@ -112,6 +114,7 @@ impl Snapshot {
             + size_of_val(mesh.triangle_of.as_slice())
             + size_of_val(mesh.is_back.as_slice())
             + size_of_val(mesh.element_of.as_slice())
+            + size_of_val(mesh.repeated.as_slice())
             + size_of_val(light.irradiance.as_slice())
             + size_of_val(light.direct.as_slice())
             + size_of_val(light.uncertainty.as_slice())

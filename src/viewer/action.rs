@@ -102,6 +102,8 @@ pub enum Action {
     TogglePanels,
     /// Panels, their sizes and the size of text as at first.
     ResetLayout,
+    /// Text and panels larger or smaller.
+    Scale(Scale),
     /// Whole screen on or off.
     ToggleFullScreen,
     /// The key sheet on or off.
@@ -110,4 +112,15 @@ pub enum Action {
     ClearRecent,
     /// Close the window.
     Quit,
+}
+
+/// How large text and panels are to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// A step larger.
+    Larger,
+    /// A step smaller.
+    Smaller,
+    /// As at first.
+    Whole,
 }

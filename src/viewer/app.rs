@@ -74,6 +74,9 @@ impl App {
         faults: Arc<Faults>,
     ) -> std::io::Result<Self> {
         theme::apply(&cc.egui_ctx);
+        // All keys are in one table.
+        cc.egui_ctx
+            .options_mut(|options| options.zoom_with_keyboard = false);
         let ctx = cc.egui_ctx.clone();
         let wake: Wake = Arc::new(move || ctx.request_repaint_after(SOON));
         let viewport = cc.wgpu_render_state.as_ref().map(|render_state| {

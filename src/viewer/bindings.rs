@@ -3,7 +3,7 @@
 use eframe::egui::{Event, InputState, Key, Modifiers};
 
 use super::{
-    action::Action,
+    action::{Action, Scale},
     camera::{AxisView, UpAxis},
     view::ViewMode,
 };
@@ -57,7 +57,7 @@ impl Binding {
     fn fits(&self, key: Key, modifiers: Modifiers, is_repeat: bool) -> bool {
         let goes_in_steps = matches!(
             self.action,
-            Action::ExposureBy(_) | Action::ClusterLevelBy(_)
+            Action::ExposureBy(_) | Action::ClusterLevelBy(_) | Action::Scale(_)
         );
         let shift = self.ignores_shift || modifiers.shift == self.modifiers.shift;
         key == self.key
@@ -99,6 +99,9 @@ pub const MOUSE: [(&str, &str); 10] = [
 
 /// Keys that move the camera while the right button is held; Ctrl slows it then, and means nothing else.
 const FLYING: [Key; 6] = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E];
+
+/// What two keys do, since one of them needs Shift on some keyboards.
+const LARGER: &str = "Larger text and panels";
 
 /// All bindings.
 pub fn bindings() -> Vec<Binding> {
@@ -244,6 +247,20 @@ pub fn bindings() -> Vec<Binding> {
             Action::TogglePanels,
         ),
         plain(Key::F11, File, "Full screen", Action::ToggleFullScreen),
+        command(Key::Plus, File, LARGER, Action::Scale(Scale::Larger)),
+        command(Key::Equals, File, LARGER, Action::Scale(Scale::Larger)),
+        command(
+            Key::Minus,
+            File,
+            "Smaller text and panels",
+            Action::Scale(Scale::Smaller),
+        ),
+        command(
+            Key::Num0,
+            File,
+            "Text and panels as at first",
+            Action::Scale(Scale::Whole),
+        ),
         plain(Key::F1, File, "This sheet", Action::ToggleHelp),
         plain(Key::Questionmark, File, "This sheet", Action::ToggleHelp),
         command(Key::Q, File, "Quit", Action::Quit),
@@ -383,6 +400,29 @@ mod tests {
             found(Key::Questionmark, Modifiers::SHIFT),
             Some(Action::ToggleHelp)
         );
+    }
+
+    #[test]
+    fn text_is_scaled_by_the_keys_of_browsers() {
+        let table = bindings();
+        for (key, modifiers, scale) in [
+            (
+                Key::Plus,
+                Modifiers::COMMAND | Modifiers::SHIFT,
+                Scale::Larger,
+            ),
+            (Key::Equals, Modifiers::COMMAND, Scale::Larger),
+            (Key::Minus, Modifiers::COMMAND, Scale::Smaller),
+            (Key::Num0, Modifiers::COMMAND, Scale::Whole),
+        ] {
+            let found = table
+                .iter()
+                .find(|binding| binding.fits(key, modifiers, true));
+            assert_eq!(
+                found.map(|binding| &binding.action),
+                Some(&Action::Scale(scale))
+            );
+        }
     }
 
     #[test]

@@ -22,13 +22,15 @@ struct SegmentsKey {
 }
 
 impl LineCache {
-    /// The lines of a state with this tree.
+    /// The lines of a state with this tree, with or without what marks the selected cluster.
     pub(super) fn segments(
         &mut self,
         state: &State,
         clusters: &[ClusterBox],
+        marks_selection: bool,
     ) -> &Arc<Vec<SegmentInstance>> {
-        let selected = state.cluster.and_then(|index| clusters.get(index));
+        let selected = state.cluster.filter(|_| marks_selection);
+        let selected = selected.and_then(|index| clusters.get(index));
         let inspection = state.inspections.drawn(&state.view.links);
         let is_current = |key: &SegmentsKey| {
             key.selected.as_ref() == selected
@@ -65,4 +67,23 @@ fn segments(
         lines.extend(cluster_lines::face_power_arrows(cluster));
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::clusters::tests::tree, *};
+
+    #[test]
+    fn a_selection_is_marked_only_where_that_is_asked_for() {
+        let state = State {
+            cluster: Some(0),
+            ..State::default()
+        };
+        let (clusters, mut lines) = (tree(), LineCache::default());
+        let marked = lines.segments(&state, &clusters, true).clone();
+        // The edges of a box, and two arrows.
+        assert_eq!(marked.len(), 12 + 2);
+        assert!(lines.segments(&state, &clusters, false).is_empty());
+        assert_eq!(*lines.segments(&state, &clusters, true), marked);
+    }
 }

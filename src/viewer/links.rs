@@ -9,8 +9,8 @@ use super::{
 };
 use crate::solver::{InspectedLink, Inspection};
 
-/// Magnitudes that the colours of strengths span. With fewer, weak links look alike; with more, strong ones do.
-const MAGNITUDES: f32 = 3.0;
+/// Magnitudes that the colours of strengths span at most. With fewer, weak links look alike; with more, strong ones do.
+const MOST_MAGNITUDES: f32 = 3.0;
 
 /// What the lines tell, for their legend.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,15 +38,16 @@ pub fn summary(inspection: &Inspection, overlay: &LinkOverlay) -> LinkSummary {
         } else {
             0.0
         },
-        range: range(inspection, overlay.color),
+        range: range(drawn, overlay.color),
     }
 }
 
 /// One line a link, from receiver to source, the strongest on top; light within a cluster is the outline of its box.
 pub fn segments(inspection: &Inspection, overlay: &LinkOverlay) -> Vec<SegmentInstance> {
-    let range = range(inspection, overlay.color);
+    let drawn = drawn(inspection, overlay);
+    let range = range(drawn, overlay.color);
     let mut lines = Vec::new();
-    for link in drawn(inspection, overlay).iter().rev() {
+    for link in drawn.iter().rev() {
         let color = theme::ramp(position(link, overlay.color, range));
         if link.source.node == link.receiver.node {
             lines.extend(outline(link.source.min, link.source.max, color));
@@ -72,13 +73,14 @@ fn strength(link: &InspectedLink) -> f32 {
     luminance(link.irradiance).max(0.0)
 }
 
-/// Ends of the colours.
-fn range(inspection: &Inspection, color: LinkColor) -> [f32; 2] {
+/// Ends of the colours: strengths from the weakest to the strongest of those drawn, which come strongest first.
+fn range(drawn: &[InspectedLink], color: LinkColor) -> [f32; 2] {
     match color {
         LinkColor::Visibility => [0.0, 1.0],
         LinkColor::Strength => {
-            let most = inspection.links.first().map_or(0.0, strength);
-            [most * 10f32.powf(-MAGNITUDES), most]
+            let [most, least] =
+                [drawn.first(), drawn.last()].map(|link| link.map_or(0.0, strength));
+            [least.max(most * 10f32.powf(-MOST_MAGNITUDES)), most]
         }
     }
 }
@@ -87,9 +89,10 @@ fn range(inspection: &Inspection, color: LinkColor) -> [f32; 2] {
 fn position(link: &InspectedLink, color: LinkColor, [low, high]: [f32; 2]) -> f32 {
     let position = match color {
         LinkColor::Visibility => link.visibility,
-        LinkColor::Strength if low > 0.0 => {
+        LinkColor::Strength if 0.0 < low && low < high => {
             (strength(link).max(low) / low).ln() / (high / low).ln()
         }
+        LinkColor::Strength if low > 0.0 => 1.0,
         LinkColor::Strength => 0.0,
     };
     position.clamp(0.0, 1.0)
@@ -141,7 +144,10 @@ mod tests {
 
     #[test]
     fn lines_run_from_receiver_to_source_and_the_strongest_is_on_top() {
-        let overlay = LinkOverlay::default();
+        let overlay = LinkOverlay {
+            color: LinkColor::Visibility,
+            ..LinkOverlay::default()
+        };
         let lines = segments(&inspection(), &overlay);
         assert_eq!(lines.len(), 1 + 12 + 1);
         let strongest = lines[lines.len() - 1];
@@ -162,6 +168,31 @@ mod tests {
         assert_eq!(told.range[1], 8.0);
         overlay.most = 9;
         assert!((summary(&inspection(), &overlay).share - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn strengths_of_those_drawn_use_all_colours() {
+        let color_of = |lines: &[SegmentInstance], at: usize| lines[at][6..9].to_vec();
+        let ramp = |at: f32| theme::ramp(at).to_array().to_vec();
+        let mut overlay = LinkOverlay {
+            color: LinkColor::Strength,
+            ..LinkOverlay::default()
+        };
+        // From 0.5 to 8, whose logarithms are 4 octaves apart; 1.5 lies at log2(3)/4.
+        let lines = segments(&inspection(), &overlay);
+        let (weakest, middle, strongest) = (
+            color_of(&lines, 0),
+            color_of(&lines, 1),
+            color_of(&lines, 13),
+        );
+        assert_eq!((weakest, strongest), (ramp(0.0), ramp(1.0)));
+        let wanted = ramp(3f32.log2() / 4.0);
+        assert!(middle.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-4));
+        // Fewer span less: the weakest of them is where the colours begin.
+        overlay.most = 2;
+        assert_eq!(color_of(&segments(&inspection(), &overlay), 0), ramp(0.0));
+        overlay.most = 1;
+        assert_eq!(color_of(&segments(&inspection(), &overlay), 0), ramp(1.0));
     }
 
     #[test]

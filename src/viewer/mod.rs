@@ -7,6 +7,7 @@ pub mod action;
 pub mod app;
 pub mod bindings;
 pub mod camera;
+pub mod change;
 pub mod cluster_lines;
 pub mod clusters;
 pub mod fonts;

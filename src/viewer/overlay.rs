@@ -173,11 +173,11 @@ pub enum LinkEnd {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinkColor {
-    /// Which part gets through.
-    #[default]
-    Visibility,
     /// How much light it brings.
+    #[default]
     Strength,
+    /// Which part gets through.
+    Visibility,
 }
 
 /// Which links are drawn.
@@ -204,7 +204,7 @@ impl Default for LinkOverlay {
         Self {
             shown: false,
             of: LinkEnd::Element,
-            color: LinkColor::Visibility,
+            color: LinkColor::Strength,
             most: 64,
         }
     }

@@ -19,6 +19,10 @@ pub struct PanelState {
     pub path: bool,
     /// The typed path.
     pub path_text: String,
+    /// Why the typed path could not be read.
+    pub path_error: Option<String>,
+    /// Whether the field for a path is to be typed into, over what it holds.
+    pub path_is_asked: bool,
     /// The typed path of a picture.
     pub picture_text: String,
     /// The typed path of the lit mesh.
@@ -40,6 +44,21 @@ pub struct PanelState {
 impl PanelState {
     /// Speeds that can be flown at.
     pub const FLY_SPEED_RANGE: std::ops::RangeInclusive<f32> = 0.05..=1000.0;
+
+    /// Open the field for a path.
+    pub fn ask_for_path(&mut self) {
+        self.path = true;
+        self.path_error = None;
+        self.path_is_asked = true;
+    }
+
+    /// A scene could not be read: where its path was typed, it can be mended.
+    pub fn refuse_path(&mut self, error: Option<String>) {
+        if self.path {
+            self.path_error = error;
+            self.path_is_asked = true;
+        }
+    }
 
     /// Whether a dialog asks for a file.
     pub fn asks_for_file(&self) -> bool {
@@ -71,6 +90,8 @@ impl Default for PanelState {
             mesh: false,
             path: false,
             path_text: String::new(),
+            path_error: None,
+            path_is_asked: false,
             picture_text: String::new(),
             mesh_text: String::new(),
             picture_size: [1920, 1080],

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{
     camera::CameraRig,
+    change::Change,
     clusters::ShownClusters,
     frame_time::FrameTimes,
     inspection::Inspections,
@@ -19,7 +20,7 @@ use super::{
 use crate::{
     scene::{Scene, SceneOptions},
     solver::{Snapshot, SolveSettings, StepReport},
-    worker::{Effect, Event, RunOptions, StopReason},
+    worker::{Event, RunOptions, StopReason},
 };
 
 /// Where a run stands.
@@ -93,8 +94,8 @@ pub struct Run {
     pub prepare_secs: Option<f64>,
     /// Seconds that changing the light took last.
     pub relit_secs: Option<f64>,
-    /// What the last change of settings did.
-    pub last_effect: Option<Effect>,
+    /// The last change of settings since the light began.
+    pub last_change: Option<Change>,
 }
 
 impl Run {

@@ -89,7 +89,7 @@ impl Viewport {
         let size = [rect.width(), rect.height()]
             .map(|points| ((points * pixels_per_point).round() as u32).max(1));
         state.viewport_size = size;
-        let Some(key) = self.key(state, size, background(ui)) else {
+        let Some(key) = self.key(state, size, background(ui), true) else {
             return;
         };
         let texture = match self.texture(size) {
@@ -123,8 +123,11 @@ impl Viewport {
         is_transparent: bool,
     ) -> Result<Drawn, String> {
         let background = Vec3::splat(theme::PICTURE_BACKGROUND);
+        // What is picked is marked for the one who picks, not for those who look at the picture: without boxes or links
+        // they would not know what the mark is.
+        let marks_selection = state.view.clusters.shown || state.view.links.shown;
         let key = self
-            .key(state, size, background)
+            .key(state, size, background, marks_selection)
             .ok_or("there is nothing to take a picture of; open a scene first")?;
         let gpu = self.renderer.gpu().clone();
         let canvas = if is_transparent {
@@ -151,13 +154,20 @@ impl Viewport {
         })
     }
 
-    fn key(&mut self, state: &State, size: [u32; 2], background: Vec3) -> Option<PictureKey> {
+    fn key(
+        &mut self,
+        state: &State,
+        size: [u32; 2],
+        background: Vec3,
+        marks_selection: bool,
+    ) -> Option<PictureKey> {
         let staged = state.staged.as_ref()?;
         let snapshot = &staged.wanted.snapshot;
-        let segments = self.lines.segments(state, &snapshot.clusters).clone();
+        let lines = &mut self.lines;
+        let segments = lines.segments(state, &snapshot.clusters, marks_selection);
         Some(PictureKey {
             staged: staged.clone(),
-            segments,
+            segments: segments.clone(),
             camera: state.rig.current,
             view: ViewSettings {
                 // Another mode shows once its light is on the adapter.

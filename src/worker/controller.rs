@@ -429,10 +429,6 @@ impl Controller {
     /// Rest or end: interrupt the step under way, and announce it once the solve is home.
     fn aim_at(&mut self, aim: Aim) {
         if let Some(run) = &mut self.run {
-            if run.aim == Aim::Run {
-                run.before += run.since.elapsed();
-                run.since = Instant::now();
-            }
             run.turn_to(aim);
         }
         // A run that reaches a limit keeps what it has: without the first picture that would be nothing.
@@ -448,7 +444,6 @@ impl Controller {
     fn go_on(&mut self) {
         if let Some(run) = &mut self.run {
             run.turn_to(Aim::Run);
-            run.since = Instant::now();
             self.outbox.send(run.generation, Event::Continued);
         }
     }

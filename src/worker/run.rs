@@ -60,9 +60,9 @@ pub(super) struct Run {
     /// Whether the aim was said to be reached.
     pub announced: bool,
     /// Start, or last continue.
-    pub since: Instant,
+    since: Instant,
     /// Running time before that.
-    pub before: Duration,
+    before: Duration,
     /// Time spent preparing and stepping.
     pub solving: Duration,
     /// Running time and time spent, in seconds, at the end of the last step.
@@ -168,10 +168,20 @@ impl Run {
         }
     }
 
-    /// Aim at something, which is to be announced once it is reached.
+    /// Aim at something, which is to be announced once it is reached. The clock runs on from where it stood.
     pub(super) fn turn_to(&mut self, aim: Aim) {
+        self.before = self.running_time();
+        self.since = Instant::now();
         self.aim = aim;
         self.announced = false;
+    }
+
+    /// Time since the start, without that in which nothing was to be done.
+    fn running_time(&self) -> Duration {
+        match self.aim {
+            Aim::Run => self.before + self.since.elapsed(),
+            _ => self.before,
+        }
     }
 
     /// When the time limit passes.
@@ -189,6 +199,7 @@ impl Run {
 
     /// Complete the report of a step, and end the run if it was the last.
     pub(super) fn take_note(&mut self, report: StepReport) -> StepReport {
+        // A step that was interrupted too late ran on until now.
         self.last_times = (
             (self.before + self.since.elapsed()).as_secs_f64(),
             self.solving.as_secs_f64(),

@@ -4,8 +4,10 @@ use eframe::egui;
 
 use super::{
     super::{
-        action::Action,
-        bindings, clusters, light_range,
+        action::{Action, Scale},
+        bindings,
+        change::Change,
+        clusters, light_range,
         materials::Materials,
         navigation::Picked,
         panel_state::PanelState,
@@ -30,13 +32,15 @@ impl App {
             Action::Reset => {
                 if self.state.loaded.is_some() {
                     self.state.inspections.close();
+                    self.state.run.last_change = None;
                     self.worker.reset();
                 }
             }
             Action::Settings(settings) => {
                 self.state.settings = settings.clone();
                 let effect = self.worker.change_settings(settings);
-                self.state.run.last_effect = Some(effect);
+                let status = self.state.run.status.clone();
+                self.state.run.last_change = Some(Change { effect, status });
                 if effect == Effect::Restarts {
                     self.state.inspections.close();
                     self.state.cluster = None;
@@ -86,6 +90,9 @@ impl App {
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(!is_full));
             }
             Action::ResetLayout => self.reset_layout(ctx),
+            Action::Scale(Scale::Larger) => egui::gui_zoom::zoom_in(ctx),
+            Action::Scale(Scale::Smaller) => egui::gui_zoom::zoom_out(ctx),
+            Action::Scale(Scale::Whole) => ctx.set_zoom_factor(1.0),
             Action::ClearRecent => self.state.recent = Recent::default(),
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             other => self.change_view(&other),

@@ -37,7 +37,13 @@ impl App {
             self.state.loading = None;
             match outcome {
                 Ok(loaded) => self.show(loaded),
-                Err(error) => self.state.messages.push(Severity::Error, error),
+                Err(error) => {
+                    self.state.messages.push(Severity::Error, error);
+                    let said = self.state.messages.all.last();
+                    self.state
+                        .panels
+                        .refuse_path(said.map(|said| said.text.clone()));
+                }
             }
         }
         self.drain_worker();
@@ -47,13 +53,14 @@ impl App {
 
     /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by its haste.
     fn no_file(&mut self, is_hasty: bool) {
-        let text = if is_hasty {
-            self.state.panels.path = true;
-            "this desktop has no file dialog; type the path instead"
+        let (severity, text) = if is_hasty {
+            self.state.panels.ask_for_path();
+            let text = "this desktop has no file dialog; type the path instead";
+            (Severity::Warning, text)
         } else {
-            "no file was chosen"
+            (Severity::Note, "no file was chosen")
         };
-        self.state.messages.push(Severity::Note, text);
+        self.state.messages.push(severity, text);
     }
 
     fn drain_worker(&mut self) {

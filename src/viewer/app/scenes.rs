@@ -35,6 +35,9 @@ impl App {
 
     /// Show a scene that was read, and begin to light it.
     pub(super) fn show(&mut self, loaded: LoadedScene) {
+        self.state.panels.path = false;
+        // What went wrong before is over; the panel still tells.
+        self.state.messages.seen = self.state.messages.all.len();
         for warning in &loaded.scene.warnings {
             self.state
                 .messages
@@ -52,7 +55,7 @@ impl App {
         self.state.cluster = None;
         self.state.inspections.close();
         self.forget_picture();
-        self.state.run.last_effect = None;
+        self.state.run.last_change = None;
         self.worker.watch(None);
         self.state.truth = Truth::default();
         self.worker.start_with_rays(
@@ -136,7 +139,7 @@ impl App {
     pub(super) fn open_dialog(&mut self) {
         if self.dialog_since.is_some() {
             // It may hang without having been seen.
-            self.state.panels.path = true;
+            self.state.panels.ask_for_path();
             return;
         }
         let (sender, wake) = (self.chosen.0.clone(), self.wake.clone());

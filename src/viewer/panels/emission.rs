@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::{figure, row};
+use super::{figure, number, row};
 use crate::viewer::{action::Action, state::State};
 
 /// Show the scale of all emission; a wish goes into `actions`.
@@ -22,7 +22,7 @@ pub fn emission_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
                     .clamping(egui::SliderClamping::Never)
                     .custom_formatter(|value, _| figure(value))
                     .custom_parser(|text| {
-                        let value = text.trim().parse::<f64>().ok()?;
+                        let value = number(text)?;
                         (0.0..=f64::from(f32::MAX))
                             .contains(&value)
                             .then_some(value)

@@ -3,7 +3,7 @@
 use eframe::egui::{self, Color32, RichText};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use super::{count, figure, plot::run_time, row, seconds};
+use super::{count, figure, plot, row, seconds};
 use crate::{
     solver::StepReport,
     viewer::{
@@ -62,7 +62,11 @@ fn reference_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
         }
         if truth.exists() {
             let share = progress.samples as f32 / progress.goal.max(1) as f32;
-            let text = format!("{} of {} samples", progress.samples, progress.goal);
+            let text = format!(
+                "{} of {} samples",
+                count(u64::from(progress.samples)),
+                count(u64::from(progress.goal))
+            );
             ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
         }
     });
@@ -183,9 +187,12 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
         .allow_scroll(false)
         .allow_zoom(false)
         .allow_drag(false)
-        .x_axis_formatter(|mark, _| run_time(mark.value))
-        .y_axis_formatter(|mark, _| decade(mark.value))
-        .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
+        .custom_x_axes(vec![plot::time_axis()])
+        .custom_y_axes(vec![plot::decade_axis(|exponent| {
+            format!("{} %", 10_f64.powi(exponent))
+        })])
+        .x_grid_spacer(plot::time_spacer())
+        .y_grid_spacer(plot::decade_spacer())
         .include_y(0.0)
         .include_y(2.0)
         .include_x(0.0)
@@ -213,16 +220,6 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
 
 fn point(report: &StepReport, error: f64) -> [f64; 2] {
     [report.elapsed_s, (100.0 * error).max(FLOOR_PERCENT).log10()]
-}
-
-/// A whole power of ten as per cent, and nothing between.
-fn decade(exponent: f64) -> String {
-    let is_whole = (exponent - exponent.round()).abs() < 1e-6;
-    if is_whole {
-        format!("{} %", 10_f64.powf(exponent.round()))
-    } else {
-        String::new()
-    }
 }
 
 /// Colours that tell neighbours apart, in turn.

@@ -2,6 +2,7 @@
 
 use eframe::egui;
 
+use super::counts_in;
 use crate::viewer::state::State;
 
 /// Show the list, where there is one.
@@ -16,9 +17,10 @@ pub fn left_out_ui(ui: &mut egui::Ui, state: &State) {
         .id_salt("left out")
         .show(ui, |ui| {
             for left_out in snapshot.left_out.iter() {
-                ui.label(&left_out.what)
-                    .on_hover_text(format!("{}; {}", left_out.reason, left_out.bound));
-                ui.weak(format!("since {}", left_out.reason));
+                let reason = counts_in(&left_out.reason);
+                ui.label(counts_in(&left_out.what))
+                    .on_hover_text(format!("{reason}; {}", left_out.bound));
+                ui.weak(format!("since {reason}"));
             }
         });
 }

@@ -24,14 +24,14 @@ const ENDS: [(LinkEnd, &str, &str); 2] = [
 
 const COLORS: [(LinkColor, &str, &str); 2] = [
     (
+        LinkColor::Strength,
+        "Strength",
+        "How much light the link brings, from the weakest to the strongest of those drawn; spaced logarithmically",
+    ),
+    (
         LinkColor::Visibility,
         "Visibility",
         "The part of the light that nothing blocks",
-    ),
-    (
-        LinkColor::Strength,
-        "Strength",
-        "How much light the link brings; spaced logarithmically",
     ),
 ];
 

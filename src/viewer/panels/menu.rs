@@ -4,12 +4,12 @@ use eframe::egui;
 
 use super::scene;
 use crate::viewer::{
-    action::Action,
+    action::{Action, Scale},
     bindings::{Binding, hint},
     camera::{AxisView, UpAxis},
     loader::SceneSource,
     state::State,
-    view::ViewMode,
+    view::{ToneMap, ViewMode},
 };
 
 /// Show the bar; wishes go into `actions`.
@@ -55,7 +55,7 @@ pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions:
 fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
     item(ui, table, actions, "Open…", Action::OpenDialog);
     if ui.button("Open by path…").clicked() {
-        state.panels.path = true;
+        state.panels.ask_for_path();
         ui.close();
     }
     ui.add_enabled_ui(!state.recent.files.is_empty(), |ui| {
@@ -118,34 +118,65 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         }
     });
     ui.separator();
-    item(
-        ui,
-        table,
-        actions,
-        "Element mesh over the light",
-        Action::ToggleEdges,
-    );
-    item(ui, table, actions, "Cluster boxes", Action::ToggleClusters);
-    item(
-        ui,
-        table,
-        actions,
-        "Links of what is picked",
-        Action::ToggleLinks,
-    );
-    if state.loaded.as_ref().is_none_or(|loaded| loaded.has_backs) {
-        item(ui, table, actions, "Backs of faces", Action::ToggleBacks);
+    let view = &state.view;
+    let has_backs = state.loaded.as_ref().is_none_or(|loaded| loaded.has_backs);
+    let toggles = [
+        (
+            "Element mesh over the light",
+            view.edges,
+            Action::ToggleEdges,
+        ),
+        ("Cluster boxes", view.clusters.shown, Action::ToggleClusters),
+        (
+            "Links of what is picked",
+            view.links.shown,
+            Action::ToggleLinks,
+        ),
+        ("Backs of faces", view.backs, Action::ToggleBacks),
+        (
+            "Automatic exposure",
+            view.auto_exposure,
+            Action::AutoExposure,
+        ),
+        (
+            "Tone map",
+            view.tone_map == ToneMap::Neutral,
+            Action::ToggleToneMap,
+        ),
+    ];
+    for (label, is_on, action) in toggles {
+        if has_backs || action != Action::ToggleBacks {
+            toggle(ui, table, actions, label, is_on, action);
+        }
     }
-    item(
+    ui.separator();
+    toggle(
         ui,
         table,
         actions,
-        "Automatic exposure",
-        Action::AutoExposure,
+        "Panels",
+        state.panels.shown,
+        Action::TogglePanels,
     );
-    ui.separator();
-    item(ui, table, actions, "Panels", Action::TogglePanels);
-    item(ui, table, actions, "Full screen", Action::ToggleFullScreen);
+    let is_full = ui.input(|input| input.viewport().fullscreen.unwrap_or(false));
+    toggle(
+        ui,
+        table,
+        actions,
+        "Full screen",
+        is_full,
+        Action::ToggleFullScreen,
+    );
+    let percent = (100.0 * ui.ctx().zoom_factor()).round();
+    ui.menu_button(format!("UI scale ({percent} %)"), |ui| {
+        for (label, scale) in [
+            ("Larger", Scale::Larger),
+            ("Smaller", Scale::Smaller),
+            ("As at first", Scale::Whole),
+        ] {
+            item(ui, table, actions, label, Action::Scale(scale));
+        }
+    });
     item(ui, table, actions, "Reset layout", Action::ResetLayout);
     ui.menu_button("Theme", theme_menu);
 }
@@ -197,6 +228,23 @@ fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mu
             actions.push(Action::Up(up));
             ui.close();
         }
+    }
+}
+
+/// An entry with its key, and a check mark where it is on.
+fn toggle(
+    ui: &mut egui::Ui,
+    table: &[Binding],
+    actions: &mut Vec<Action>,
+    label: &str,
+    mut is_on: bool,
+    action: Action,
+) {
+    let keys = egui::RichText::new(hint(table, &action)).weak();
+    let entry = egui::Checkbox::new(&mut is_on, (label, egui::Atom::grow(), keys));
+    if ui.add(entry).clicked() {
+        actions.push(action);
+        ui.close();
     }
 }
 

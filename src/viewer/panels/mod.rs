@@ -40,13 +40,43 @@ pub fn figure(value: f64) -> String {
         // A setting of 0.01 is a little less than that in single precision.
         let magnitude = (size * (1.0 + 1e-6)).log10().floor() as i32;
         let decimals = (2 - magnitude).max(0) as usize;
-        format!("{value:.decimals$}")
+        let text = format!("{value:.decimals$}");
+        match (decimals, text.strip_prefix('-')) {
+            (0, Some(digits)) => format!("-{}", in_groups(digits)),
+            (0, None) => in_groups(&text),
+            _ => text,
+        }
     }
+}
+
+/// What was typed as a number, with or without spaces between thousands.
+pub fn number(text: &str) -> Option<f64> {
+    let packed: String = text.split_whitespace().collect();
+    packed.parse().ok()
 }
 
 /// A count with thin spaces between thousands.
 pub fn count(value: u64) -> String {
-    let digits = value.to_string();
+    in_groups(&value.to_string())
+}
+
+/// A sentence whose whole numbers look like those of [`count`], however it groups them.
+pub fn counts_in(text: &str) -> String {
+    let alike = |word: &str| {
+        let is_end = |c: char| ",;:.()".contains(c);
+        let core = word.trim_matches(is_end);
+        let digits = core.replace(',', "");
+        match digits.parse() {
+            Ok(value) if core.starts_with(|c: char| c.is_ascii_digit()) => {
+                word.replacen(core, &count(value), 1)
+            }
+            _ => word.to_owned(),
+        }
+    };
+    text.split(' ').map(alike).collect::<Vec<_>>().join(" ")
+}
+
+fn in_groups(digits: &str) -> String {
     let mut text = String::with_capacity(digits.len() * 2);
     for (index, digit) in digits.chars().enumerate() {
         if index > 0 && (digits.len() - index).is_multiple_of(3) {
@@ -91,7 +121,8 @@ mod tests {
             (1.234_56, "1.23"),
             (f64::from(0.01_f32), "0.0100"),
             (12.3456, "12.3"),
-            (1234.5, "1234"),
+            (1234.5, "1\u{2009}234"),
+            (-995_100.0, "-995\u{2009}100"),
             (0.012_345, "0.0123"),
             (1.5e-6, "1.50e-6"),
         ];
@@ -101,5 +132,17 @@ mod tests {
         assert_eq!(count(1_234_567), "1\u{2009}234\u{2009}567");
         assert_eq!(count(999), "999");
         assert_eq!(seconds(75.2), "1 min 15 s");
+    }
+
+    #[test]
+    fn numbers_look_alike_and_are_read_as_they_look() {
+        for value in [0.5, 1234.0, 995_100.0, -995_100.0] {
+            assert_eq!(number(&figure(value)), Some(value));
+        }
+        assert_eq!(number("seven"), None);
+        let sentence = "20,000 triangles (1022 of them small), room-42879, 0.25, and 7.";
+        let wanted =
+            "20\u{2009}000 triangles (1\u{2009}022 of them small), room-42879, 0.25, and 7.";
+        assert_eq!(counts_in(sentence), wanted);
     }
 }

@@ -51,7 +51,7 @@ fn node_ui(
     let Some(patch_count) = node.patch_count else {
         let text = format!(
             "Element {} · {} links",
-            node.place.node.0,
+            count(u64::from(node.place.node.0)),
             count(u64::from(node.link_count))
         );
         ui.horizontal(|ui| {

@@ -1,13 +1,22 @@
 //! Residual and estimated error against run time.
 
 use eframe::egui;
-use egui_plot::{Legend, Line, Plot, PlotPoints};
+use egui_plot::{AxisHints, GridInput, GridMark, Line, Plot, PlotPoints};
 
-use super::figure;
-use crate::viewer::{state::State, theme};
+use super::count;
+use crate::{
+    solver::StepReport,
+    viewer::{state::State, theme},
+};
 
 /// Smallest value on the logarithmic axis.
 const FLOOR: f64 = 1e-9;
+
+/// Marks on an axis of time at most. More, and their labels touch each other in a narrow panel.
+const MOST_TIMES: f64 = 5.0;
+
+/// Marks on an axis of decades at most, for the same reason.
+const MOST_DECADES: f64 = 7.0;
 
 /// Show the plot, once there are two points.
 pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
@@ -16,37 +25,122 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         ui.weak("The plot begins with the second step.");
         return;
     }
-    let line = |name: &str, of: fn(&crate::solver::StepReport) -> f32| {
+    let line = |name: &'static str, of: fn(&StepReport) -> f32| {
         let points: PlotPoints<'_> = reports
             .iter()
             .map(|report| [report.elapsed_s, f64::from(of(report)).max(FLOOR).log10()])
             .collect();
         Line::new(name, points).width(2.0)
     };
+    let lines = [
+        (
+            "Error bound",
+            theme::SELECTED,
+            (|report| report.estimated_error) as fn(&StepReport) -> f32,
+        ),
+        ("Residual", theme::axis_color(2), |report| report.residual),
+    ];
+    // Above the plot: within it they would hide the lines.
+    ui.horizontal(|ui| {
+        for (name, color, _) in lines {
+            ui.colored_label(color, "—");
+            ui.label(name);
+        }
+    });
     Plot::new("residual")
-        .height(150.0)
-        .legend(Legend::default().position(egui_plot::Corner::RightTop))
+        .height(160.0)
         .allow_scroll(false)
         .allow_zoom(false)
         .allow_drag(false)
         .show_axes([true, true])
-        .x_axis_formatter(|mark, _| run_time(mark.value))
-        .y_axis_formatter(|mark, _| {
-            let whole = (mark.value - mark.value.round()).abs() < 1e-6;
-            if whole {
-                figure(10_f64.powf(mark.value))
-            } else {
-                String::new()
-            }
-        })
-        .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
+        .custom_x_axes(vec![time_axis()])
+        .custom_y_axes(vec![decade_axis(power_of_ten)])
+        .x_grid_spacer(time_spacer())
+        .y_grid_spacer(decade_spacer())
         .show(ui, |plot| {
-            plot.line(line("Residual", |report| report.residual).color(theme::axis_color(2)));
-            plot.line(line("Error bound", |report| report.estimated_error).color(theme::SELECTED));
+            for (name, color, of) in lines {
+                plot.line(line(name, of).color(color));
+            }
         });
 }
 
+/// An axis of run time whose marks all have labels.
+pub(super) fn time_axis() -> AxisHints<'static> {
+    AxisHints::new_x()
+        .formatter(|mark, _| run_time(mark.value))
+        .label_spacing(egui::Rangef::new(20.0, 30.0))
+}
+
+/// Marks at round numbers of seconds, few enough for labels.
+pub(super) fn time_spacer() -> impl Fn(GridInput) -> Vec<GridMark> {
+    egui_plot::uniform_grid_spacer(|input| {
+        let step = round_step(input.bounds.1 - input.bounds.0);
+        [step, step, step]
+    })
+}
+
+/// An axis of logarithms; `label` writes a whole one.
+pub(super) fn decade_axis(label: fn(i32) -> String) -> AxisHints<'static> {
+    AxisHints::new_y()
+        .formatter(move |mark, _| label(mark.value.round() as i32))
+        .label_spacing(egui::Rangef::new(10.0, 14.0))
+}
+
+/// Marks at whole decades, or at some of them where there are many.
+pub(super) fn decade_spacer() -> impl Fn(GridInput) -> Vec<GridMark> {
+    egui_plot::uniform_grid_spacer(|input| {
+        let step = ((input.bounds.1 - input.bounds.0) / MOST_DECADES)
+            .ceil()
+            .max(1.0);
+        [step, step, step]
+    })
+}
+
+/// The smallest of 1, 2, 5, 10, … that leaves at most [`MOST_TIMES`] steps in a range.
+fn round_step(range: f64) -> f64 {
+    let least = (range / MOST_TIMES).max(1e-3);
+    let power = 10_f64.powf(least.log10().floor());
+    let factor = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|factor| factor * power >= least * (1.0 - 1e-9));
+    factor.unwrap_or(10.0) * power
+}
+
+/// A whole power of ten as people write it.
+fn power_of_ten(exponent: i32) -> String {
+    match exponent {
+        0..=6 => count(10_u64.pow(exponent.unsigned_abs())),
+        -3..0 => format!("{}", 10_f64.powi(exponent)),
+        _ => format!("1e{exponent}"),
+    }
+}
+
 /// A mark on an axis of run time. Marks are round numbers but for their rounding.
-pub(super) fn run_time(seconds: f64) -> String {
+fn run_time(seconds: f64) -> String {
     format!("{} s", (1000.0 * seconds).round() / 1000.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_of_time_are_round_and_few() {
+        for (range, step) in [
+            (0.9, 0.2),
+            (5.0, 1.0),
+            (12.6, 5.0),
+            (61.0, 20.0),
+            (0.0, 1e-3),
+        ] {
+            let found = round_step(range);
+            assert!((found / step - 1.0).abs() < 1e-9, "{range}: {found}");
+        }
+    }
+
+    #[test]
+    fn powers_of_ten_are_short() {
+        let texts = [2, 0, -1, -3, -4].map(power_of_ten);
+        assert_eq!(texts, ["100", "1", "0.1", "0.001", "1e-4"]);
+    }
 }

@@ -27,7 +27,12 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
         );
         row::figure(ui, "Position", place, "In the file's units");
         let side = if pick.is_back { "back" } else { "front" };
-        row::figure(ui, "Triangle", format!("{} ({side})", pick.triangle.0), "");
+        row::figure(
+            ui,
+            "Triangle",
+            format!("{} ({side})", count(u64::from(pick.triangle.0))),
+            "",
+        );
         let name = if material.name.is_empty() {
             "default"
         } else {
@@ -57,7 +62,7 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             row::figure(
                 ui,
                 "Element",
-                probe.element.to_string(),
+                count(u64::from(probe.element)),
                 "Node of the hierarchy",
             );
             row::figure(

@@ -7,6 +7,7 @@ use crate::{
     solver::StepReport,
     viewer::{
         action::Action,
+        change::Change,
         state::{RunStatus, State},
         theme,
     },
@@ -15,15 +16,16 @@ use crate::{
 /// Show the run; wishes go into `actions`.
 pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let status = &state.run.status;
-    let steps = state.settings.max_steps.max(1);
+    let steps = state.settings.max_steps;
     let step = state.report().map_or(0, |report| report.step);
     let share = match status {
         RunStatus::Finished(_) => 1.0,
-        _ => step as f32 / steps as f32,
+        _ => step as f32 / steps.max(step + 1) as f32,
     };
     let text = match status {
-        RunStatus::Running => format!("Computing step {} of {steps}", (step + 1).min(steps)),
-        RunStatus::Paused => format!("Paused after step {step} of {steps}"),
+        RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
+        RunStatus::Paused => format!("Paused after {}", place(step, steps)),
+        RunStatus::Idle if state.loading.is_some() => "Reading the scene".to_owned(),
         _ => status.label(),
     };
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
@@ -34,7 +36,25 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
             format!("The solver failed: {message}"),
         );
     }
+    change_ui(ui, state);
     figures_ui(ui, state);
+}
+
+/// What the last change of settings did. Its room is always there, so that no slider moves away from the hand.
+fn change_ui(ui: &mut egui::Ui, state: &State) {
+    if state.loaded.is_none() {
+        return;
+    }
+    let room = egui::vec2(
+        ui.available_width(),
+        2.0 * ui.text_style_height(&egui::TextStyle::Body),
+    );
+    let (rect, _) = ui.allocate_exact_size(room, egui::Sense::hover());
+    if let Some(text) = state.run.last_change.as_ref().and_then(Change::label) {
+        // Beside the layout: a line that is a little higher moves nothing either.
+        ui.new_child(egui::UiBuilder::new().max_rect(rect))
+            .label(text);
+    }
 }
 
 fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) {
@@ -74,71 +94,85 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
             Action::Stop,
         );
         button(
-            "Reset",
+            "Begin again",
             *status != RunStatus::Idle,
-            "Begin the light again (Ctrl+R)",
+            "Light the scene anew (Ctrl+R)",
             Action::Reset,
         );
     });
 }
 
+/// The figures of the last step. Before the first, rows stand there without values, so that nothing below moves.
 fn figures_ui(ui: &mut egui::Ui, state: &State) {
-    let Some(report) = state.report() else { return };
+    if state.loaded.is_none() {
+        return;
+    }
+    let report = state.report();
     row::figures(ui, "progress", |ui| {
-        row::figure(
-            ui,
+        let mut row = |name: &str, value: &dyn Fn(&StepReport) -> String, explanation: &str| {
+            let value = report.map_or_else(|| "–".to_owned(), value);
+            row::figure(ui, name, value, explanation);
+        };
+        row(
             "Time",
-            seconds(report.elapsed_s),
+            &|report| seconds(report.elapsed_s),
             "Since the run began, without pauses",
         );
-        row::figure(
-            ui,
+        row(
             "Threshold ε",
-            figure(f64::from(report.epsilon)),
+            &|report| figure(f64::from(report.epsilon)),
             "Of the last step",
         );
-        row::figure(
-            ui,
+        row(
             "Transported",
-            transported(report).map_or_else(|| "–".to_owned(), share_text),
+            &|report| transported(report).map_or_else(|| "–".to_owned(), share_text),
             "Estimated part of the light that has found its place over the links of the last step. The rest, residual / \
              (1 − contraction), is still on its way between surfaces. Finer links change the light, too: that is what \
              the error bound tells",
         );
-        row::figure(
-            ui,
+        row(
             "Residual",
-            figure(f64::from(report.residual)),
+            &|report| figure(f64::from(report.residual)),
             "Change of the last sweep, relative to the total power",
         );
-        row::figure(
-            ui,
+        row(
             "Energy balance",
-            format!("{:.2} %", 100.0 * report.energy_balance),
+            &|report| format!("{:.2} %", 100.0 * report.energy_balance),
             "Light that arrived, of the light that left; 100 % in a closed scene",
         );
-        row::figure(
-            ui,
+        row(
             "Error bound",
-            format!("{} %", figure(f64::from(100.0 * report.estimated_error))),
-            "Sum of the intervals of all links, relative to the mean irradiance; far above the real error",
+            &|report| bound_text(report.estimated_error),
+            "The worst case: the intervals of all links together, relative to the mean irradiance. The real error is far \
+             below. 'Measured error' in the panel on the right tells it, once a reference is traced",
         );
-        row::figure(
-            ui,
+        row(
             "Links",
-            count(report.links),
+            &|report| count(report.links),
             "Pairs of nodes that exchange light",
         );
-        row::figure(ui, "Shadow rays", count(report.shadow_rays), "Shot so far");
-        row::figure(
-            ui,
+        row(
+            "Shadow rays",
+            &|report| count(report.shadow_rays),
+            "Shot so far",
+        );
+        row(
             "Memory",
-            bytes(report.memory_bytes),
+            &|report| bytes(report.memory_bytes),
             "Held by the solver",
         );
     });
-    for note in &report.notes {
+    for note in report.into_iter().flat_map(|report| &report.notes) {
         ui.colored_label(theme::warning(ui.visuals()), note);
+    }
+}
+
+/// Where a step stands. Light that is refined after its last step has steps beyond it, counted on.
+fn place(step: u32, steps: u32) -> String {
+    if step > steps {
+        format!("step {step}, refining further")
+    } else {
+        format!("step {step} of {steps}")
     }
 }
 
@@ -148,6 +182,15 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
 fn transported(report: &StepReport) -> Option<f64> {
     let rest = f64::from(report.residual) / (1.0 - f64::from(report.contraction));
     (report.contraction < 1.0 && rest.is_finite()).then(|| (1.0 - rest).max(0.0))
+}
+
+/// A bound of the error as per cent, where it says more than that all may be wrong.
+fn bound_text(bound: f32) -> String {
+    if bound < 1.0 {
+        format!("{} %", figure(f64::from(100.0 * bound)))
+    } else {
+        "over 100 %".to_owned()
+    }
 }
 
 /// A share as per cent. Rounded down: all of it is only what is all of it.
@@ -178,6 +221,19 @@ mod tests {
         assert_eq!(transported(&report(0.0, 0.0)), Some(1.0));
         assert_eq!(transported(&report(0.6, 0.9)), Some(0.0));
         assert_eq!(transported(&report(0.1, 1.0)), None);
+    }
+
+    #[test]
+    fn steps_are_counted_on_when_light_is_refined_after_the_last() {
+        assert_eq!(place(5, 5), "step 5 of 5");
+        assert_eq!(place(8, 5), "step 8, refining further");
+    }
+
+    #[test]
+    fn a_bound_is_a_figure_only_where_it_bounds() {
+        assert_eq!(bound_text(0.25), "25.0 %");
+        assert_eq!(bound_text(24.99), "over 100 %");
+        assert_eq!(bound_text(f32::INFINITY), "over 100 %");
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::{self, RichText};
+use eframe::egui::{self, RichText, text::CCursorRange};
 
+use super::counts_in;
 use crate::{
     scene::builtin::builtins,
     viewer::{
@@ -37,13 +38,15 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
                 actions.push(Action::OpenDialog);
             }
             ui.add_space(8.0);
-            path_ui(ui, state, actions);
+            if !state.panels.path {
+                path_ui(ui, state, actions);
+            }
             ui.add_space(14.0);
             ui.weak("Or begin with a built-in scene");
             ui.add_space(2.0);
             for builtin in builtins().iter().take(4) {
                 if ui
-                    .link(format!("{}: {}", builtin.name, builtin.summary))
+                    .link(format!("{}: {}", builtin.name, counts_in(builtin.summary)))
                     .clicked()
                 {
                     actions.push(Action::Load(SceneSource::Builtin(builtin.name.to_owned())));
@@ -85,27 +88,34 @@ fn lacks_errors(state: &State) -> bool {
 }
 
 /// A field for a path, for when there is no file dialog.
-pub fn path_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
+fn path_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let label = ui.label("Path");
         let field = egui::TextEdit::singleline(&mut state.panels.path_text)
             .hint_text("/home/me/scene.obj")
             .desired_width(ui.available_width() - 70.0);
-        let response = ui.add(field).labelled_by(label.id);
+        let mut shown = field.show(ui);
+        let response = shown.response.response.labelled_by(label.id);
+        if std::mem::take(&mut state.panels.path_is_asked) {
+            response.request_focus();
+            // What is typed replaces what was there.
+            let all = CCursorRange::select_all_str(&state.panels.path_text);
+            shown.state.cursor.set_char_range(Some(all));
+            shown.state.store(ui.ctx(), response.id);
+        }
         let entered =
             response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         let text = state.panels.path_text.trim();
-        let pressed = ui
-            .add_enabled(!text.is_empty(), egui::Button::new("Read"))
-            .clicked();
-        if (entered || pressed) && !text.is_empty() {
+        let can_read = !text.is_empty() && state.loading.is_none();
+        let pressed = ui.add_enabled(can_read, egui::Button::new("Read"));
+        if (entered || pressed.clicked()) && can_read {
             actions.push(Action::Load(SceneSource::File(PathBuf::from(text))));
-            state.panels.path = false;
+            state.panels.path_error = None;
         }
     });
 }
 
-/// The window with the field for a path.
+/// The window with the field for a path. It stays until a scene is read, or it is closed.
 pub fn path_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let mut open = state.panels.path;
     egui::Window::new("Open by path")
@@ -114,7 +124,12 @@ pub fn path_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Act
         .resizable(false)
         .default_width(420.0)
         .anchor(egui::Align2::CENTER_CENTER, [0.0, -60.0])
-        .show(ctx, |ui| path_ui(ui, state, actions));
+        .show(ctx, |ui| {
+            path_ui(ui, state, actions);
+            if let Some(error) = &state.panels.path_error {
+                ui.colored_label(theme::bad(ui.visuals()), error);
+            }
+        });
     state.panels.path &= open;
 }
 
@@ -123,7 +138,7 @@ pub fn builtin_menu(ui: &mut egui::Ui, actions: &mut Vec<Action>) {
     for builtin in builtins() {
         if ui
             .button(builtin.name)
-            .on_hover_text(builtin.summary)
+            .on_hover_text(counts_in(builtin.summary))
             .clicked()
         {
             actions.push(Action::Load(SceneSource::Builtin(builtin.name.to_owned())));

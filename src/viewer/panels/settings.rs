@@ -9,7 +9,6 @@ use crate::{
     scene::Sides,
     solver::SolveSettings,
     viewer::{action::Action, state::State},
-    worker::Effect,
 };
 
 /// Show the settings; wishes go into `actions`.
@@ -23,20 +22,6 @@ pub fn settings_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
         actions.push(Action::Settings(settings));
     }
     limits_ui(ui, state, actions);
-    if let Some(text) = state.run.last_effect.and_then(effect_text) {
-        ui.add_space(4.0);
-        ui.weak(text);
-    }
-}
-
-/// What the last change did.
-fn effect_text(effect: Effect) -> Option<&'static str> {
-    match effect {
-        Effect::Nothing => None,
-        Effect::Continues => Some("The change holds from the next step on; nothing is lost."),
-        Effect::Refines => Some("The light is refined further; nothing is lost."),
-        Effect::Restarts => Some("The change began the light again."),
-    }
 }
 
 fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
@@ -56,23 +41,36 @@ fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
     ui.horizontal(|ui| {
         let width = (ui.available_width() - 2.0 * ui.spacing().item_spacing.x) / 3.0;
         for (label, preset, explanation) in PRESETS {
-            // A preset sets the quality; seed and method stay as they are.
-            let with_preset = SolveSettings {
-                method: settings.method,
-                oracle: settings.oracle,
-                direct: settings.direct,
-                push: settings.push,
-                seed: settings.seed,
-                ..preset
+            let chosen = with_quality_of(&preset, settings);
+            let is_active = *settings == preset;
+            let (label, explanation) = if *settings == chosen && !is_active {
+                let but = "This quality is set, but something of the method, or the seed, differs from the preset";
+                (format!("{label} *"), format!("{explanation}. {but}"))
+            } else {
+                (label.to_owned(), explanation.to_owned())
             };
-            let button = egui::Button::selectable(*settings == with_preset, label)
+            let button = egui::Button::selectable(is_active, label)
                 .min_size(egui::vec2(width, 24.0))
                 .frame_when_inactive(true);
             if ui.add(button).on_hover_text(explanation).clicked() {
-                *settings = with_preset;
+                *settings = chosen;
             }
         }
     });
+}
+
+/// Settings with the quality of a preset. How light is computed stays, and so does the seed.
+fn with_quality_of(preset: &SolveSettings, settings: &SolveSettings) -> SolveSettings {
+    SolveSettings {
+        method: settings.method,
+        oracle: settings.oracle,
+        direct: settings.direct,
+        push: settings.push,
+        crease_degrees: settings.crease_degrees,
+        seed: settings.seed,
+        keep: settings.keep,
+        ..preset.clone()
+    }
 }
 
 fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
@@ -214,7 +212,7 @@ pub(super) fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> S
         .clamping(egui::SliderClamping::Never)
         .custom_formatter(|value, _| super::figure(value))
         .custom_parser(|text| {
-            let value = text.trim().parse::<f32>().ok()?;
+            let value = super::number(text)? as f32;
             (f32::MIN_POSITIVE..=f32::MAX)
                 .contains(&value)
                 .then_some(f64::from(value))

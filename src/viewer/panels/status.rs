@@ -4,6 +4,7 @@ use eframe::egui::{self, RichText};
 
 use super::{count, figure, seconds};
 use crate::viewer::{
+    change::Change,
     state::{Message, RunStatus, Severity, State},
     theme,
 };
@@ -21,7 +22,10 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
             RunStatus::Pausing | RunStatus::Paused => theme::warning(ui.visuals()),
             _ => ui.visuals().text_color(),
         };
-        ui.colored_label(color, state.run.status.label());
+        // There is a scene, it is only not there yet.
+        if state.loading.is_none() || state.run.status != RunStatus::Idle {
+            ui.colored_label(color, state.run.status.label());
+        }
         if let Some(report) = state.report() {
             let text = format!(
                 "Step {}   ε {}   Links {}   Vertices {}   {}",
@@ -48,7 +52,13 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
         Severity::Error => 2,
     };
     let Some(worst) = unseen.iter().max_by_key(rank) else {
-        hint_ui(ui);
+        // The panel of the run may be hidden, or scrolled away.
+        match state.run.last_change.as_ref().and_then(Change::label) {
+            Some(text) => {
+                ui.weak(text);
+            }
+            None => hint_ui(ui),
+        }
         return;
     };
     let color = match worst.severity {

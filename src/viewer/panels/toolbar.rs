@@ -8,6 +8,9 @@ use crate::viewer::{
     view::{ToneMap, ViewMode, ViewSettings},
 };
 
+/// Width of the exposure's value, for two digits before the point and a sign.
+const EXPOSURE_WIDTH: f32 = 76.0;
+
 /// Show the row; what is quick to change is changed in place, the rest goes into `actions`.
 pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     ui.horizontal_wrapped(|ui| {
@@ -69,11 +72,16 @@ fn exposure_ui(ui: &mut egui::Ui, view: &mut ViewSettings, actions: &mut Vec<Act
     let mut exposure = view.exposure;
     let slider = Slider::new(&mut exposure, -8.0..=8.0)
         .suffix(" EV")
-        .fixed_decimals(1)
+        .custom_formatter(|value, _| exposure_text(value))
         .step_by(0.1)
         .clamping(egui::SliderClamping::Never);
     let response = ui
-        .add(slider)
+        .scope(|ui| {
+            // As wide as the longest value, so that what follows stays in its place.
+            ui.spacing_mut().interact_size.x = EXPOSURE_WIDTH;
+            ui.add(slider)
+        })
+        .inner
         .labelled_by(label.id)
         .on_hover_text("Brightness of the picture, without computing anything (- and =)");
     if response.changed() {
@@ -94,6 +102,11 @@ fn exposure_ui(ui: &mut egui::Ui, view: &mut ViewSettings, actions: &mut Vec<Act
     } else {
         ToneMap::None
     };
+}
+
+/// An exposure with one decimal; what is rounded to 0 has no sign.
+fn exposure_text(value: f64) -> String {
+    format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0)
 }
 
 fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
@@ -119,5 +132,23 @@ fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
         ui.add(drag(low)).labelled_by(label.id);
         let label = ui.label("to");
         ui.add(drag(high)).labelled_by(label.id);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::exposure_text;
+
+    #[test]
+    fn no_exposure_is_no_less_than_nothing() {
+        let cases = [
+            (-0.04, "0.0"),
+            (0.04, "0.0"),
+            (-0.06, "-0.1"),
+            (12.3, "12.3"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(exposure_text(value), text);
+        }
     }
 }

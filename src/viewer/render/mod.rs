@@ -45,7 +45,7 @@ const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub enum RenderError {
     /// A buffer of the mesh is larger than the adapter takes.
     #[error(
-        "the mesh needs a buffer of {needed_mib} MiB and this graphics adapter takes {limit_mib}; raise the smallest element area, or the mesh tolerance, and reset"
+        "the mesh needs a buffer of {needed_mib} MiB and this graphics adapter takes {limit_mib}; raise the smallest element area, or the mesh tolerance, and begin again"
     )]
     MeshTooLarge {
         /// Size of the largest buffer.
