@@ -311,7 +311,7 @@ mod tests {
         let mut colors = lamp(1, |_, _| false);
         colors[1].radiosity = Vec4::splat(2.0);
         let mut bent = lamp(1, |_, _| false);
-        bent[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize();
+        bent[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize_or_zero();
         let mut materials = lamp(1, |_, _| false);
         materials[1].material = MaterialId(1);
         // The two sides of one triangle.
