@@ -131,6 +131,11 @@ impl DirectField {
         }
     }
 
+    /// Nothing is known any more: what was, came of too few rays.
+    pub(super) fn forget(&mut self) {
+        (self.vertices, self.centres) = (Vec::new(), Vec::new());
+    }
+
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid.
     pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
         let [a, b, c] = hierarchy.mesh.elements[element]

@@ -77,6 +77,10 @@ impl Cancel {
     }
 }
 
+/// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
+/// comes soon; the first step shoots them all.
+const FIRST_RAYS: usize = 1 << 20;
+
 /// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
 /// again costs more than the new ones.
 const THRESHOLD_FACTOR: f32 = 2.0;
@@ -189,7 +193,7 @@ impl Solver {
         let limits = self.direct_limits(1.0);
         self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
-            let (count, seed) = (limits.shadow_samples, limits.seed);
+            let (count, seed) = (first_samples(&self.hierarchy, limits), limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
         self.extend_to_new_elements();
@@ -339,8 +343,12 @@ impl Solver {
     /// Make direct light known at all vertices, and divide elements where it bends.
     fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(fineness);
+        let is_rough = first_samples(&self.hierarchy, limits) < limits.shadow_samples;
         self.is_full |= !self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
+            if self.step == 0 && is_rough {
+                field.forget();
+            }
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
             self.is_full |= field.is_full;
         }
@@ -491,6 +499,12 @@ impl Solver {
         }
         Some(epsilon)
     }
+}
+
+/// Shadow rays of a vertex for the first picture.
+fn first_samples(hierarchy: &Hierarchy, limits: adapt::Limits) -> u32 {
+    let each = FIRST_RAYS / hierarchy.mesh.vertices.len().max(1);
+    limits.shadow_samples.min(each.max(1) as u32)
 }
 
 /// A colour that is safe to show: finite and not negative.
