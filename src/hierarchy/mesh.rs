@@ -8,10 +8,12 @@
 use std::{collections::HashMap, ops::Range};
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::Patch;
-use crate::scene::Scene;
+use crate::{
+    geometry::{DisjointSets, HalfEdge, half_edges},
+    scene::Scene,
+};
 
 /// Levels of division at most: beyond, single precision cannot tell neighbours apart.
 const DEEPEST_LEVEL: u8 = 14;
@@ -398,43 +400,35 @@ fn share_vertices(
     crease_degrees: f32,
     cancelled: &dyn Fn() -> bool,
 ) -> Option<(Vec<Vertex>, Vec<[u32; 3]>)> {
-    let mut corner_group = Groups::new(corners.len() * 3);
-    // Half edges sorted by edge: neighbours are then adjacent. The last fields tell which corners they join.
-    let mut half_edges: Vec<(u32, u32, bool, u32, u8)> = Vec::with_capacity(corners.len() * 3);
-    for (patch, points) in corners.iter().enumerate() {
-        for side in 0..3 {
-            let (a, b) = (points[side], points[(side + 1) % 3]);
-            half_edges.push((a.min(b), a.max(b), a < b, patch as u32, side as u8));
-        }
-    }
-    half_edges.par_sort_unstable();
+    let mut corner_group = DisjointSets::new(corners.len() * 3);
+    let half_edges = half_edges(corners.iter().copied());
     if cancelled() {
         return None;
     }
     let smooth = crease_degrees.to_radians().cos();
-    for run in half_edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let first_down = run.partition_point(|half| !half.2);
+    for run in half_edges.chunk_by(|a, b| a.ends == b.ends) {
+        let first_down = run.partition_point(|half| !half.is_forward);
         let (down, up) = run.split_at(first_down);
         let down = &down[..down.len().min(MOST_NEIGHBOURS)];
         for one in up {
-            let likeness = |other: &&(u32, u32, bool, u32, u8)| {
-                patches[one.3 as usize]
+            let likeness = |other: &&HalfEdge| {
+                patches[one.triangle as usize]
                     .normal
-                    .dot(patches[other.3 as usize].normal)
+                    .dot(patches[other.triangle as usize].normal)
             };
             let best = down
                 .iter()
                 .max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
             let Some(other) = best else { continue };
-            if likeness(&other) >= smooth && same_material(scene, patches, one.3, other.3) {
-                let (a, b) = (
-                    one.3 * 3 + u32::from(one.4),
-                    one.3 * 3 + u32::from((one.4 + 1) % 3),
-                );
-                let (c, d) = (
-                    other.3 * 3 + u32::from(other.4),
-                    other.3 * 3 + u32::from((other.4 + 1) % 3),
-                );
+            if likeness(&other) >= smooth
+                && same_material(scene, patches, one.triangle, other.triangle)
+            {
+                let ends = |half: &HalfEdge| {
+                    let corner = |side: u32| half.triangle * 3 + side;
+                    let side = u32::from(half.side);
+                    (corner(side), corner((side + 1) % 3))
+                };
+                let ((a, b), (c, d)) = (ends(one), ends(other));
                 // They run in opposite directions: the start of one is the end of the other.
                 corner_group.join(a, d);
                 corner_group.join(b, c);
@@ -452,7 +446,7 @@ fn share_vertices(
         .map(|(patch, points)| {
             std::array::from_fn(|side| {
                 let slot =
-                    &mut vertex_of_group[corner_group.find((patch * 3 + side) as u32) as usize];
+                    &mut vertex_of_group[corner_group.root((patch * 3 + side) as u32) as usize];
                 if *slot == u32::MAX {
                     *slot = vertices.len() as u32;
                     vertices.push(Vertex {
@@ -470,27 +464,4 @@ fn share_vertices(
 fn same_material(scene: &Scene, patches: &[Patch], a: u32, b: u32) -> bool {
     let material = |patch: u32| scene.triangles[patches[patch as usize].triangle.index()].material;
     material(a) == material(b)
-}
-
-/// Disjoint sets over the corners.
-struct Groups(Vec<u32>);
-
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn find(&mut self, mut item: u32) -> u32 {
-        while self.0[item as usize] != item {
-            let above = self.0[self.0[item as usize] as usize];
-            self.0[item as usize] = above;
-            item = above;
-        }
-        item
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.find(a), self.find(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
 }

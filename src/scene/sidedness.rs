@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Sides, Triangle};
+use crate::geometry::{DisjointSets, half_edges};
 
 /// The shells of a scene.
 #[derive(Clone, Debug)]
@@ -95,15 +96,15 @@ fn sorted_corners([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
 impl Shells {
     /// Find the shells; takes the time of sorting the edges.
     pub(super) fn of(triangles: &[Triangle]) -> Self {
-        let edges = sorted_edges(triangles);
+        let edges = half_edges(triangles.iter().map(|triangle| triangle.corners));
         // Connect triangles over shared edges.
-        let mut forest = Forest::new(triangles.len());
+        let mut forest = DisjointSets::new(triangles.len());
         let mut open = Vec::new();
         for group in edges.chunk_by(|a, b| a.ends == b.ends) {
             for pair in group.windows(2) {
                 forest.join(pair[0].triangle, pair[1].triangle);
             }
-            if group.len() != 2 || group[0].forward == group[1].forward {
+            if group.len() != 2 || group[0].is_forward == group[1].is_forward {
                 open.push(group[0].triangle);
             }
         }
@@ -127,60 +128,6 @@ impl Shells {
             of_triangle,
             closed,
         }
-    }
-}
-
-/// An edge of a triangle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Edge {
-    /// Smaller and larger corner.
-    ends: (u32, u32),
-    triangle: u32,
-    /// Whether the triangle runs from the smaller to the larger.
-    forward: bool,
-}
-
-fn sorted_edges(triangles: &[Triangle]) -> Vec<Edge> {
-    let mut edges = Vec::with_capacity(triangles.len() * 3);
-    for (number, triangle) in triangles.iter().enumerate() {
-        let [a, b, c] = triangle.corners;
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            edges.push(Edge {
-                ends: (from.min(to), from.max(to)),
-                triangle: number as u32,
-                forward: from < to,
-            });
-        }
-    }
-    edges.sort_unstable();
-    edges
-}
-
-/// Disjoint sets with path halving.
-struct Forest {
-    parent: Vec<u32>,
-}
-
-impl Forest {
-    fn new(count: usize) -> Self {
-        Self {
-            parent: (0..count as u32).collect(),
-        }
-    }
-
-    fn root(&mut self, mut item: u32) -> u32 {
-        while self.parent[item as usize] != item {
-            let grandparent = self.parent[self.parent[item as usize] as usize];
-            self.parent[item as usize] = grandparent;
-            item = grandparent;
-        }
-        item
-    }
-
-    /// Join two sets; the smaller root stays, so that the outcome does not depend on anything else.
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b) as usize] = a.min(b);
     }
 }
 

@@ -30,6 +30,8 @@ const PLACES: f32 = 16_384.0;
 /// An emitting patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Emitter {
+    /// Indices into [`Scene::positions`], as the side that emits is wound.
+    pub vertices: [u32; 3],
     pub corners: [Vec3; 3],
     pub normal: Vec3,
     pub area: f32,
@@ -87,9 +89,11 @@ impl Lights {
             .filter(|(_, is_sampled)| **is_sampled);
         let emitters: Vec<Emitter> = sampled
             .map(|(patch, _)| {
-                let [a, b, c] = scene.corners(patch.triangle);
+                let [a, b, c] = scene.triangles[patch.triangle.index()].corners;
+                let vertices = if patch.is_back { [a, c, b] } else { [a, b, c] };
                 Emitter {
-                    corners: if patch.is_back { [a, c, b] } else { [a, b, c] },
+                    vertices,
+                    corners: vertices.map(|vertex| scene.positions[vertex as usize]),
                     normal: patch.normal,
                     area: patch.area,
                     triangle: patch.triangle,

@@ -9,7 +9,7 @@ use std::{collections::HashMap, f32::consts::PI, ops::Range};
 use glam::Vec3;
 
 use super::direct::{Emitter, Receiver};
-use crate::geometry::outline_irradiance;
+use crate::geometry::{DisjointSets, HalfEdge, half_edges, outline_irradiance};
 
 /// Normals whose cosine is at least this belong to one plane.
 const SAME_PLANE: f32 = 1.0 - 1e-6;
@@ -25,6 +25,13 @@ const LOW: f32 = 1e-3;
 
 /// Edges of which the sine of the angle is no larger run on as one.
 const STRAIGHT: f32 = 1e-5;
+
+/// Emitters that are looked at across an edge to find the one that continues another. All, and thousands on one edge
+/// take the square of their number.
+const MOST_NEIGHBOURS: usize = 64;
+
+/// A corner of an emitter: its place in the scene's list of points, and where that is.
+type Corner = (u32, Vec3);
 
 /// Emitters of one material and radiosity that lie in one plane and hang together by edges.
 #[derive(Clone, Debug)]
@@ -95,28 +102,31 @@ impl Panel {
 /// Sort emitters so that those of a panel follow each other, and find the panels. Both stay in the order of the first
 /// emitter of each panel.
 pub(super) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
-    let edges = edges(emitters);
-    let (mut roots, mut is_inner) = (
-        (0..emitters.len()).collect::<Vec<usize>>(),
+    let (mut sets, mut is_inner) = (
+        DisjointSets::new(emitters.len()),
         vec![[false; 3]; emitters.len()],
     );
+    let edges = half_edges(emitters.iter().map(|emitter| emitter.vertices));
+    let emitter_of = |edge: &HalfEdge| &emitters[edge.triangle as usize];
     for same in edges.chunk_by(|a, b| a.ends == b.ends) {
         for (at, one) in same.iter().enumerate() {
-            let other = same[at + 1..].iter().find(|other| {
+            let is_free = |edge: &HalfEdge| !is_inner[edge.triangle as usize][edge.side as usize];
+            let mut others = same[at + 1..].iter().take(MOST_NEIGHBOURS);
+            let other = others.find(|other| {
                 one.is_forward != other.is_forward
-                    && !is_inner[other.emitter][other.number]
-                    && emitters[one.emitter].continues(&emitters[other.emitter])
+                    && is_free(other)
+                    && emitter_of(one).continues(emitter_of(other))
             });
-            if let Some(other) = other.filter(|_| !is_inner[one.emitter][one.number]) {
-                is_inner[one.emitter][one.number] = true;
-                is_inner[other.emitter][other.number] = true;
-                let pair = [one.emitter, other.emitter].map(|emitter| root(&mut roots, emitter));
-                roots[pair[0].max(pair[1])] = pair[0].min(pair[1]);
+            if let Some(other) = other.filter(|_| is_free(one)) {
+                for edge in [one, other] {
+                    is_inner[edge.triangle as usize][edge.side as usize] = true;
+                }
+                sets.join(one.triangle, other.triangle);
             }
         }
     }
-    let mut order: Vec<(usize, usize)> = (0..emitters.len())
-        .map(|emitter| (root(&mut roots, emitter), emitter))
+    let mut order: Vec<(u32, usize)> = (0..emitters.len())
+        .map(|emitter| (sets.root(emitter as u32), emitter))
         .collect();
     order.sort_unstable();
     let mut panels = Vec::new();
@@ -155,13 +165,17 @@ fn panel(
         _ => members[0].corners[0],
     };
     let edges = members.iter().zip(inner).flat_map(|(emitter, inner)| {
-        let [a, b, c] = emitter.corners;
-        let sides = [[a, b], [b, c], [c, a]].into_iter().zip(inner);
+        let corner = |at: usize| (emitter.vertices[at], emitter.corners[at]);
+        let sides = [0, 1, 2].map(|side| [corner(side), corner((side + 1) % 3)]);
+        let sides = sides.into_iter().zip(inner);
         sides
             .filter(|(_, is_inner)| !is_inner)
             .map(|(side, _)| side)
     });
-    let outline = straightened(edges.collect());
+    let outline: Vec<[Vec3; 2]> = straightened(edges.collect())
+        .into_iter()
+        .map(|ends| ends.map(|(_, point)| point))
+        .collect();
     let corners = outline.iter().map(|[start, _]| start.distance(centre));
     Panel {
         emitters: range,
@@ -173,46 +187,18 @@ fn panel(
     }
 }
 
-/// One side of an emitter.
-struct Edge {
-    /// Its ends, the lesser first.
-    ends: [[u32; 3]; 2],
-    /// Whether the emitter has them in this order.
-    is_forward: bool,
-    emitter: usize,
-    number: usize,
-}
-
-/// All sides of all emitters, those between the same points together.
-fn edges(emitters: &[Emitter]) -> Vec<Edge> {
-    let mut edges: Vec<Edge> = Vec::with_capacity(3 * emitters.len());
-    for (index, emitter) in emitters.iter().enumerate() {
-        for number in 0..3 {
-            let [from, to] = [number, (number + 1) % 3].map(|at| key(emitter.corners[at]));
-            edges.push(Edge {
-                ends: [from.min(to), from.max(to)],
-                is_forward: from < to,
-                emitter: index,
-                number,
-            });
-        }
-    }
-    edges.sort_unstable_by_key(|edge| (edge.ends, edge.emitter, edge.number));
-    edges
-}
-
 /// The same outline with fewer edges: those that run on straight become one.
-fn straightened(mut edges: Vec<[Vec3; 2]>) -> Vec<[Vec3; 2]> {
-    let mut starting: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
-    for (index, &[start, _]) in edges.iter().enumerate() {
-        starting.entry(key(start)).or_default().push(index);
+fn straightened(mut edges: Vec<[Corner; 2]>) -> Vec<[Corner; 2]> {
+    let mut starting: HashMap<u32, Vec<usize>> = HashMap::new();
+    for (index, [start, _]) in edges.iter().enumerate() {
+        starting.entry(start.0).or_default().push(index);
     }
     let mut is_part = vec![false; edges.len()];
     for index in 0..edges.len() {
         // Where outlines touch in a corner, nobody can say which edge goes on.
-        while let Some(&[next]) = starting.get(&key(edges[index][1])).map(Vec::as_slice) {
+        while let Some(&[next]) = starting.get(&edges[index][1].0).map(Vec::as_slice) {
             let ([start, end], [_, last]) = (edges[index], edges[next]);
-            let (along, on) = (end - start, last - end);
+            let (along, on) = (end.1 - start.1, last.1 - end.1);
             let bend = along.cross(on).length();
             let is_straight =
                 along.dot(on) > 0.0 && bend <= STRAIGHT * along.length() * on.length();
@@ -226,19 +212,6 @@ fn straightened(mut edges: Vec<[Vec3; 2]>) -> Vec<[Vec3; 2]> {
     let mut parts = is_part.into_iter();
     edges.retain(|_| !parts.next().unwrap_or_default());
     edges
-}
-
-/// What equal points have in common: adding 0 leaves one kind of zero.
-fn key(point: Vec3) -> [u32; 3] {
-    (point + 0.0).to_array().map(f32::to_bits)
-}
-
-fn root(roots: &mut [usize], mut at: usize) -> usize {
-    while roots[at] != at {
-        roots[at] = roots[roots[at]];
-        at = roots[at];
-    }
-    at
 }
 
 impl Emitter {
@@ -262,16 +235,22 @@ mod tests {
 
     /// A lamp of `n` by `n` squares from 0 to 1 in the plane z = 1 that looks down, without those that `is_hole` names.
     fn lamp(n: usize, is_hole: impl Fn(usize, usize) -> bool) -> Vec<Emitter> {
-        let at = |x: usize, y: usize| Vec3::new(x as f32, y as f32, n as f32) / n as f32;
+        let vertex = |x: usize, y: usize| (x * (n + 1) + y) as u32;
+        let point = |vertex: u32| {
+            let (x, y) = (vertex as usize / (n + 1), vertex as usize % (n + 1));
+            Vec3::new(x as f32, y as f32, n as f32) / n as f32
+        };
         let mut emitters: Vec<Emitter> = Vec::new();
         for (x, y) in (0..n).flat_map(|x| (0..n).map(move |y| (x, y))) {
             if is_hole(x, y) {
                 continue;
             }
-            let [a, b, c, d] = [at(x, y), at(x, y + 1), at(x + 1, y + 1), at(x + 1, y)];
-            for corners in [[a, b, c], [a, c, d]] {
+            let [a, b, c, d] =
+                [(x, y), (x, y + 1), (x + 1, y + 1), (x + 1, y)].map(|(x, y)| vertex(x, y));
+            for vertices in [[a, b, c], [a, c, d]] {
                 emitters.push(Emitter {
-                    corners,
+                    vertices,
+                    corners: vertices.map(point),
                     normal: Vec3::NEG_Z,
                     area: 0.5 / (n * n) as f32,
                     triangle: TriangleId(emitters.len() as u32),
@@ -316,8 +295,10 @@ mod tests {
         materials[1].material = MaterialId(1);
         // The two sides of one triangle.
         let mut sides = lamp(1, |_, _| false);
+        let turned = |[a, b, c]: [u32; 3]| [a, c, b];
         let [a, b, c] = sides[0].corners;
         sides[1] = Emitter {
+            vertices: turned(sides[0].vertices),
             corners: [a, c, b],
             normal: Vec3::Z,
             ..sides[0]
