@@ -1,12 +1,10 @@
-//! Shapes and rays: area vectors, shared edges, the exact irradiance of a polygon, sampling, occlusion.
+//! Shapes and rays: area vectors, the exact irradiance of a polygon, sampling, occlusion.
 //! Everything here is in frame units and knows nothing of light.
 
-mod edges;
 mod polygon;
 mod rays;
 mod sampling;
 
-pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance};
 pub use rays::{Hit, RAY_OFFSET, RayTree};
 pub use sampling::{Random, cosine_direction, low_discrepancy_2d, triangle_point};

@@ -10,10 +10,7 @@ use std::{collections::HashMap, ops::Range};
 use glam::Vec3;
 
 use super::Patch;
-use crate::{
-    geometry::{DisjointSets, HalfEdge, half_edges},
-    scene::Scene,
-};
+use crate::scene::{DisjointSets, HalfEdge, Scene, half_edges};
 
 /// Levels of division at most: beyond, single precision cannot tell neighbours apart.
 const DEEPEST_LEVEL: u8 = 14;

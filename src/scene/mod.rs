@@ -8,6 +8,7 @@
 mod build;
 pub mod builtin;
 mod clean;
+mod edges;
 mod frame;
 mod lines;
 mod locate;
@@ -23,6 +24,7 @@ mod whole;
 mod write;
 
 pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, Source};
+pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
 pub use relight::Appearance;

@@ -9,8 +9,7 @@ use std::f32::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Sides, Triangle};
-use crate::geometry::{DisjointSets, half_edges};
+use super::{DisjointSets, Sides, Triangle, half_edges};
 
 /// The shells of a scene.
 #[derive(Clone, Debug)]

@@ -9,7 +9,10 @@ use std::{collections::HashMap, f32::consts::PI, ops::Range};
 use glam::Vec3;
 
 use super::direct::{Emitter, Receiver};
-use crate::geometry::{DisjointSets, HalfEdge, half_edges, outline_irradiance};
+use crate::{
+    geometry::outline_irradiance,
+    scene::{DisjointSets, HalfEdge, half_edges},
+};
 
 /// Normals whose cosine is at least this belong to one plane.
 const SAME_PLANE: f32 = 1.0 - 1e-6;
