@@ -1,4 +1,5 @@
-//! Elements: patches divided into four, again and again, on vertices that neighbours share.
+//! Elements: patches divided into four, again and again, on vertices that neighbours share. Long thin ones are halved
+//! across, so that their parts become less so.
 //!
 //! Points and vertices are kept apart. A point is a place; an edge between two points has one midpoint, whoever
 //! divides it, so that no crack can open. A vertex is a point as one smooth surface sees it: faces on both sides of a
@@ -15,12 +16,15 @@ use crate::scene::{DisjointSets, HalfEdge, Scene, half_edges};
 /// Levels of division at most: beyond, single precision cannot tell neighbours apart.
 const DEEPEST_LEVEL: u8 = 14;
 
+/// Triangles that are longer than so many times their height are halved and not quartered: quarters would be as thin.
+const SLIVER: f32 = 3.0;
+
 /// A triangle that receives and sends as one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Element {
     /// Indices into [`Mesh::vertices`], counter-clockwise from the lit side.
     pub vertices: [u32; 3],
-    /// First of four adjacent children, or [`Element::LEAF`].
+    /// First of two or four adjacent children of the same area, or [`Element::LEAF`].
     pub first_child: u32,
     /// The patch it lies on.
     pub patch: u32,
@@ -28,6 +32,11 @@ pub struct Element {
     pub parent: u32,
     /// Divisions between the patch and this.
     pub level: u8,
+    /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that is
+    /// not known.
+    pub covered: u8,
+    /// Number of children: 0, 2 or 4.
+    pub child_count: u8,
     /// Mean of the corners.
     pub centroid: Vec3,
     /// Largest distance of a corner from the centroid.
@@ -40,18 +49,39 @@ impl Element {
     /// Stands for missing children.
     pub const LEAF: u32 = u32::MAX;
 
+    /// Stands for [`Element::covered`] where it is not known.
+    pub const UNPROBED: u8 = u8::MAX;
+
+    /// [`Element::covered`] where all of it lies within a solid.
+    const BURIED: u8 = 0b1111;
+
+    /// Whether it lies within a solid in part.
+    pub fn is_contact(&self) -> bool {
+        !matches!(self.covered, 0 | Self::BURIED | Self::UNPROBED)
+    }
+
+    /// Whether none of it is known to lie within a solid.
+    pub fn is_open(&self) -> bool {
+        matches!(self.covered, 0 | Self::UNPROBED)
+    }
+
+    /// Whether a corner is known to lie within a solid.
+    pub fn is_covered(&self, side: usize) -> bool {
+        self.covered != Self::UNPROBED && self.covered & (1 << side) != 0
+    }
+
     /// Whether it has no children.
     pub fn is_leaf(&self) -> bool {
         self.first_child == Self::LEAF
     }
 
-    /// Its four children among the elements; none of a leaf.
+    /// Its children among the elements; none of a leaf.
     pub fn children(&self) -> Range<usize> {
         if self.is_leaf() {
             return 0..0;
         }
         let first = self.first_child as usize;
-        first..first + 4
+        first..first + usize::from(self.child_count)
     }
 }
 
@@ -146,6 +176,8 @@ impl Mesh {
             patch,
             parent,
             level,
+            covered: Element::UNPROBED,
+            child_count: 0,
             centroid,
             radius,
             area_vector,
@@ -212,11 +244,12 @@ impl Mesh {
             }
             self.divide_one(index);
             // Where others are much finer already, the children are still too coarse.
-            let first = self.elements[index as usize].first_child;
-            pending.extend((first..first + 4).filter(|&child| self.hangs_twice(child as usize)));
+            let children = self.elements[index as usize].children();
+            let hanging = children.filter(|&child| self.hangs_twice(child));
+            pending.extend(hanging.map(|child| child as u32));
             // An edge of the new children may lie on a neighbour's half edge: then the neighbour is two levels
             // above and must be divided, too.
-            for half in self.half_edges_of_parent(index) {
+            for half in self.edges_above(index) {
                 if let Some(coarse) = self.leaf_over(half) {
                     pending.extend(coarse);
                 }
@@ -248,16 +281,17 @@ impl Mesh {
                 leaves.retain(|&leaf| leaf != index);
             }
         }
-        let [a, b, c] = parent.vertices;
-        let (ab, bc, ca) = (self.middle(a, b), self.middle(b, c), self.middle(c, a));
+        let children = self.parts(parent.vertices, parent.area_vector.length());
+        let share = 1.0 / children.len() as f32;
         self.elements[index as usize].first_child = self.elements.len() as u32;
-        for vertices in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]] {
+        self.elements[index as usize].child_count = children.len() as u8;
+        for vertices in children {
             let child = self.element(
                 vertices,
                 parent.patch,
                 index,
                 parent.level + 1,
-                parent.area_vector * 0.25,
+                parent.area_vector * share,
             );
             let child_index = self.elements.len() as u32;
             self.elements.push(child);
@@ -267,15 +301,41 @@ impl Mesh {
         }
     }
 
-    /// Edges whose midpoint is an end of a half edge of the divided element: the edges that its own edges are halves
-    /// of, where a leaf may still lie undivided.
-    fn half_edges_of_parent(&self, index: u32) -> Vec<(u32, u32)> {
-        let element = self.elements[index as usize];
-        if element.parent == u32::MAX {
-            return Vec::new();
+    /// The parts of equal area that a triangle is divided into.
+    fn parts(&mut self, vertices: [u32; 3], area: f32) -> Vec<[u32; 3]> {
+        let corners = vertices.map(|vertex| self.position(vertex));
+        let squares = [0, 1, 2].map(|side| corners[side].distance_squared(corners[(side + 1) % 3]));
+        let longest = (1..3).fold(0, |best, side| {
+            if squares[side] > squares[best] {
+                side
+            } else {
+                best
+            }
+        });
+        // The height is twice the area over the longest side.
+        if squares[longest] > SLIVER * 2.0 * area {
+            let [a, b, c] = [0, 1, 2].map(|turn| vertices[(longest + turn) % 3]);
+            let ab = self.middle(a, b);
+            return vec![[a, ab, c], [ab, b, c]];
         }
-        self.point_edges(self.elements[element.parent as usize].vertices)
-            .to_vec()
+        let [a, b, c] = vertices;
+        let (ab, bc, ca) = (self.middle(a, b), self.middle(b, c), self.middle(c, a));
+        vec![[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
+    }
+
+    /// Edges that those of the divided element are halves of, where a leaf may still lie undivided.
+    fn edges_above(&self, index: u32) -> Vec<(u32, u32)> {
+        let mut edges = Vec::new();
+        let mut above = self.elements[index as usize].parent;
+        while let Some(element) = self.elements.get(above as usize) {
+            edges.extend(self.point_edges(element.vertices));
+            // Halves keep edges of what they are halves of.
+            if element.child_count == 4 {
+                break;
+            }
+            above = element.parent;
+        }
+        edges
     }
 
     /// Leaves that have a whole edge where others already have quarters of it.

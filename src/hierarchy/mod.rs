@@ -267,10 +267,10 @@ impl Hierarchy {
                     cluster.first_child..cluster.first_child + 2
                 }
             }
-            Kind::Element(index) => match self.mesh.elements[index].first_child {
-                Element::LEAF => 0..0,
-                first => base + first..base + first + 4,
-            },
+            Kind::Element(index) => {
+                let children = self.mesh.elements[index].children();
+                base + children.start as u32..base + children.end as u32
+            }
         }
     }
 

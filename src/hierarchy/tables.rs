@@ -97,7 +97,8 @@ impl Tables {
                 continue;
             }
             let children = element.children();
-            self.elements[index] = self.elements[children.clone()].iter().sum::<Vec4>() * 0.25;
+            let sum: Vec4 = self.elements[children.clone()].iter().sum();
+            self.elements[index] = sum / f32::from(element.child_count);
             self.brightest_in_elements[index] = self.brightest_in_elements[children.clone()]
                 .iter()
                 .fold(Vec4::ZERO, |most, value| most.upper_of(*value));

@@ -67,9 +67,10 @@ impl Hierarchy {
                 {
                     return Err(format!("element {index}: a child does not belong to it"));
                 }
-                if child.area_vector != element.area_vector * 0.25 {
+                let share = 1.0 / f32::from(element.child_count);
+                if child.area_vector != element.area_vector * share {
                     return Err(format!(
-                        "element {index}: a child has not a quarter of its area"
+                        "element {index}: a child has not its share of the area"
                     ));
                 }
             }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
+    contact::{carry_over, told_by},
     direct::{DirectLight, Lights, Receiver},
     reconstruct::{LeafLight, project},
     smooth,
@@ -160,7 +161,10 @@ impl DirectField {
                 self.lights.bounded(unoccluded * fraction)
             })
             .collect();
-        let centres = hierarchy.mesh.leaves().filter_map(|leaf| {
+        let told = told_by(&hierarchy.mesh, |element, side| !element.is_covered(side));
+        carry_over(&hierarchy.mesh, told, &mut self.shown);
+        let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_open();
+        let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
             let centre = self.centres.get(leaf).copied().flatten()?;
             Some((leaf, self.lights.bounded(centre.irradiance())))
         });
@@ -269,7 +273,8 @@ impl DirectField {
             .mesh
             .held_leaves()
             .filter(|&leaf| {
-                self.centres[leaf].is_none()
+                hierarchy.mesh.elements[leaf].is_open()
+                    && self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
                         || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
             })
@@ -311,7 +316,8 @@ impl DirectField {
                 let Some(centre) = self.centres.get(leaf).copied().flatten() else {
                     return false;
                 };
-                if area * 0.25 < limits.min_area {
+                // What reaches into a solid was divided as far as it shall be.
+                if !element.is_open() || area * 0.25 < limits.min_area {
                     return false;
                 }
                 let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));

@@ -190,7 +190,7 @@ impl DirectField {
     }
 
     /// Where to sample each corner of a leaf that is wanted: a little inside the leaf whose normal is nearest to the mean
-    /// normal about the vertex.
+    /// normal about the vertex, of those that are not within a solid there.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
@@ -203,18 +203,19 @@ impl DirectField {
                 normals[vertex as usize] += mesh.elements[leaf].area_vector;
             }
         }
-        let mut chosen: Vec<Option<(f32, u32)>> = vec![None; mesh.vertices.len()];
+        let mut chosen: Vec<Option<((bool, f32), u32)>> = vec![None; mesh.vertices.len()];
         for leaf in mesh.held_leaves() {
-            let normal = hierarchy.patch_of(leaf).normal;
-            for vertex in mesh.elements[leaf].vertices.map(|vertex| vertex as usize) {
-                let likeness = normals[vertex].dot(normal);
-                let is_best = chosen[vertex].is_none_or(|(best, _)| likeness > best);
+            let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
+            for (side, vertex) in element.vertices.into_iter().enumerate() {
+                let vertex = vertex as usize;
+                let fitness = (!element.is_covered(side), normals[vertex].dot(normal));
+                let is_best = chosen[vertex].is_none_or(|(best, _)| fitness > best);
                 if is_best && is_wanted(vertex, self.vertices[vertex]) {
-                    chosen[vertex] = Some((likeness, leaf as u32));
+                    chosen[vertex] = Some((fitness, leaf as u32));
                 }
             }
         }
-        let receiver = |(vertex, choice): (usize, Option<(f32, u32)>)| {
+        let receiver = |(vertex, choice): (usize, Option<((bool, f32), u32)>)| {
             let (_, leaf) = choice?;
             let patch = hierarchy.patch_of(leaf as usize);
             let centroid = mesh.elements[leaf as usize].centroid;

@@ -9,6 +9,7 @@ mod anderson;
 mod budget;
 mod clear;
 mod closure;
+mod contact;
 mod cover;
 mod direct;
 mod display;
@@ -192,6 +193,7 @@ impl Solver {
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(1.0);
         self.divide_coarse(limits);
+        self.divide_contacts(limits, cancel)?;
         if let Some(field) = &mut self.direct {
             let (count, seed) = (first_samples(&self.hierarchy, limits), limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
@@ -241,6 +243,7 @@ impl Solver {
         cancel.proceed()?;
         self.estimate_mean();
         report.epsilon = self.refine(report.epsilon, cancel)?;
+        self.probe_contacts(self.direct_limits(1.0), cancel)?;
         self.iterate(&mut report, cancel)?;
         self.leaves =
             reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
@@ -352,6 +355,7 @@ impl Solver {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
             self.is_full |= field.is_full;
         }
+        self.probe_contacts(self.direct_limits(1.0), cancel)?;
         self.extend_to_new_elements();
         Some(())
     }

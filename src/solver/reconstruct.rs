@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::{
     Cancel,
     closure::{Closure, Closures},
+    contact::{carry_over, told_by},
 };
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
@@ -26,6 +27,9 @@ const TASK_PATCHES: u32 = 256;
 /// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
 /// seams show between groups; larger, and the same is worked out again and again.
 const SIGHT_DISTANCE: f32 = 16.0;
+
+/// What an element that lies within a solid in part counts at a vertex beside others: links see it as a whole.
+const CONTACT_TRUST: f32 = 1e-3;
 
 /// What a leaf found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -281,7 +285,12 @@ impl VertexMeans {
         let mut weight = vec![0.0f32; count];
         for leaf in leaves {
             let element = &hierarchy.mesh.elements[leaf.element as usize];
-            let area = element.area_vector.length().max(f32::MIN_POSITIVE);
+            let trust = if element.is_open() {
+                1.0
+            } else {
+                CONTACT_TRUST
+            };
+            let area = (element.area_vector.length() * trust).max(f32::MIN_POSITIVE);
             for (&vertex, &value) in element.vertices.iter().zip(&leaf.corners) {
                 irradiance[vertex as usize] += value * area;
                 error[vertex as usize] += leaf.error * area;
@@ -298,9 +307,12 @@ impl VertexMeans {
             irradiance[index] /= weight[index];
             error[index] /= weight[index];
         }
+        let told = told_by(&hierarchy.mesh, |element, _| element.is_open());
+        carry_over(&hierarchy.mesh, told, &mut irradiance);
         let centres = leaves
             .iter()
-            .map(|leaf| (leaf.element as usize, leaf.centre));
+            .map(|leaf| (leaf.element as usize, leaf.centre))
+            .filter(|&(element, _)| hierarchy.mesh.elements[element].is_open());
         project(hierarchy, &mut irradiance, centres);
         for index in (0..count).filter(|&index| weight[index] <= 0.0) {
             if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {

@@ -208,23 +208,24 @@ impl PairSampler<'_> {
         }
     }
 
-    /// One of the four children of an element, which all have the same area.
+    /// One of the children of an element, which all have the same area.
     fn choose_child(&self, element: usize, by_power: bool, at: f32) -> usize {
-        let first = self.hierarchy.mesh.elements[element].first_child as usize;
-        let weights = [0, 1, 2, 3].map(|child| {
+        let children = self.hierarchy.mesh.elements[element].children();
+        let weight = |child: usize| {
             if by_power {
-                luminance(self.tables.elements[first + child]).max(0.0)
+                luminance(self.tables.elements[child]).max(0.0)
             } else {
                 1.0
             }
-        });
-        let target = at * weights.iter().sum::<f32>();
+        };
+        let target = at * children.clone().map(weight).sum::<f32>();
         let mut sum = 0.0;
-        let chosen = weights.iter().position(|weight| {
-            sum += weight;
+        let chosen = children.clone().find(|&child| {
+            sum += weight(child);
             sum > target
         });
-        first + chosen.unwrap_or((at * 4.0) as usize & 3)
+        let even = (at * children.len() as f32) as usize;
+        chosen.unwrap_or(children.start + even.min(children.len() - 1))
     }
 
     fn sample_on(&self, element: usize, random: &mut Random) -> Sample {

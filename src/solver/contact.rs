@@ -1,0 +1,169 @@
+//! Where one object stands on another or reaches into it: what lies within a solid gets no light, and nobody sees it.
+//!
+//! An element that reaches out from under an object is dark in part. As a whole it would show a smudge beside the
+//! object; so it is divided until what is left of it is small, and that shows the light of its open corners.
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::{Cancel, Solver, adapt::Limits, reconstruct::INSET};
+use crate::{
+    geometry::RayTree,
+    hierarchy::{Element, Hierarchy, Mesh},
+};
+
+/// Elements that lie under an object in part are divided while the root of their share of the area is more than this
+/// many times the tolerance of the mesh. Smaller costs elements along every contact; larger shows through beside it.
+const CONTACT_TOLERANCE: f32 = 1.0;
+
+/// Whether an element lies within a solid is looked at if it is this many times larger than those that are not divided
+/// for it, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose contacts are fine anyway.
+const LOOKED_AT: f32 = 16.0;
+
+/// Tangents of the probes' directions against the normal: from within a solid all of them meet it from behind.
+const PROBES: [[f32; 2]; 4] = [[0.0, 0.0], [0.9, 0.1], [-0.4, 0.8], [-0.5, -0.7]];
+
+/// Elements over which light is carried at most: vertices under an object and those beside them.
+const CARRIED: u32 = 2;
+
+impl Solver {
+    /// Divide elements that lie under an object in part.
+    pub(super) fn divide_contacts(&mut self, limits: Limits, cancel: &Cancel) -> Option<()> {
+        loop {
+            self.probe_contacts(limits, cancel)?;
+            let least = self.least_contact(limits);
+            let mesh = &mut self.hierarchy.mesh;
+            let is_wanted = |leaf: &usize| {
+                let element = &mesh.elements[*leaf];
+                element.is_contact() && element.area_vector.length() > least
+            };
+            let wanted: Vec<u32> = mesh
+                .held_leaves()
+                .filter(is_wanted)
+                .map(|leaf| leaf as u32)
+                .collect();
+            let fits = mesh.fits(&wanted, limits.most_elements);
+            self.is_full |= !fits;
+            if !fits || !mesh.divide(&wanted) {
+                return Some(());
+            }
+        }
+    }
+
+    /// Find out which leaves lie within solids. Of small ones it is only asked where what was divided did.
+    pub(super) fn probe_contacts(&mut self, limits: Limits, cancel: &Cancel) -> Option<()> {
+        let least = self.least_contact(limits);
+        let elements = &self.hierarchy.mesh.elements;
+        let fresh: Vec<usize> = self
+            .hierarchy
+            .mesh
+            .held_leaves()
+            .filter(|&leaf| elements[leaf].covered == Element::UNPROBED)
+            .collect();
+        let probed: Vec<(u8, u64)> = fresh
+            .par_iter()
+            .map(|&leaf| {
+                let element = &elements[leaf];
+                let above = elements.get(element.parent as usize);
+                let may_be = element.area_vector.length() > LOOKED_AT * least
+                    || above.is_some_and(|parent| parent.covered != 0);
+                if may_be && !cancel.is_cancelled() {
+                    probe(&self.rays, &self.hierarchy, leaf)
+                } else {
+                    (0, 0)
+                }
+            })
+            .collect();
+        cancel.proceed()?;
+        for (leaf, (covered, shot)) in fresh.into_iter().zip(probed) {
+            self.hierarchy.mesh.elements[leaf].covered = covered;
+            self.ray_count += shot;
+        }
+        Some(())
+    }
+
+    /// Elements in contact that are no larger are not divided, frame units.
+    fn least_contact(&self, limits: Limits) -> f32 {
+        let root = CONTACT_TOLERANCE * limits.tolerance;
+        (root * root * self.hierarchy.area as f32).max(limits.min_area)
+    }
+}
+
+/// Which corners of an element, and whether its centroid, lie within a solid, as [`Element::covered`] has it; and the rays
+/// shot.
+fn probe(rays: &RayTree, hierarchy: &Hierarchy, element: usize) -> (u8, u64) {
+    if rays.is_clear() {
+        return (0, 0);
+    }
+    let [a, b, c] = hierarchy.mesh.corners(element);
+    let centroid = hierarchy.mesh.elements[element].centroid;
+    let corner = |corner: Vec3| corner.lerp(centroid, INSET);
+    let (mut covered, mut shot) = (0, 0);
+    for (place, point) in [corner(a), corner(b), corner(c), centroid]
+        .into_iter()
+        .enumerate()
+    {
+        let (is_inside, count) = is_inside(rays, hierarchy, element, point);
+        covered |= u8::from(is_inside) << place;
+        shot += count;
+    }
+    (covered, shot)
+}
+
+/// Whether a point of an element lies within a solid: whatever is met from there is met from behind. And the rays shot.
+fn is_inside(rays: &RayTree, hierarchy: &Hierarchy, element: usize, point: Vec3) -> (bool, u64) {
+    let patch = hierarchy.patch_of(element);
+    let tangent = patch.normal.any_orthonormal_vector();
+    let other = patch.normal.cross(tangent);
+    let mut shot = 0;
+    let is_inside = PROBES.iter().all(|&[x, y]| {
+        let direction = (patch.normal + tangent * x + other * y).normalize_or_zero();
+        shot += 1;
+        rays.closest(point, direction, Some(patch.triangle))
+            .is_some_and(|hit| hierarchy.patch_met(hit.triangle, direction).is_none())
+    });
+    (is_inside, shot)
+}
+
+/// By vertex: whether any leaf tells what it receives, as far as it lies within no solid.
+pub(super) fn told_by(mesh: &Mesh, tells: impl Fn(&Element, usize) -> bool) -> Vec<bool> {
+    let mut told = vec![false; mesh.vertices.len()];
+    for leaf in mesh.held_leaves() {
+        let element = &mesh.elements[leaf];
+        for (side, vertex) in element.vertices.into_iter().enumerate() {
+            told[vertex as usize] |= tells(element, side);
+        }
+    }
+    told
+}
+
+/// Give vertices of elements that lie within a solid in part, of which nothing is told, the mean of those of these
+/// elements that something is told of.
+pub(super) fn carry_over(mesh: &Mesh, mut told: Vec<bool>, values: &mut [Vec4]) {
+    let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
+    let contacts: Vec<usize> = mesh.held_leaves().filter(is_contact).collect();
+    for _ in 0..CARRIED {
+        let mut sums =
+            vec![(Vec4::ZERO, 0.0f32); if contacts.is_empty() { 0 } else { values.len() }];
+        for &leaf in &contacts {
+            let element = &mesh.elements[leaf];
+            let area = element.area_vector.length();
+            let (from, to): (Vec<usize>, Vec<usize>) = element
+                .vertices
+                .into_iter()
+                .map(|vertex| vertex as usize)
+                .partition(|&vertex| told[vertex]);
+            for &from in &from {
+                for &to in &to {
+                    sums[to].0 += values[from] * area;
+                    sums[to].1 += area;
+                }
+            }
+        }
+        for (vertex, (sum, weight)) in sums.into_iter().enumerate() {
+            if weight > 0.0 {
+                (values[vertex], told[vertex]) = (sum / weight, true);
+            }
+        }
+    }
+}
