@@ -21,7 +21,7 @@ use crate::{
 /// neighbour at an angle would be seen edge-on, or from within the object that stands on it.
 pub(super) const INSET: f32 = 0.02;
 
-/// Patches of the clusters whose leaves are visited by one task.
+/// Patches of the clusters whose leaves are visited by one task; fewer in small scenes.
 const TASK_PATCHES: u32 = 256;
 
 /// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
@@ -48,9 +48,9 @@ pub(super) fn gather_leaves(
     closures: &Closures,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
-    let found: Vec<Vec<LeafLight>> = kernel
-        .hierarchy
-        .groups(TASK_PATCHES)
+    let hierarchy = kernel.hierarchy;
+    let found: Vec<Vec<LeafLight>> = hierarchy
+        .groups(hierarchy.task_patches(TASK_PATCHES))
         .into_par_iter()
         .map(|group| {
             let mut walk = Walk {

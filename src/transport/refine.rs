@@ -14,7 +14,7 @@ use crate::{
     hierarchy::{Hierarchy, Kind, NodeId},
 };
 
-/// Receivers with fewer patches than this are refined by one task.
+/// Receivers with fewer patches than this are refined by one task; less in small scenes.
 const TASK_PATCHES: u32 = 256;
 
 /// Rays of one link at least.
@@ -170,7 +170,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let is_large = match self.hierarchy().kind(receiver) {
             Kind::Cluster(index) => {
                 let cluster = &self.hierarchy().clusters[index];
-                !cluster.is_leaf() && cluster.end - cluster.start > TASK_PATCHES
+                !cluster.is_leaf()
+                    && cluster.end - cluster.start > self.hierarchy().task_patches(TASK_PATCHES)
             }
             Kind::Element(_) => false,
         };
