@@ -1,11 +1,13 @@
 //! Shapes and rays: area vectors, the exact irradiance of a polygon, sampling, occlusion.
 //! Everything here is in frame units and knows nothing of light.
 
+mod lanes;
 mod polygon;
 mod rays;
 mod sampling;
 
-pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance};
+pub use lanes::Vectors4;
+pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};
 pub use rays::{Hit, RAY_OFFSET, RayTree};
 pub use sampling::{Random, cosine_direction, low_discrepancy_2d, triangle_point};
 

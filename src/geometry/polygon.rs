@@ -2,117 +2,254 @@
 //!
 //! For radiosity B the irradiance vector (Lambert 1760; Arvo, "The Irradiance Jacobian", 1994, eq. 5) is
 //! `(B / 2π) Σ_k θ_k Γ_k`, with θ_k the angle that edge k subtends and Γ_k the unit normal of its fan triangle.
-//! It is finite however close the point is, and needs no samples.
+//! It is finite however close the point is, and needs no samples. Four edges, or one edge from four points, are computed at
+//! once.
 
 use std::f32::consts::{PI, TAU};
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
-/// Longest polygon that clipping a triangle by a plane can leave.
-const CLIPPED_CORNERS: usize = 4;
+use super::Vectors4;
 
 /// Beyond this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
 /// angles of the edges cancel in single precision, until nothing but rounding is left.
 const FAR: f32 = 64.0;
 
+/// `acos(x)/√(1 − x²)` for x from 0 to 1, as a polynomial in 1 − x, least power first. Its relative error is at most
+/// 7e-8, that of single precision, by Remez's exchange; with a coefficient less it is 4e-7, and one more gains nothing.
+const ARC_OVER_SINE: [f32; 9] = [
+    1.000_000_1,
+    0.333_322_17,
+    0.133_621_92,
+    0.054_302_435,
+    0.039_184_545,
+    -0.025_188_117,
+    0.060_640_704,
+    -0.042_566_516,
+    0.017_478_997,
+];
+
+/// A triangle as a point sees it.
+struct Sight {
+    /// Corners relative to the point.
+    corners: [Vec3; 3],
+    /// Twice the area times the normal of the back, which looks away from the point.
+    doubled_area: Vec3,
+    /// Centroid relative to the point.
+    separation: Vec3,
+    /// Squared length of the longest edge.
+    size: f32,
+}
+
+impl Sight {
+    /// `None` where the point does not lie before the triangle's front.
+    #[inline]
+    fn new(point: Vec3, [a, b, c]: [Vec3; 3]) -> Option<Self> {
+        let (u, v) = (b - a, c - a);
+        let doubled_area = v.cross(u);
+        let corners = [a - point, b - point, c - point];
+        (doubled_area.dot(corners[0]) > 0.0).then(|| Self {
+            corners,
+            doubled_area,
+            separation: corners[0] + (u + v) * (1.0 / 3.0),
+            size: longest(u, v),
+        })
+    }
+
+    /// The irradiance vector of a triangle that is far enough to count as a point.
+    #[inline]
+    fn far_vector(&self) -> Option<Vec3> {
+        let squared = self.separation.length_squared();
+        (squared > FAR * FAR * self.size).then(|| {
+            let projected = 0.5 * self.doubled_area.dot(self.separation).max(0.0);
+            self.separation * (projected / (PI * squared * squared))
+        })
+    }
+}
+
+/// Squared length of the longest edge of a triangle with these two.
+fn longest(u: Vec3, v: Vec3) -> f32 {
+    let third = (v - u).length_squared();
+    u.length_squared().max(v.length_squared()).max(third)
+}
+
 /// Irradiance vector at `point` of a triangle of radiosity 1 that faces it, per unit radiosity.
 /// Its dot product with a unit normal whose horizon the triangle does not cross is the irradiance there.
 /// Zero where the point lies behind the triangle's front or in its plane.
 pub fn irradiance_vector(point: Vec3, corners: [Vec3; 3]) -> Vec3 {
-    if !sees_front(point, corners) {
-        Vec3::ZERO
-    } else {
-        far_vector(point, corners)
-            .unwrap_or_else(|| edge_sum(&corners.map(|corner| corner - point)))
-    }
-}
-
-/// The irradiance vector of a triangle that is far enough to count as a point.
-fn far_vector(point: Vec3, [a, b, c]: [Vec3; 3]) -> Option<Vec3> {
-    let (u, v) = (b - a, c - a);
-    let size = u
-        .length_squared()
-        .max(v.length_squared())
-        .max((v - u).length_squared());
-    let separation = (a - point) + (u + v) * (1.0 / 3.0);
-    let squared = separation.length_squared();
-    (squared > FAR * FAR * size).then(|| {
-        let projected = (-0.5 * u.cross(v).dot(separation)).max(0.0);
-        separation * (projected / (PI * squared * squared))
+    let Some(sight) = Sight::new(point, corners) else {
+        return Vec3::ZERO;
+    };
+    sight.far_vector().unwrap_or_else(|| {
+        let [a, b, c] = sight.corners;
+        let (crosses, weights) = outline_terms(&Vectors4::new([a, b, c, c]));
+        crosses.weighted_sum(weights) / TAU
     })
 }
 
 /// Irradiance at `point` with unit `normal` of a triangle of radiosity 1, clipped at the horizon; 0…1.
 /// It is the form factor from the point to the triangle's front.
 pub fn point_irradiance(point: Vec3, normal: Vec3, corners: [Vec3; 3]) -> f32 {
-    if !sees_front(point, corners) {
+    let Some(sight) = Sight::new(point, corners) else {
         return 0.0;
-    }
-    if let Some(vector) = far_vector(point, corners) {
+    };
+    let heights = sight.corners.map(|corner| corner.dot(normal));
+    let Some(outline) = above_horizon(sight.corners, heights) else {
+        return 0.0;
+    };
+    if let Some(vector) = sight.far_vector() {
         return vector.dot(normal).clamp(0.0, 1.0);
     }
-    let local = corners.map(|corner| corner - point);
-    let heights = local.map(|corner| corner.dot(normal));
-    if heights.iter().all(|&height| height >= 0.0) {
-        return edge_sum(&local).dot(normal).clamp(0.0, 1.0);
+    let (crosses, weights) = outline_terms(&Vectors4::new(outline));
+    let projected = crosses.dot(&Vectors4::splat(normal)) * weights;
+    (projected.element_sum() / TAU).clamp(0.0, 1.0)
+}
+
+/// Irradiance at each of four points with its unit normal of one triangle of radiosity 1: see [`point_irradiance`].
+pub fn point_irradiances(points: &Vectors4, normals: &Vectors4, [a, b, c]: [Vec3; 3]) -> Vec4 {
+    let (u, v) = (b - a, c - a);
+    let corners = [a, b, c].map(|corner| Vectors4::splat(corner) - *points);
+    let heights = corners.map(|corner| corner.dot(normals));
+    let [first, second, third] = heights;
+    let doubled_area = Vectors4::splat(v.cross(u));
+    let is_before = doubled_area.dot(&corners[0]).cmpgt(Vec4::ZERO);
+    let is_seen = is_before & first.max(second).max(third).cmpgt(Vec4::ZERO);
+    if !is_seen.any() {
+        return Vec4::ZERO;
     }
-    let mut clipped = [Vec3::ZERO; CLIPPED_CORNERS];
-    let mut count = 0;
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if heights[i] >= 0.0 {
-            clipped[count] = local[i];
-            count += 1;
-        }
-        if (heights[i] >= 0.0) != (heights[j] >= 0.0) {
-            clipped[count] = local[i].lerp(local[j], heights[i] / (heights[i] - heights[j]));
-            count += 1;
-        }
-    }
-    if count < 3 {
-        0.0
+    let lowest = first.min(second).min(third);
+    let mut sum = if lowest.cmplt(Vec4::ZERO).any() {
+        clipped_sum(&corners, heights, normals)
     } else {
-        edge_sum(&clipped[..count]).dot(normal).clamp(0.0, 1.0)
+        let [a, b, c] = &corners;
+        edge_term(a, b, &Vectors4::splat(u), normals)
+            + edge_term(b, c, &Vectors4::splat(v - u), normals)
+            + edge_term(c, a, &Vectors4::splat(-v), normals)
+    } / TAU;
+    let separation = Vectors4::splat((a + b + c) / 3.0) - *points;
+    let squared = separation.dot(&separation);
+    let is_far = squared.cmpgt(Vec4::splat(FAR * FAR * longest(u, v)));
+    if is_far.any() {
+        let projected = doubled_area.dot(&separation) * separation.dot(normals) * 0.5;
+        sum = Vec4::select(is_far, projected / (squared * squared * PI), sum);
     }
+    Vec4::select(is_seen, sum, Vec4::ZERO).clamp(Vec4::ZERO, Vec4::ONE)
 }
 
 /// Irradiance at `point` with unit `normal` of a flat surface of radiosity 1, given by the edges of its outline in any
 /// order, each wound as seen from its front; 0…1. It may have holes and several parts. The point must lie before its
 /// front, and all of it above the horizon.
 pub fn outline_irradiance(point: Vec3, normal: Vec3, edges: &[[Vec3; 2]]) -> f32 {
-    let terms = edges
-        .iter()
-        .map(|&[from, to]| edge_term(from - point, to - point));
-    (terms.sum::<Vec3>() / TAU).dot(normal).clamp(0.0, 1.0)
-}
-
-/// Whether the point lies before the triangle's front.
-fn sees_front(point: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
-    (b - a).cross(c - a).dot(point - a) > 0.0
-}
-
-/// `Σ_k θ_k Γ_k / 2π` over the edges of a polygon given relative to the point, wound as seen from its front.
-fn edge_sum(corners: &[Vec3]) -> Vec3 {
-    let mut sum = Vec3::ZERO;
-    let mut previous = corners[corners.len() - 1];
-    for &corner in corners {
-        sum += edge_term(previous, corner);
-        previous = corner;
+    let normal = Vectors4::splat(normal);
+    let mut sum = Vec4::ZERO;
+    for four in edges.chunks(4) {
+        let ends = |end: usize| {
+            let corner = |lane: usize| four.get(lane).map_or(Vec3::ZERO, |ends| ends[end] - point);
+            Vectors4::new([corner(0), corner(1), corner(2), corner(3)])
+        };
+        let (from, to) = (ends(0), ends(1));
+        sum += edge_term(&from, &to, &(to - from), &normal);
     }
-    sum / TAU
+    (sum.element_sum() / TAU).clamp(0.0, 1.0)
 }
 
-/// `θ Γ` of the edge between two corners given relative to the point.
-fn edge_term(from: Vec3, to: Vec3) -> Vec3 {
+/// The part of a triangle above the horizon, by the heights of its corners; a corner twice where it has but three.
+/// `None` where nothing is.
+#[inline]
+fn above_horizon([a, b, c]: [Vec3; 3], [of_a, of_b, of_c]: [f32; 3]) -> Option<[Vec3; 4]> {
+    Some(match [of_a >= 0.0, of_b >= 0.0, of_c >= 0.0] {
+        [true, true, true] => [a, b, c, c],
+        [false, false, false] => return None,
+        [true, false, false] => tip([a, b, c], [of_a, of_b, of_c]),
+        [false, true, false] => tip([b, c, a], [of_b, of_c, of_a]),
+        [false, false, true] => tip([c, a, b], [of_c, of_a, of_b]),
+        [false, true, true] => stump([a, b, c], [of_a, of_b, of_c]),
+        [true, false, true] => stump([b, c, a], [of_b, of_c, of_a]),
+        [true, true, false] => stump([c, a, b], [of_c, of_a, of_b]),
+    })
+}
+
+/// What is left where only the first corner lies above the horizon.
+fn tip([a, b, c]: [Vec3; 3], [of_a, of_b, of_c]: [f32; 3]) -> [Vec3; 4] {
+    let last = a.lerp(c, of_a / (of_a - of_c));
+    [a, a.lerp(b, of_a / (of_a - of_b)), last, last]
+}
+
+/// What is left where only the first corner lies below the horizon.
+fn stump([a, b, c]: [Vec3; 3], [of_a, of_b, of_c]: [f32; 3]) -> [Vec3; 4] {
+    [
+        a.lerp(b, of_a / (of_a - of_b)),
+        b,
+        c,
+        a.lerp(c, of_a / (of_a - of_c)),
+    ]
+}
+
+/// For four edges around an outline that is given relative to a point, wound as seen from its front: vectors that point
+/// towards the inside of the fan triangles, and what to multiply them with to have θ Γ.
+#[inline]
+fn outline_terms(corners: &Vectors4) -> (Vectors4, Vec4) {
+    let next = corners.rotated();
+    let crosses = (next - *corners).cross(corners);
+    (crosses, angle_over_cross(&crosses, corners.dot(&next)))
+}
+
+/// `θ Γ · n` of four edges, between corners that are given relative to the point of each, with normals n.
+#[inline]
+fn edge_term(from: &Vectors4, to: &Vectors4, edge: &Vectors4, normals: &Vectors4) -> Vec4 {
     // The front faces the point, so its corners run clockwise around the outgoing vector: from × to would point away,
-    // to × from points towards the polygon.
-    let cross = to.cross(from);
-    let sine = cross.length();
-    if sine > 0.0 {
-        cross * (sine.atan2(to.dot(from)) / sine)
-    } else {
-        Vec3::ZERO
+    // to × from points towards the polygon. The edge in place of `to` keeps the digits of short edges far away.
+    let cross = edge.cross(from);
+    angle_over_cross(&cross, from.dot(to)) * cross.dot(normals)
+}
+
+/// The angle between two vectors over the length of their cross product; 0 where that is 0.
+#[inline]
+fn angle_over_cross(cross: &Vectors4, dot: Vec4) -> Vec4 {
+    let squared_sine = cross.dot(cross);
+    // One over the product of the lengths of the two.
+    let scale = Vec4::ONE / (squared_sine + dot * dot).sqrt();
+    let cosine = dot.abs() * scale;
+    let mut angle = arc_over_sine(Vec4::ONE - cosine) * scale;
+    let is_obtuse = dot.cmplt(Vec4::ZERO);
+    if is_obtuse.any() {
+        let supplement = Vec4::splat(PI) / squared_sine.sqrt() - angle;
+        angle = Vec4::select(is_obtuse, supplement, angle);
     }
+    Vec4::select(squared_sine.cmpgt(Vec4::ZERO), angle, Vec4::ZERO)
+}
+
+/// See [`ARC_OVER_SINE`]; in pairs, so that few products wait for each other.
+#[inline]
+fn arc_over_sine(rest: Vec4) -> Vec4 {
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8] = ARC_OVER_SINE.map(Vec4::splat);
+    let square = rest * rest;
+    let fourth = square * square;
+    let low = (c0 + c1 * rest) + (c2 + c3 * rest) * square;
+    let high = (c4 + c5 * rest) + (c6 + c7 * rest) * square;
+    low + high * fourth + c8 * (fourth * fourth)
+}
+
+/// `Σ_k θ_k Γ_k · n` of a triangle as four points see it, clipped at the horizon of each.
+fn clipped_sum(corners: &[Vectors4; 3], heights: [Vec4; 3], normals: &Vectors4) -> Vec4 {
+    let mut sum = Vec4::ZERO;
+    // Where the outline goes below the horizon, and where it comes up again.
+    let (mut exit, mut entry) = (Vectors4::splat(Vec3::ZERO), Vectors4::splat(Vec3::ZERO));
+    for k in 0..3 {
+        let next = (k + 1) % 3;
+        let [starts_above, ends_above] =
+            [heights[k], heights[next]].map(|height| height.cmpge(Vec4::ZERO));
+        let share = heights[k] / (heights[k] - heights[next]);
+        let crossing = corners[k].lerp(&corners[next], share);
+        let (leaves, enters) = (starts_above & !ends_above, !starts_above & ends_above);
+        exit = Vectors4::select(leaves, &crossing, &exit);
+        entry = Vectors4::select(enters, &crossing, &entry);
+        let from = Vectors4::select(enters, &crossing, &corners[k]);
+        let to = Vectors4::select(leaves, &crossing, &corners[next]);
+        let term = edge_term(&from, &to, &(to - from), normals);
+        sum += Vec4::select(starts_above | ends_above, term, Vec4::ZERO);
+    }
+    sum + edge_term(&exit, &entry, &(entry - exit), normals)
 }
 
 #[cfg(test)]

@@ -23,6 +23,10 @@ use glam::Vec3;
 
 use crate::scene::{Scene, TriangleId};
 
+/// Tasks that work over the patches is shared into, where there are as many. Fewer, and threads wait for the last one; more,
+/// and what each works out for itself of the clusters above adds up.
+const LEAST_TASKS: u32 = 64;
+
 /// Index of a patch, in tree order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PatchId(pub u32);
@@ -207,6 +211,12 @@ impl Hierarchy {
                 first + usize::from(is_second)
             })
         })
+    }
+
+    /// Patches that one task should visit: no more than `most`, and fewer where there are few, since their elements are
+    /// many. The same on any number of threads.
+    pub fn task_patches(&self, most: u32) -> u32 {
+        (self.held().len() as u32 / LEAST_TASKS).clamp(1, most)
     }
 
     /// The largest clusters with few enough patches, in the order of the patches.

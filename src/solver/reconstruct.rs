@@ -13,6 +13,7 @@ use super::{
     contact::{carry_over, told_by},
 };
 use crate::{
+    geometry::Vectors4,
     hierarchy::{Hierarchy, Kind, NodeId},
     transport::{Kernel, Link, LinkStore, Sight, self_irradiance},
 };
@@ -21,7 +22,7 @@ use crate::{
 /// neighbour at an angle would be seen edge-on, or from within the object that stands on it.
 pub(super) const INSET: f32 = 0.02;
 
-/// Patches of the clusters whose leaves are visited by one task.
+/// Patches of the clusters whose leaves are visited by one task; fewer in small scenes.
 const TASK_PATCHES: u32 = 256;
 
 /// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
@@ -51,9 +52,9 @@ pub(super) fn gather_leaves(
     closures: &Closures,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
-    let found: Vec<Vec<LeafLight>> = kernel
-        .hierarchy
-        .groups(TASK_PATCHES)
+    let hierarchy = kernel.hierarchy;
+    let found: Vec<Vec<LeafLight>> = hierarchy
+        .groups(hierarchy.task_patches(TASK_PATCHES))
         .into_par_iter()
         .map(|group| {
             let mut walk = Walk {
@@ -237,16 +238,19 @@ impl<'a> Walk<'a> {
             light.centre += link_irradiance(kernel, link, centroid, normal);
         }
         light.corners = [light.centre; 3];
-        let corners = hierarchy
+        let [a, b, c] = hierarchy
             .mesh
             .corners(index)
             .map(|corner| corner.lerp(centroid, INSET));
+        let points = Vectors4::new([centroid, a, b, c]);
         let elements = self.path.iter().flat_map(|chain| chain.own);
         for link in elements.chain(own) {
             light.error += link.error;
-            light.centre += link_irradiance(kernel, link, centroid, normal);
-            for (sum, &corner) in light.corners.iter_mut().zip(&corners) {
-                *sum += link_irradiance(kernel, link, corner, normal);
+            let transmission = transmission(kernel, link);
+            let [centre, corners @ ..] = kernel.irradiances(link.source, &points, normal);
+            light.centre += centre * transmission;
+            for (sum, corner) in light.corners.iter_mut().zip(corners) {
+                *sum += corner * transmission;
             }
         }
         light
@@ -261,11 +265,15 @@ pub(super) fn own_irradiance(kernel: Kernel<'_>, cluster: usize, link: &Link) ->
 
 /// What a face receives over a link from another node, of its own or of what is above it.
 pub(super) fn link_irradiance(kernel: Kernel<'_>, link: &Link, point: Vec3, normal: Vec3) -> Vec4 {
-    let transmission = match kernel.hierarchy.kind(link.source) {
+    kernel.irradiance(link.source, point, normal) * transmission(kernel, link)
+}
+
+/// What gets through over a link where form factors are evaluated anew.
+fn transmission(kernel: Kernel<'_>, link: &Link) -> Vec4 {
+    match kernel.hierarchy.kind(link.source) {
         Kind::Cluster(_) => link.transmission(),
         Kind::Element(_) => Vec4::splat(link.visibility),
-    };
-    kernel.irradiance(link.source, point, normal) * transmission
+    }
 }
 
 /// Area-weighted means of the leaves about each vertex.

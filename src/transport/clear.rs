@@ -5,22 +5,20 @@
 //! factor varies, which matters only for what it reflects: what is shown is evaluated at its corners. So a pair can be
 //! kept that bounds from spheres would divide again and again, and elements are left to be divided where light bends.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::{
-    Judgement, Link, PairSampler,
-    kernel::element_form_factor,
-    luminance,
+    Judgement, Link, PairSampler, element_form_factor, element_form_factors, luminance,
     refine::{Decision, Refinement, Refiner},
 };
 use crate::{
-    geometry::{Random, centroid, point_irradiance},
+    geometry::{Random, Vectors4, centroid, point_irradiances},
     hierarchy::{Hierarchy, Kind, NodeId},
 };
 
 /// Points of a receiver at which form factors of clusters are summed. One would miss how uneven they are near an edge; many
 /// cost time for links that later steps divide.
-const POINTS: u32 = 4;
+const POINTS: usize = 4;
 
 /// Beyond this many radii of both, form factors are those of the centroids: they vary by less than half.
 const NEAR: f32 = 2.0;
@@ -63,40 +61,42 @@ impl InView {
             &hierarchy.mesh.elements[receiver],
         );
         let normal = hierarchy.patch_of(receiver).normal;
-        let at = |point| element_form_factor(hierarchy, source, point, normal);
-        let middle = at(to.centroid);
         let distance = from.centroid.distance(to.centroid);
         if distance > NEAR * (from.radius + to.radius) {
+            let middle = element_form_factor(hierarchy, source, to.centroid, normal);
             return Self {
                 mean: middle,
                 change: middle * (FAR_CHANGE * to.radius / distance).min(1.0),
             };
         }
         let [a, b, c] = hierarchy.mesh.corners(receiver);
-        let around = |corners: [Vec3; 3]| {
-            let middle = centroid(corners);
-            corners.map(|corner| at(middle.lerp(corner, TOWARDS_CORNER)))
+        let normals = Vectors4::splat(normal);
+        let within = |corners: [Vec3; 3]| {
+            let points = inner_points(corners);
+            element_form_factors(hierarchy, source, &points, &normals)
         };
-        let coarse = around([a, b, c]);
-        let least = coarse.into_iter().fold(middle, f32::min);
-        let most = coarse.into_iter().fold(middle, f32::max);
-        let mean = (middle + coarse.iter().sum::<f32>()) * 0.25;
-        let change = most - least;
+        let coarse = within([a, b, c]);
+        let mean = coarse.element_sum() * 0.25;
+        let change = coarse.max_element() - coarse.min_element();
         if change <= PEAKED * mean {
             return Self { mean, change };
         }
         // Four quarters, each by its own points.
         let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
         let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]];
-        let sum: f32 = quarters
-            .into_iter()
-            .map(|quarter| at(centroid(quarter)) + around(quarter).iter().sum::<f32>())
-            .sum();
+        let sum: Vec4 = quarters.into_iter().map(within).sum();
         Self {
-            mean: sum / 16.0,
+            mean: sum.element_sum() / 16.0,
             change,
         }
     }
+}
+
+/// The centroid of a triangle, and three points on the way to its corners.
+fn inner_points(corners: [Vec3; 3]) -> Vectors4 {
+    let middle = centroid(corners);
+    let [a, b, c] = corners.map(|corner| middle.lerp(corner, TOWARDS_CORNER));
+    Vectors4::new([middle, a, b, c])
 }
 
 impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
@@ -192,14 +192,13 @@ impl PairSampler<'_> {
             Kind::Cluster(index) => hierarchy.clusters[index].patches(),
             Kind::Element(index) => index..index + 1,
         };
-        let mut sum = 0.0;
-        for _ in 0..POINTS {
-            let (point, normal) = self.point_on(receiver, random);
-            let seen = elements
-                .clone()
-                .map(|element| point_irradiance(point, normal, hierarchy.mesh.corners(element)));
-            sum += seen.sum::<f32>().min(1.0);
-        }
-        sum / POINTS as f32
+        let samples = [(); POINTS].map(|()| self.point_on(receiver, random));
+        let (points, normals) = (
+            Vectors4::new(samples.map(|(point, _)| point)),
+            Vectors4::new(samples.map(|(_, normal)| normal)),
+        );
+        let seen = elements
+            .map(|element| point_irradiances(&points, &normals, hierarchy.mesh.corners(element)));
+        seen.sum::<Vec4>().min(Vec4::ONE).element_sum() / POINTS as f32
     }
 }

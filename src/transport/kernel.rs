@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, Vec4};
 
 use crate::{
-    geometry::{irradiance_vector, point_irradiance},
+    geometry::{Vectors4, irradiance_vector, point_irradiance, point_irradiances},
     hierarchy::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Reading, Tables},
 };
 
@@ -225,6 +225,22 @@ impl Kernel<'_> {
             }
         }
     }
+
+    /// As [`Self::irradiance`], at four points of one unit normal.
+    pub fn irradiances(&self, source: NodeId, points: &Vectors4, normal: Vec3) -> [Vec4; 4] {
+        match self.hierarchy.kind(source) {
+            Kind::Cluster(index) => points
+                .to_array()
+                .map(|point| self.sight(index, point).incident(point).on_face(normal)),
+            Kind::Element(index) => {
+                let normals = Vectors4::splat(normal);
+                let factors = element_form_factors(self.hierarchy, index, points, &normals);
+                factors
+                    .to_array()
+                    .map(|factor| self.tables.elements[index] * factor)
+            }
+        }
+    }
 }
 
 /// Irradiance vector at a point of an element of radiosity 1 (eq. 14 for a patch).
@@ -250,4 +266,27 @@ pub fn element_form_factor(hierarchy: &Hierarchy, index: usize, point: Vec3, nor
     let projected =
         element.area_vector.dot(separation).max(0.0) * (-separation.dot(normal)).max(0.0);
     projected / (PI * squared * squared)
+}
+
+/// As [`element_form_factor`], from each of four points with its unit normal.
+pub fn element_form_factors(
+    hierarchy: &Hierarchy,
+    index: usize,
+    points: &Vectors4,
+    normals: &Vectors4,
+) -> Vec4 {
+    let element = &hierarchy.mesh.elements[index];
+    let separation = *points - Vectors4::splat(element.centroid);
+    let squared = separation.dot(&separation);
+    let emitted = Vectors4::splat(element.area_vector).dot(&separation);
+    let received = -separation.dot(normals);
+    let projected = emitted.max(Vec4::ZERO) * received.max(Vec4::ZERO);
+    let far = projected / (squared * squared * PI);
+    let is_near = squared.cmplt(Vec4::splat(NEAR * NEAR * element.radius * element.radius));
+    if is_near.any() {
+        let exact = point_irradiances(points, normals, hierarchy.mesh.corners(index));
+        Vec4::select(is_near, exact, far)
+    } else {
+        far
+    }
 }

@@ -7,7 +7,7 @@ mod oracle;
 mod refine;
 mod visibility;
 
-pub use kernel::{Incident, Kernel, Sight, element_form_factor};
+pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};
 pub use link::{Link, LinkStore};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};

@@ -114,21 +114,25 @@ impl Judge<'_> {
             Kind::Element(index) => {
                 let element = &hierarchy.mesh.elements[index];
                 let normal = hierarchy.patch_of(index).normal;
-                let height = match hierarchy.kind(to) {
-                    Kind::Element(other) => hierarchy
-                        .mesh
-                        .corners(other)
-                        .iter()
-                        .map(|&corner| (corner - element.centroid).dot(normal))
-                        .fold(f32::MIN, f32::max),
+                let least = IN_PLANE * (element.radius + hierarchy.radius(to));
+                let height_of = |point: Vec3| (point - element.centroid).dot(normal);
+                match hierarchy.kind(to) {
+                    // Some corner is at least as high as the centroid, which is at hand.
+                    Kind::Element(other) => {
+                        height_of(hierarchy.mesh.elements[other].centroid) > least
+                            || hierarchy
+                                .mesh
+                                .corners(other)
+                                .iter()
+                                .any(|&corner| height_of(corner) > least)
+                    }
                     Kind::Cluster(other) => {
                         let cluster = &hierarchy.clusters[other];
                         let middle = (cluster.min + cluster.max) * 0.5;
                         let half = (cluster.max - cluster.min) * 0.5;
-                        (middle - element.centroid).dot(normal) + half.dot(normal.abs())
+                        height_of(middle) + half.dot(normal.abs()) > least
                     }
-                };
-                height > IN_PLANE * (element.radius + hierarchy.radius(to))
+                }
             }
             Kind::Cluster(index) => {
                 let cluster = &hierarchy.clusters[index];

@@ -6,15 +6,15 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{Judge, Judgement, Link, kernel::element_form_factor};
+use super::{Judge, Judgement, Link, element_form_factor, element_form_factors};
 use glam::Vec3;
 
 use crate::{
-    geometry::Random,
+    geometry::{Random, Vectors4},
     hierarchy::{Hierarchy, Kind, NodeId},
 };
 
-/// Receivers with fewer patches than this are refined by one task.
+/// Receivers with fewer patches than this are refined by one task; less in small scenes.
 const TASK_PATCHES: u32 = 256;
 
 /// Rays of one link at least.
@@ -170,7 +170,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let is_large = match self.hierarchy().kind(receiver) {
             Kind::Cluster(index) => {
                 let cluster = &self.hierarchy().clusters[index];
-                !cluster.is_leaf() && cluster.end - cluster.start > TASK_PATCHES
+                !cluster.is_leaf()
+                    && cluster.end - cluster.start > self.hierarchy().task_patches(TASK_PATCHES)
             }
             Kind::Element(_) => false,
         };
@@ -498,12 +499,13 @@ fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f3
     }
     // A rule of degree 3 whose points lie inside: centroid and three points towards the corners (Strang and Fix's
     // would have a negative weight, so the four are weighed alike at three fifths of the way).
-    let corners = hierarchy.mesh.corners(receiver);
-    let sum: f32 = corners
-        .iter()
-        .map(|&corner| {
-            element_form_factor(hierarchy, source, to.centroid.lerp(corner, 0.6), normal)
-        })
-        .sum();
-    (sum + element_form_factor(hierarchy, source, to.centroid, normal)) * 0.25
+    let [a, b, c] = hierarchy
+        .mesh
+        .corners(receiver)
+        .map(|corner| to.centroid.lerp(corner, 0.6));
+    let (points, normals) = (
+        Vectors4::new([to.centroid, a, b, c]),
+        Vectors4::splat(normal),
+    );
+    element_form_factors(hierarchy, source, &points, &normals).element_sum() * 0.25
 }

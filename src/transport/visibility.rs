@@ -33,6 +33,47 @@ struct Sample {
     radiosity: f32,
 }
 
+/// An element to draw points on.
+#[derive(Clone, Copy, Debug)]
+struct Facet {
+    corners: [Vec3; 3],
+    normal: Vec3,
+    triangle: TriangleId,
+    radiosity: f32,
+}
+
+impl Facet {
+    /// Uniform over its area.
+    fn sample(&self, random: &mut Random) -> Sample {
+        let [a, b, c] = self.corners;
+        let at = triangle_point(random.uniform_2d());
+        Sample {
+            point: a * at.x + b * at.y + c * at.z,
+            normal: self.normal,
+            triangle: self.triangle,
+            radiosity: self.radiosity,
+        }
+    }
+}
+
+/// A node that many points are drawn on by area: an element as a whole, whatever its parts.
+enum Receiver {
+    Element(Facet),
+    /// The patches of a cluster.
+    Patches(Range<usize>),
+}
+
+/// A node that many points are drawn on by power and by area in turn.
+struct Source {
+    kind: Kind,
+    /// The element where it has no parts; else parts are chosen each time.
+    leaf: Option<Facet>,
+    /// Whether it sends anything at all.
+    has_power: bool,
+    /// Mean radiosity (luminance).
+    mean: f32,
+}
+
 /// Running sums over the patches in tree order, to choose patches of a cluster in proportion to what is summed.
 /// One more than there are patches.
 #[derive(Clone, Debug)]
@@ -151,52 +192,71 @@ pub struct PairSampler<'a> {
 impl PairSampler<'_> {
     /// A random point of a node and its normal, uniform over its area.
     pub fn point_on(&self, node: NodeId, random: &mut Random) -> (Vec3, Vec3) {
-        let sample = self.sample(node, random);
+        let sample = self.sample(&self.receiver(node), random);
         (sample.point, sample.normal)
     }
 
+    fn receiver(&self, node: NodeId) -> Receiver {
+        match self.hierarchy.kind(node) {
+            Kind::Element(index) => Receiver::Element(self.facet(index)),
+            Kind::Cluster(index) => Receiver::Patches(self.hierarchy.clusters[index].patches()),
+        }
+    }
+
     /// Uniform over the area of a node.
-    fn sample(&self, node: NodeId, random: &mut Random) -> Sample {
-        let element = match self.hierarchy.kind(node) {
-            Kind::Element(index) => index,
+    fn sample(&self, receiver: &Receiver, random: &mut Random) -> Sample {
+        match receiver {
+            Receiver::Element(facet) => facet.sample(random),
+            Receiver::Patches(patches) => {
+                let patch = self.areas.choose(patches, random.uniform());
+                self.facet(patch).sample(random)
+            }
+        }
+    }
+
+    fn source(&self, node: NodeId) -> Source {
+        let kind = self.hierarchy.kind(node);
+        let (leaf, area, power) = match kind {
+            Kind::Element(index) => {
+                let element = &self.hierarchy.mesh.elements[index];
+                let area = element.area_vector.length();
+                let power = luminance(self.tables.elements[index]) * area;
+                let leaf = element.is_leaf().then(|| self.facet(index));
+                (leaf, area, power)
+            }
             Kind::Cluster(index) => {
                 let patches = self.hierarchy.clusters[index].patches();
-                self.areas.choose(&patches, random.uniform())
+                let area = self.areas.total(&patches) as f32;
+                (None, area, self.powers.total(&patches) as f32)
             }
         };
-        self.sample_on(element, random)
+        Source {
+            kind,
+            leaf,
+            has_power: power > 0.0,
+            mean: power / area.max(f32::MIN_POSITIVE),
+        }
     }
 
     /// A point of a source, now in proportion to its power, now to its area.
-    fn sample_source(&self, node: NodeId, random: &mut Random) -> Candidate {
+    fn sample_source(&self, source: &Source, random: &mut Random) -> Candidate {
         let by_power = random.uniform() < POWER_SHARE;
-        let (mut element, area, power) = match self.hierarchy.kind(node) {
-            Kind::Element(index) => {
-                let area = self.hierarchy.mesh.elements[index].area_vector.length();
-                (index, area, luminance(self.tables.elements[index]) * area)
-            }
-            Kind::Cluster(index) => {
-                let patches = self.hierarchy.clusters[index].patches();
-                let power = self.powers.total(&patches) as f32;
-                let sums = if by_power && power > 0.0 {
+        let sample = match (&source.leaf, source.kind) {
+            (Some(facet), _) => facet.sample(random),
+            (None, Kind::Element(index)) => self.sample_leaf(index, by_power, random),
+            (None, Kind::Cluster(index)) => {
+                let sums = if by_power && source.has_power {
                     self.powers
                 } else {
                     self.areas
                 };
-                (
-                    sums.choose(&patches, random.uniform()),
-                    self.areas.total(&patches) as f32,
-                    power,
-                )
+                let patches = self.hierarchy.clusters[index].patches();
+                let patch = sums.choose(&patches, random.uniform());
+                self.sample_leaf(patch, by_power, random)
             }
         };
-        while !self.hierarchy.mesh.elements[element].is_leaf() {
-            element = self.choose_child(element, by_power, random.uniform());
-        }
-        let sample = self.sample_on(element, random);
-        let mean = power / area.max(f32::MIN_POSITIVE);
-        let relative = if mean > 0.0 {
-            sample.radiosity / mean
+        let relative = if source.mean > 0.0 {
+            sample.radiosity / source.mean
         } else {
             1.0
         };
@@ -206,6 +266,14 @@ impl PairSampler<'_> {
             light: relative / density,
             area: 1.0 / density,
         }
+    }
+
+    /// A point on one of the leaves of an element.
+    fn sample_leaf(&self, mut element: usize, by_power: bool, random: &mut Random) -> Sample {
+        while !self.hierarchy.mesh.elements[element].is_leaf() {
+            element = self.choose_child(element, by_power, random.uniform());
+        }
+        self.facet(element).sample(random)
     }
 
     /// One of the children of an element, which all have the same area.
@@ -228,12 +296,10 @@ impl PairSampler<'_> {
         chosen.unwrap_or(children.start + even.min(children.len() - 1))
     }
 
-    fn sample_on(&self, element: usize, random: &mut Random) -> Sample {
-        let [a, b, c] = self.hierarchy.mesh.corners(element);
-        let at = triangle_point(random.uniform_2d());
+    fn facet(&self, element: usize) -> Facet {
         let patch = self.hierarchy.patch_of(element);
-        Sample {
-            point: a * at.x + b * at.y + c * at.z,
+        Facet {
+            corners: self.hierarchy.mesh.corners(element),
             normal: patch.normal,
             triangle: patch.triangle,
             radiosity: luminance(self.tables.elements[element]),
@@ -254,11 +320,12 @@ impl PairSampler<'_> {
         }
         let (mut light, mut area) = (Share::default(), Share::default());
         let mut all = Share::default();
+        let (source, receiver) = (self.source(source), self.receiver(receiver));
         for _ in 0..ray_count {
             let (mut kept, mut sum) = (None, 0.0);
             for _ in 0..CANDIDATES {
-                let candidate = self.sample_source(source, random);
-                let to = self.sample(receiver, random);
+                let candidate = self.sample_source(&source, random);
+                let to = self.sample(&receiver, random);
                 let weight = transfer(&candidate.from, &to);
                 sum += weight;
                 if kept.is_none() || random.uniform() * sum < weight {
@@ -296,8 +363,9 @@ impl PairSampler<'_> {
             return self.form_factor_in_clear(source, receiver, random);
         }
         let mut met = 0;
+        let receiver = self.receiver(receiver);
         for _ in 0..ray_count {
-            let from = self.sample(receiver, random);
+            let from = self.sample(&receiver, random);
             let direction = cosine_direction(from.normal, random.uniform_2d());
             let hit = self
                 .rays
