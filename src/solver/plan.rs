@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Method, Oracle, SolveSettings};
+use super::{Cancel, Method, Oracle, SolveSettings};
 use crate::{
     hierarchy::PatchTree,
     scene::{Scene, WarningKind},
@@ -105,6 +105,14 @@ pub struct LeftOut {
     pub reason: String,
     /// How far the light may differ from that with it.
     pub bound: &'static str,
+}
+
+impl LeftOut {
+    /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
+    pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
+        let (plan, _) = Plan::make(scene, settings, &|| cancel.is_cancelled())?;
+        Some(Arc::unwrap_or_clone(plan.left_out))
+    }
 }
 
 impl std::fmt::Display for LeftOut {
