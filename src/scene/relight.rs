@@ -136,9 +136,9 @@ mod tests {
         let mut builder = SceneBuilder::default();
         builder.textures.push(Texture {
             name: String::new(),
-            width: 1,
+            width: 2,
             height: 1,
-            pixels: vec![Vec3::splat(0.5)],
+            pixels: vec![Vec3::splat(0.4), Vec3::splat(0.6)],
         });
         let textured = builder.push_material(Material {
             reflectance_texture: Some(TextureId(0)),

@@ -295,6 +295,20 @@ fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
             "each lies on another one that looks the same way",
             "light would be there twice",
         ),
+        (
+            "constant-textures",
+            scene.spared.constant_textures,
+            "textures of one colour",
+            "where faces show them all their pixels are alike, so the materials have that colour instead",
+            "nothing changes but rounding",
+        ),
+        (
+            "unused-textures",
+            scene.spared.unused_textures,
+            "textures",
+            "no face shows them",
+            "nothing changes",
+        ),
     ];
     let found = entries.into_iter().filter(|entry| entry.1 > 0);
     found
