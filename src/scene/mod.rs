@@ -28,7 +28,7 @@ pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, So
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
-pub use relight::Appearance;
+pub use relight::{Appearance, Awakened};
 pub use spared::Spared;
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};

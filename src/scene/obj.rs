@@ -247,7 +247,9 @@ impl Import<'_> {
             let segment = segment.and_then(|segment| self.notes.segments.get(segment));
             if let Some(material) = segment.and_then(|segment| segment.material) {
                 shown[material].has_faces |= !model.mesh.indices.is_empty();
-                shown[material].has_texcoords |= !model.mesh.texcoord_indices.is_empty();
+                // What is not finite stands for none.
+                let mut texcoords = model.mesh.texcoords.iter();
+                shown[material].has_texcoords |= texcoords.any(|at| at.is_finite());
             }
         }
         shown

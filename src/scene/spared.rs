@@ -188,7 +188,7 @@ mod tests {
     }
 
     /// A triangle for each material: a texture and the texture coordinates.
-    fn scene(textures: [Texture; 2], faces: &[(u32, Option<[Vec2; 3]>)]) -> Scene {
+    fn scene(textures: &[Texture; 2], faces: &[(u32, Option<[Vec2; 3]>)]) -> Scene {
         let mut builder = SceneBuilder {
             textures: textures.to_vec(),
             ..SceneBuilder::default()
@@ -214,7 +214,7 @@ mod tests {
     #[test]
     fn a_texture_of_one_colour_becomes_that_of_the_material_whatever_it_shows() {
         let whole = Some([Vec2::ZERO, Vec2::new(7.0, 0.0), Vec2::new(0.0, 9.0)]);
-        let scene = scene([plain(), spotted()], &[(0, whole), (1, whole)]);
+        let scene = scene(&[plain(), spotted()], &[(0, whole), (1, whole)]);
         assert_eq!(scene.materials[0].reflectance, Vec3::splat(0.2));
         assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.2));
         assert_eq!(scene.materials[0].reflectance_texture, None);
@@ -236,7 +236,7 @@ mod tests {
             (about(0.9, 0.4), true),
             (about(0.1, 0.0), false),
         ] {
-            let scene = scene([spotted(), plain()], &[(0, at)]);
+            let scene = scene(&[spotted(), plain()], &[(0, at)]);
             assert_eq!(scene.textures.is_empty(), is_constant, "{at:?}");
             assert_eq!(scene.texcoords.is_empty(), is_constant, "{at:?}");
             if is_constant {
