@@ -93,7 +93,7 @@ fn compare_on(
             break;
         }
         for (index, kept) in trial.kept().enumerate() {
-            if round > 0 && index + 1 == trial.kept().len() {
+            if !trial.is_due(index) {
                 continue;
             }
             session.say(format!(

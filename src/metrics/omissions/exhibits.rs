@@ -40,7 +40,7 @@ fn builtin(name: &str) -> SceneBuilder {
     find_builtin(name).map_or_else(SceneBuilder::default, |builtin| builtin.builder())
 }
 
-static EXHIBITS: [Exhibit; 10] = [
+static EXHIBITS: [Exhibit; 11] = [
     Exhibit {
         name: "plates",
         is_quick: true,
@@ -100,5 +100,11 @@ static EXHIBITS: [Exhibit; 10] = [
         is_quick: false,
         sides: Sides::One,
         builder: || builtin("room-1022"),
+    },
+    Exhibit {
+        name: "room-42879, one-sided",
+        is_quick: false,
+        sides: Sides::One,
+        builder: || builtin("room-42879"),
     },
 ];

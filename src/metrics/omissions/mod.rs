@@ -35,6 +35,9 @@ const AS_PLANNED: &str = "nothing";
 /// Name of the run that leaves nothing out.
 const ALL: &str = "all";
 
+/// Name of the run that differs from the last by its seed: it is there for the noise, and once is enough.
+const RESEEDED: &str = "all, other seed";
+
 /// A solve to be run.
 #[derive(Clone, Debug)]
 struct Run {
@@ -102,11 +105,13 @@ impl Trial {
             runs.extend(omitted.iter().map(alone));
         }
         runs.push(run(ALL, keeping(Keep::ALL)));
-        let reseeded = SolveSettings {
-            seed: settings.seed.wrapping_add(1),
-            ..keeping(Keep::ALL)
-        };
-        runs.push(run("all, other seed", reseeded));
+        if !omitted.is_empty() {
+            let reseeded = SolveSettings {
+                seed: settings.seed.wrapping_add(1),
+                ..keeping(Keep::ALL)
+            };
+            runs.push(run(RESEEDED, reseeded));
+        }
         Some(Self {
             points: points(&scene),
             left_out: omitted.into_iter().map(Omission::name).collect(),
@@ -116,10 +121,16 @@ impl Trial {
         })
     }
 
-    /// What is kept in each run, in their order. The last is there for the noise: once is enough.
+    /// What is kept in each run, in their order.
     pub fn kept(&self) -> impl ExactSizeIterator<Item = &'static str> + use<> {
         let kept: Vec<&'static str> = self.runs.iter().map(|run| run.kept).collect();
         kept.into_iter()
+    }
+
+    /// Whether another round needs this run, too.
+    pub fn is_due(&self, index: usize) -> bool {
+        let run = &self.runs[index];
+        run.lit.is_none() || run.kept != RESEEDED
     }
 
     /// Run one of them once; `None` when cancelled.
@@ -150,7 +161,7 @@ impl Trial {
     pub fn comparison(&self) -> Option<Comparison> {
         let lit_of = |kept: &str| self.runs.iter().find(|run| run.kept == kept)?.lit.as_ref();
         let whole = lit_of(ALL)?;
-        let (noise, runs) = self.runs.split_last()?;
+        let compared = self.runs.iter().filter(|run| run.kept != RESEEDED);
         let cost = |run: &Run| {
             let lit = run.lit.as_ref()?;
             Some(Cost {
@@ -170,8 +181,8 @@ impl Trial {
             triangles: self.scene.triangles.len(),
             left_out: self.left_out.clone(),
             plan_s: self.plan_s,
-            noise: difference(&noise.lit.as_ref()?.light, &whole.light),
-            runs: runs.iter().map(cost).collect::<Option<_>>()?,
+            noise: lit_of(RESEEDED).map(|other| difference(&other.light, &whole.light)),
+            runs: compared.map(cost).collect::<Option<_>>()?,
         })
     }
 }
@@ -210,8 +221,8 @@ pub struct Comparison {
     pub left_out: Vec<&'static str>,
     /// Seconds that it takes to see what can be left out, beside planting the tree; median.
     pub plan_s: f64,
-    /// As [`Cost::difference`], of two runs that keep everything and have other seeds.
-    pub noise: f64,
+    /// As [`Cost::difference`], of two runs that keep everything and have other seeds. Unknown where nothing is left out.
+    pub noise: Option<f64>,
     /// The runs: first the one that obeys the plan, last the one that keeps everything.
     pub runs: Vec<Cost>,
 }

@@ -24,7 +24,7 @@ pub struct Row<'a> {
     elements_ratio: Option<f64>,
     memory_ratio: Option<f64>,
     difference_rms: f64,
-    difference_of_seeds_rms: f64,
+    difference_of_seeds_rms: Option<f64>,
     power_ratio: f64,
     plan_s: f64,
 }
@@ -91,7 +91,7 @@ pub fn omissions_markdown(comparisons: &[Comparison]) -> String {
             times(row.elements_ratio),
             times(row.memory_ratio),
             per_cent(row.difference_rms),
-            per_cent(row.difference_of_seeds_rms),
+            row.difference_of_seeds_rms.map_or("–".to_owned(), per_cent),
             row.power_ratio,
         );
     }
@@ -161,7 +161,7 @@ mod tests {
             triangles: 3,
             left_out: vec!["rays"],
             plan_s: 0.01,
-            noise: 0.004,
+            noise: Some(0.004),
             runs: vec![cost("nothing", 0.5, 0), cost("all", 2.0, 7)],
         };
         let rows = Row::of(&comparison);
