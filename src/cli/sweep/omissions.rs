@@ -149,7 +149,8 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
          Keeping `rays` keeps `elements` and `clusters`, too, which rest on them; where one thing is left out, keeping it is keeping all.\n\
          Times are wall-clock seconds of preparing and stepping, the median of the rounds; ratios are to the run as planned.\n\
          The difference is that of the irradiance at random points of the surfaces from the run that keeps all, relative root mean square; \
-         \"of seeds\" is that between two runs that keep all and have different seeds.\n\
+         \"of seeds\" is that between two runs that keep all and have different seeds. \
+         Where runs differ, either may be nearer to the truth.\n\
          Power is all that arrives, relative to the run that keeps all.\n\n{}\n\
          Making the plan, beside planting the tree that each solve needs:\n\n{}",
         report.version,
