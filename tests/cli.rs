@@ -490,3 +490,24 @@ fn the_stability_suite_tells_what_holds_and_refuses_unknown_cases() {
     );
     assert_eq!(output.status.code(), Some(2), "{}", error_of(&output));
 }
+
+#[test]
+fn the_plan_suite_compares_what_is_kept_and_refuses_unknown_scenes() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = report(
+        folder.path(),
+        &["--suite", "plan", "--cases", "perpendicular"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/plan.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let runs = json["scenes"][0]["runs"].as_array().unwrap();
+    assert_eq!(runs[0]["kept"], "nothing");
+    assert!(runs.iter().all(|run| run["rounds"] == 3), "{json}");
+    let table = fs::read_to_string(folder.path().join("out/plan.md")).unwrap();
+    assert!(table.contains("| perpendicular-plates | all |"), "{table}");
+    let csv = fs::read_to_string(folder.path().join("out/plan.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + runs.len());
+    let output = report(folder.path(), &["--suite", "plan", "--cases", "unheard-of"]);
+    assert_eq!(output.status.code(), Some(2), "{}", error_of(&output));
+}

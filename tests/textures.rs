@@ -7,7 +7,7 @@ use std::{fs, path::Path, sync::Arc};
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
     scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_obj, write_builtin},
-    solver::{Cancel, Snapshot, SolveSettings, Solver},
+    solver::{Cancel, LeftOut, Snapshot, SolveSettings, Solver},
 };
 
 /// A triangle whose material names a picture.
@@ -90,7 +90,11 @@ fn pictures_beside_the_scene_are_read_whatever_their_ending() {
         "png.jpg",
     ] {
         let scene = read(folder, picture);
-        assert_eq!(scene.textures.len(), 1, "{picture}: {:?}", scene.warnings);
+        assert_eq!(
+            scene.spared.constant_textures, 1,
+            "{picture}: {:?}",
+            scene.warnings
+        );
         let red = Vec3::new(0.5, 0.0, 0.0);
         assert!(scene.surfaces[0].reflectance.abs_diff_eq(red, 1e-5));
     }
@@ -180,7 +184,7 @@ fn nothing_outside_the_folder_and_no_device_is_read() {
     for picture in ["pipe.png", "zero.png", "loop.png"] {
         assert_refused(&folder, picture, "was not found");
     }
-    assert_eq!(read(&folder, "good.png").textures.len(), 1);
+    assert_eq!(read(&folder, "good.png").spared.constant_textures, 1);
     // The same holds for material files.
     let mtl = "newmtl m\nKd 0.1\n";
     fs::write(outer.path().join("secret.mtl"), mtl).unwrap();
@@ -195,7 +199,9 @@ fn nothing_outside_the_folder_and_no_device_is_read() {
 
 /// Two triangles of a textured square, with a line for each texture coordinate, and the corners of each in these.
 fn read_square(folder: &Path, texcoords: &[[f64; 2]], faces: [[usize; 3]; 2]) -> Scene {
-    save(&folder.join("a.png"), 8);
+    let shade = |x: u32, y: u32| image::Rgb([255, 32 * x as u8, 32 * y as u8]);
+    let picture = image::RgbImage::from_fn(8, 8, shade);
+    picture.save(folder.join("a.png")).unwrap();
     fs::write(
         folder.join("a.mtl"),
         "newmtl m\nKd 0.5 0.5 0.5\nKe 1 1 1\nmap_Kd a.png\n",
@@ -313,4 +319,83 @@ fn coordinates_far_from_the_origin_keep_their_digits_and_their_neighbours() {
     // Whole periods may be left out, parts of one may not.
     assert_eq!(one[0] - one[0].floor(), Vec2::new(0.75, 0.125));
     assert!(lit(&scene).mesh.repeated.is_empty());
+}
+
+/// Names and counts of what is left out.
+fn left_out(scene: &Scene) -> Vec<(&'static str, u64)> {
+    let left_out = LeftOut::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
+    left_out
+        .iter()
+        .map(|left| (left.name, left.count))
+        .collect()
+}
+
+#[test]
+fn a_picture_of_one_colour_costs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let color = image::Rgb([188u8, 99, 255]);
+    let pixel = |name: &str, side| {
+        let picture = image::RgbImage::from_pixel(side, side, color);
+        picture.save(folder.join(name)).unwrap();
+    };
+    pixel("large.png", 300);
+    pixel("small.png", 1);
+    let mut spotted = image::RgbImage::from_pixel(64, 64, color);
+    spotted.put_pixel(0, 63, image::Rgb([0, 0, 0]));
+    spotted.save(folder.join("spotted.png")).unwrap();
+    let [large, small, spotted] =
+        ["large.png", "small.png", "spotted.png"].map(|picture| read(folder, picture));
+    let linear = |byte: f32| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
+    let expected = Vec3::new(0.5, 0.25, 0.125) * Vec3::new(188.0, 99.0, 255.0).map(linear);
+    for scene in [&large, &small] {
+        assert!(scene.textures.is_empty() && scene.texcoords.is_empty());
+        assert!(scene.surfaces[0].reflectance.abs_diff_eq(expected, 1e-6));
+        assert_eq!(
+            scene.materials[0].reflectance,
+            scene.surfaces[0].reflectance
+        );
+        assert!(left_out(scene).contains(&("constant-textures", 1)));
+    }
+    assert_eq!(large.surfaces, small.surfaces, "whatever the size");
+    assert_eq!((spotted.textures.len(), spotted.texcoords.len()), (1, 1));
+    assert!(
+        left_out(&spotted)
+            .iter()
+            .all(|left| left.0 != "constant-textures")
+    );
+}
+
+#[test]
+fn pictures_that_no_face_shows_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("broken.png"), "no picture").unwrap();
+    fs::write(
+        folder.join("a.mtl"),
+        "newmtl unused\nKd 0.5\nmap_Kd broken.png\nnewmtl flat\nKd 0.25\nKe 1\nmap_Kd broken.png\nmap_Ke missing.png\n",
+    )
+    .unwrap();
+    let read = |rest: &str| {
+        let path = folder.join("scene.obj");
+        let obj = format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{rest}\n");
+        fs::write(&path, obj).unwrap();
+        read_obj(&path, &SceneOptions::default()).unwrap()
+    };
+    // A material without faces, and one whose faces have no texture coordinates.
+    let scene = read("usemtl unused\nusemtl flat\nf 1 2 3");
+    let said = |scene: &Scene| {
+        let warnings = scene.warnings.iter();
+        let missing =
+            |warning: &&vecrad::scene::Warning| warning.kind == WarningKind::TextureMissing;
+        warnings.filter(missing).count()
+    };
+    assert_eq!(said(&scene), 0, "{:?}", scene.warnings);
+    assert_eq!(scene.spared.unused_textures, 3);
+    assert!(left_out(&scene).contains(&("unused-textures", 3)));
+    assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.25));
+    // Once a face shows them, they are read.
+    let scene = read("vt 0 0\nvt 1 0\nvt 0 1\nusemtl flat\nf 1/1 2/2 3/3");
+    assert_eq!(said(&scene), 2, "{:?}", scene.warnings);
+    assert_eq!(scene.spared.unused_textures, 0);
 }

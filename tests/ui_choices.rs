@@ -16,6 +16,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use vecrad::{
+    scene::{SceneOptions, Sides},
     solver::SolveSettings,
     viewer::{
         Options,
@@ -25,7 +26,7 @@ use vecrad::{
         loader::SceneSource,
         panels::figure,
         start::Faults,
-        state::Severity,
+        state::{RunStatus, Severity},
         view::{ToneMap, ViewMode, ViewRequest},
     },
 };
@@ -464,4 +465,69 @@ fn the_view_menu_tells_what_is_on_and_how_large_text_is() {
     harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::Num0);
     harness.run_steps(3);
     assert_eq!(harness.ctx.zoom_factor(), 1.0);
+}
+
+/// A lamp that shines at a black wall, and behind the lamp a target that sees the wall only.
+const LAMP_WALL_AND_TARGET: [(&str, &str); 2] = [
+    (
+        "scene.obj",
+        "mtllib scene.mtl\n\
+         v 0 -0.25 -0.25\nv 0 0.25 -0.25\nv 0 0.25 0.25\nv 0 -0.25 0.25\n\
+         v 2 -2 -2\nv 2 -2 2\nv 2 2 2\nv 2 2 -2\n\
+         v -1 -1 -1\nv -1 1 -1\nv -1 1 1\nv -1 -1 1\n\
+         usemtl lamp\nf 1 2 3 4\nusemtl wall\nf 5 6 7 8\nusemtl target\nf 9 10 11 12\n",
+    ),
+    (
+        "scene.mtl",
+        "newmtl lamp\nKd 0 0 0\nKe 9 9 9\nnewmtl wall\nKd 0 0 0\nnewmtl target\nKd 0.7 0.7 0.7\n",
+    ),
+];
+
+/// Whether any light falls on the target.
+fn target_is_lit(app: &App) -> bool {
+    let state = &app.state;
+    let (Some(loaded), Some(snapshot)) = (&state.loaded, &state.run.snapshot) else {
+        return false;
+    };
+    let materials = &loaded.scene.materials;
+    let target = materials.iter().position(|m| m.name == "target");
+    let target = target.expect("the file names it");
+    let mesh = &snapshot.mesh;
+    let mut own = mesh.indices.iter().zip(&mesh.triangle_of);
+    own.any(|(corners, &triangle)| {
+        let material = loaded.scene.triangles[triangle as usize].material;
+        let is_lit = |&at: &u32| snapshot.light.irradiance[at as usize].x > 0.0;
+        material.index() == target && corners.iter().any(is_lit)
+    })
+}
+
+#[test]
+fn a_wall_that_is_painted_lights_what_was_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in LAMP_WALL_AND_TARGET {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let mut harness = window(Options {
+        source: Some(SceneSource::File(folder.path().join("scene.obj"))),
+        scene_options: SceneOptions {
+            sides: Sides::One,
+            ..SceneOptions::default()
+        },
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    let is_finished = |app: &App| matches!(app.state.run.status, RunStatus::Finished(_));
+    wait_for(&mut harness, is_finished);
+    assert!(!target_is_lit(harness.state()));
+    let step_count = harness.state().state.run.reports.len();
+    let mut materials = harness.state().state.materials.clone();
+    let wall = materials.now.iter().position(|m| m.name == "wall").unwrap();
+    materials.now[wall].reflectance = glam::Vec3::splat(0.8);
+    perform(&mut harness, Action::Relight(materials));
+    wait_for(&mut harness, |app| is_finished(app) && target_is_lit(app));
+    assert_eq!(
+        harness.state().state.run.reports.len(),
+        step_count,
+        "the run began again by itself, and came to its end"
+    );
 }

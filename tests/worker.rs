@@ -121,6 +121,7 @@ impl Stepper for FakeSolver {
                 ..StepReport::default()
             },
             is_rough: true,
+            is_outgrown: false,
         })
     }
 

@@ -8,7 +8,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{Patch, PatchTree};
-use crate::{geometry::centroid, scene::Scene};
+use crate::{
+    geometry::centroid,
+    scene::{Awakened, Scene},
+};
 
 /// What is nearer to a plane than this lies in it, in frame units. Positions are rounded to 4e-6 there and normals tilted
 /// by 6e-8, over 100 units: below 2e-5 flat walls would rise over themselves. Rays start at twice this distance, so they
@@ -70,9 +73,13 @@ struct Marked {
 
 impl PatchTree {
     /// Which patches light may be exchanged with: those that no chain of patches that face each other joins to an emitter
-    /// are false, and so are emitters that nothing faces. Conservative: true where it takes long to tell.
-    pub fn lit(&self, scene: &Scene) -> Vec<bool> {
-        let emits = |patch: &Patch| patch.emission != Vec3::ZERO;
+    /// are false, and so are emitters that nothing faces. Conservative: true where it takes long to tell. Materials that are
+    /// awakened count as if they emitted or reflected.
+    pub fn lit(&self, scene: &Scene, awakened: &Awakened) -> Vec<bool> {
+        let material = |patch: &Patch| scene.triangles[patch.triangle.index()].material;
+        let emits = |patch: &Patch| patch.emission != Vec3::ZERO || awakened.emits(material(patch));
+        let reflects =
+            |patch: &Patch| patch.reflectance != Vec3::ZERO || awakened.reflects(material(patch));
         let all = self.marked(|_| true);
         let mut lit: Vec<bool> = self
             .patches
@@ -94,7 +101,7 @@ impl PatchTree {
             }
             let mut sends = vec![false; lit.len()];
             for index in reached {
-                sends[index] = self.patches[index].reflectance != Vec3::ZERO;
+                sends[index] = reflects(&self.patches[index]);
             }
             senders = self.marked(|index| sends[index]);
         }
@@ -241,7 +248,7 @@ mod tests {
     /// For each parallelogram, whether light may reach its front.
     fn fronts(scene: &Scene) -> Vec<bool> {
         let tree = tree(scene);
-        let lit = tree.lit(scene);
+        let lit = tree.lit(scene, &Awakened::default());
         let mut fronts = vec![false; scene.triangles.len() / 2];
         for (patch, is_lit) in tree.patches.iter().zip(lit) {
             fronts[patch.triangle.index() / 2] |= is_lit && !patch.is_back;
@@ -296,7 +303,7 @@ mod tests {
         ];
         let room = scene(Sides::Two, &walls);
         let both = tree(&room);
-        let lit = both.lit(&room);
+        let lit = both.lit(&room, &Awakened::default());
         let dark: Vec<bool> = lit.iter().map(|lit| !lit).collect();
         for (patch, &is_dark) in both.patches.iter().zip(&dark) {
             assert_eq!(patch.is_back, is_dark);

@@ -3,6 +3,7 @@
 mod comparison;
 mod error;
 mod lookup;
+pub mod omissions;
 mod scaling;
 pub mod stability;
 mod trajectory;

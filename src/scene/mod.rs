@@ -17,6 +17,7 @@ mod obj;
 mod relight;
 mod sidedness;
 mod source;
+mod spared;
 mod texture;
 mod triangulate;
 mod warning;
@@ -27,7 +28,8 @@ pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, So
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use frame::Frame;
 pub use obj::{ReadError, read_obj};
-pub use relight::Appearance;
+pub use relight::{Appearance, Awakened};
+pub use spared::Spared;
 pub use texture::Texture;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
@@ -155,6 +157,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// What was skipped, cured or clamped on the way in.
     pub warnings: Vec<Warning>,
+    /// Textures that were left out on the way in.
+    pub spared: Spared,
     /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
     pub max_reflectance: f32,
 }

@@ -124,7 +124,7 @@ pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError>
         slots: Vec::new(),
         default_slot: None,
     };
-    import.materials();
+    import.materials(&models);
     import.models(&models);
     drop(models);
     import.finish(path)
@@ -199,6 +199,14 @@ struct Import<'a> {
     default_slot: Option<Slot>,
 }
 
+/// What the faces of a material can show.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shown {
+    has_faces: bool,
+    /// Whether any of them has texture coordinates.
+    has_texcoords: bool,
+}
+
 /// A material with the file it comes from.
 struct Defined {
     material: MtlMaterial,
@@ -209,12 +217,14 @@ struct Defined {
 
 impl Import<'_> {
     /// Make a material of each name that `usemtl` mentions.
-    fn materials(&mut self) {
+    fn materials(&mut self, models: &[tobj::Model]) {
         let library = self.read_libraries();
         let mut unknown = Vec::new();
-        for mention in std::mem::take(&mut self.notes.materials) {
+        let shown = self.shown(models);
+        let mentions = std::mem::take(&mut self.notes.materials);
+        for (mention, shown) in mentions.into_iter().zip(shown) {
             let slot = match library.get(&mention.name) {
-                Some(defined) => self.define(defined),
+                Some(defined) => self.define(defined, shown),
                 None => {
                     let grey = Material::plain(&mention.name, DEFAULT_REFLECTANCE, Vec3::ZERO);
                     unknown.push(mention);
@@ -227,6 +237,22 @@ impl Import<'_> {
             self.slots.push(slot);
         }
         self.warn_of_unknown(&unknown);
+    }
+
+    /// What the faces of each material that is mentioned can show.
+    fn shown(&self, models: &[tobj::Model]) -> Vec<Shown> {
+        let mut shown = vec![Shown::default(); self.notes.materials.len()];
+        for model in models {
+            let segment = model.name.parse::<usize>().ok();
+            let segment = segment.and_then(|segment| self.notes.segments.get(segment));
+            if let Some(material) = segment.and_then(|segment| segment.material) {
+                shown[material].has_faces |= !model.mesh.indices.is_empty();
+                // What is not finite stands for none.
+                let mut texcoords = model.mesh.texcoords.iter();
+                shown[material].has_texcoords |= texcoords.any(|at| at.is_finite());
+            }
+        }
+        shown
     }
 
     fn warn_of_unknown(&mut self, unknown: &[Mention]) {
@@ -332,8 +358,9 @@ impl Import<'_> {
         }
     }
 
-    /// Turn a material of an MTL file into one of the scene.
-    fn define(&mut self, defined: &Defined) -> Slot {
+    /// Turn a material of an MTL file into one of the scene. Pictures that no face shows are not read, but where a missing
+    /// colour depends on whether there is one.
+    fn define(&mut self, defined: &Defined, shown: Shown) -> Slot {
         let MtlMaterial {
             diffuse,
             emissive,
@@ -341,8 +368,15 @@ impl Import<'_> {
             emissive_map,
             ..
         } = &defined.material;
-        let reflectance_texture = self.texture(diffuse_map.as_ref(), defined);
-        let emission_texture = self.texture(emissive_map.as_ref(), defined);
+        let mut texture = |map: &Option<TextureReference>, color: &Option<Vec3>| {
+            if shown.has_texcoords || (shown.has_faces && color.is_none()) {
+                return self.texture(map.as_ref(), defined);
+            }
+            self.builder.spared.unused_textures += usize::from(map.is_some());
+            None
+        };
+        let reflectance_texture = texture(diffuse_map, diffuse);
+        let emission_texture = texture(emissive_map, emissive);
         // A texture without a colour stands for itself.
         let bare = |texture: Option<TextureId>, otherwise: Vec3, most: f32| {
             texture.map_or(otherwise, |_| Vec3::splat(most))

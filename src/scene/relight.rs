@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    Material, Scene, Surface, TextureId,
+    Material, MaterialId, Scene, Surface, TextureId,
     texture::{TextureAverage, cured},
 };
 
@@ -42,7 +42,64 @@ impl Appearance {
     }
 }
 
+/// Materials that may emit or reflect, though the scene as it was read says that they do not.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Awakened {
+    /// By material; none where it is shorter.
+    emit: Vec<bool>,
+    /// Likewise.
+    reflect: Vec<bool>,
+}
+
+impl Awakened {
+    /// Whether a material emits that the scene says does not.
+    pub fn emits(&self, material: MaterialId) -> bool {
+        self.emit.get(material.index()) == Some(&true)
+    }
+
+    /// Whether a material reflects that the scene says does not.
+    pub fn reflects(&self, material: MaterialId) -> bool {
+        self.reflect.get(material.index()) == Some(&true)
+    }
+
+    /// Whether no other material is awake than here.
+    pub fn covers(&self, other: &Self) -> bool {
+        let covers = |own: &[bool], other: &[bool]| {
+            let is_own = |at: usize| own.get(at) == Some(&true);
+            other.iter().enumerate().all(|(at, is)| !is || is_own(at))
+        };
+        covers(&self.emit, &other.emit) && covers(&self.reflect, &other.reflect)
+    }
+
+    /// What is awake in either.
+    pub fn joined(&self, other: &Self) -> Self {
+        let join = |own: &[bool], other: &[bool]| {
+            let is = |of: &[bool], at: usize| of.get(at) == Some(&true);
+            let count = own.len().max(other.len());
+            (0..count).map(|at| is(own, at) || is(other, at)).collect()
+        };
+        Self {
+            emit: join(&self.emit, &other.emit),
+            reflect: join(&self.reflect, &other.reflect),
+        }
+    }
+}
+
 impl Scene {
+    /// Which materials are awake when they look so, one for each.
+    pub fn awakened(&self, appearances: &[Appearance]) -> Awakened {
+        let pairs = || self.materials.iter().zip(appearances);
+        let wakes = |before: Vec3, now: Vec3| before == Vec3::ZERO && now != Vec3::ZERO;
+        Awakened {
+            emit: pairs()
+                .map(|(material, now)| wakes(material.emission, now.emission))
+                .collect(),
+            reflect: pairs()
+                .map(|(material, now)| wakes(material.reflectance, now.reflectance))
+                .collect(),
+        }
+    }
+
     /// How each material reflects and emits.
     pub fn appearances(&self) -> Vec<Appearance> {
         self.materials.iter().map(Appearance::of).collect()
@@ -136,9 +193,9 @@ mod tests {
         let mut builder = SceneBuilder::default();
         builder.textures.push(Texture {
             name: String::new(),
-            width: 1,
+            width: 2,
             height: 1,
-            pixels: vec![Vec3::splat(0.5)],
+            pixels: vec![Vec3::splat(0.4), Vec3::splat(0.6)],
         });
         let textured = builder.push_material(Material {
             reflectance_texture: Some(TextureId(0)),
@@ -172,8 +229,9 @@ mod tests {
     fn what_was_black_takes_its_texture_along() {
         let relit = scene().relit(&[grey(0.8, 6.0)]);
         let [textured, plain] = [relit.surfaces[0], relit.surfaces[1]];
-        assert!((textured.reflectance - 0.4).abs().max_element() < 1e-6);
-        assert!((textured.emission - 3.0).abs().max_element() < 1e-6);
+        let mean = textured.reflectance / 0.8;
+        assert!(mean.cmpgt(Vec3::splat(0.4)).all() && mean.cmplt(Vec3::splat(0.6)).all());
+        assert!((textured.emission / 6.0 - mean).abs().max_element() < 1e-6);
         assert_eq!(plain, scene().surfaces[1], "nothing was wished for it");
         assert_eq!(relit.appearances()[0], grey(0.8, 6.0));
     }
@@ -189,6 +247,25 @@ mod tests {
             assert!(surface.reflectance.max_element() <= scene.max_reflectance);
             assert_eq!(surface.emission, Vec3::ZERO);
         }
+    }
+
+    #[test]
+    fn only_what_was_black_or_dark_is_awakened() {
+        let scene = scene();
+        assert_eq!(scene.awakened(&scene.appearances()), {
+            Awakened {
+                emit: vec![false; 2],
+                reflect: vec![false; 2],
+            }
+        });
+        let painted = scene.awakened(&[grey(0.5, 0.0), grey(0.0, 0.0)]);
+        let lit = scene.awakened(&[grey(0.0, 1.0), grey(0.9, 7.0)]);
+        assert!(painted.reflects(MaterialId(0)) && !painted.emits(MaterialId(0)));
+        assert!(lit.emits(MaterialId(0)) && !lit.emits(MaterialId(1)));
+        let (both, none) = (painted.joined(&lit), Awakened::default());
+        assert!(both.covers(&painted) && both.covers(&lit) && both.covers(&none));
+        assert!(!painted.covers(&lit) && !none.covers(&lit));
+        assert_eq!(none.joined(&lit), lit);
     }
 
     #[test]

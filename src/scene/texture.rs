@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel};
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Texture {
     /// File name as the material gives it.
     pub name: String,

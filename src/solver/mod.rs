@@ -45,7 +45,7 @@ pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, Reading, Tables},
-    scene::Scene,
+    scene::{Appearance, Awakened, Scene},
     transport::{
         Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
     },
@@ -140,20 +140,25 @@ impl Solver {
         memory_limit: Option<u64>,
         cancel: &Cancel,
     ) -> Option<Self> {
-        Self::with_rays(scene, None, settings, memory_limit, cancel)
+        Self::with_rays(scene, None, settings, memory_limit, None, cancel)
     }
 
-    /// As [`Self::new`], with the scene's ray tree where there is one already.
+    /// As [`Self::new`], with the scene's ray tree where there is one already, and for materials that look so, where not as
+    /// the scene says. What one of both needs is not left out, so that what is switched off may be switched on.
     pub fn with_rays(
         scene: Arc<Scene>,
         rays: Option<Arc<RayTree>>,
         settings: SolveSettings,
         memory_limit: Option<u64>,
+        wished: Option<&[Appearance]>,
         cancel: &Cancel,
     ) -> Option<Self> {
         cancel.proceed()?;
         let is_cancelled = || cancel.is_cancelled();
-        let (plan, tree) = Plan::make(&scene, &settings, &is_cancelled)?;
+        let awakened = wished.map_or_else(Awakened::default, |wished| {
+            scene.awakened(&scene.allowed(wished))
+        });
+        let (plan, tree) = Plan::make(&scene, &settings, awakened, &is_cancelled)?;
         let hierarchy = Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &is_cancelled)?;
         cancel.proceed()?;
         let rays = match rays {
@@ -186,6 +191,9 @@ impl Solver {
         solver.first_light(cancel)?;
         solver.pull();
         solver.show(cancel)?;
+        if let Some(wished) = wished {
+            solver.relight(wished, cancel)?;
+        }
         Some(solver)
     }
 

@@ -14,7 +14,12 @@
 //! The last two are for the default method and oracle: whoever asks for others wants to see what they do.
 //!
 //! Looked at and not left out, since it does not pay: rays of single pairs whose shaft is empty, channels of grey scenes,
-//! clusters of small scenes with shadows.
+//! clusters of small scenes with shadows, and
+//! * links of black sources: form factors of all sources must add to the closure, and since they are judged by little light
+//!   they are few, a twentieth of the links and a hundredth of the rays where the blocks or the floor of the Cornell box are
+//!   black;
+//! * tables of clusters with one normal or along the axes: a sixth of the clusters in rooms and soups at most, and so a
+//!   fiftieth of the memory.
 //!
 //! Beside these, some things are left out by loading, whatever is kept; they are listed after the plan.
 
@@ -22,10 +27,10 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Method, Oracle, SolveSettings};
+use super::{Cancel, Method, Oracle, SolveSettings};
 use crate::{
-    hierarchy::PatchTree,
-    scene::{Scene, WarningKind},
+    hierarchy::{Hierarchy, Patch, PatchTree},
+    scene::{Awakened, Scene, WarningKind},
 };
 
 /// Patches of a scene that is solved patch by patch, at most: their pairs are fewer than the links of usual scenes.
@@ -107,6 +112,15 @@ pub struct LeftOut {
     pub bound: &'static str,
 }
 
+impl LeftOut {
+    /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
+    pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
+        let awakened = Awakened::default();
+        let (plan, _) = Plan::make(scene, settings, awakened, &|| cancel.is_cancelled())?;
+        Some(Arc::unwrap_or_clone(plan.left_out))
+    }
+}
+
 impl std::fmt::Display for LeftOut {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
@@ -131,19 +145,26 @@ pub(super) struct Plan {
     pub(super) follows_light: bool,
     /// Only elements exchange light.
     pub(super) is_by_patch: bool,
+    /// Materials that it is made for as if they emitted or reflected.
+    awakened: Awakened,
     /// The list.
     pub(super) left_out: Arc<Vec<LeftOut>>,
 }
 
 impl Plan {
-    /// Look at a scene, and plant the tree that is needed; `None` when cancelled.
+    /// Look at a scene, and plant the tree that is needed; `None` when cancelled. What is left out need not be added where
+    /// the awakened materials emit or reflect.
     pub(super) fn make(
         scene: &Scene,
         settings: &SolveSettings,
+        awakened: Awakened,
         cancelled: &dyn Fn() -> bool,
     ) -> Option<(Self, PatchTree)> {
         let may_omit = |omission| !settings.keep.has(omission);
-        let mut plan = Self::default();
+        let mut plan = Self {
+            awakened,
+            ..Self::default()
+        };
         let mut tree = PatchTree::build(scene, cancelled)?;
         if may_omit(Omission::Unlit) {
             tree = plan.omit_unlit(scene, tree, cancelled)?;
@@ -169,14 +190,14 @@ impl Plan {
         tree: PatchTree,
         cancelled: &dyn Fn() -> bool,
     ) -> Option<PatchTree> {
-        let lit = tree.lit(scene);
+        let lit = tree.lit(scene, &self.awakened);
         // Without any light there is nothing to spare.
         if lit.iter().all(|&is_lit| is_lit) || !lit.contains(&true) {
             return Some(tree);
         }
         let dark: Vec<bool> = lit.into_iter().map(|is_lit| !is_lit).collect();
         let patches = || tree.patches.iter().zip(&dark).filter(|(_, dark)| **dark);
-        let emits = |patch: &crate::hierarchy::Patch| patch.emission != glam::Vec3::ZERO;
+        let emits = |patch: &Patch| patch.emission != glam::Vec3::ZERO;
         let unseen = patches().filter(|(patch, _)| emits(patch)).count();
         self.note(
             Omission::Unlit,
@@ -199,6 +220,35 @@ impl Plan {
             );
         }
         tree.without(scene, &dark, cancelled)
+    }
+
+    /// Whether what was left out of a hierarchy stays dark where these materials are awakened, too. If so, the plan holds
+    /// for them from now on.
+    pub(super) fn holds_for(
+        &mut self,
+        scene: &Scene,
+        hierarchy: &Hierarchy,
+        awakened: &Awakened,
+    ) -> bool {
+        let is_whole = hierarchy.held().len() == hierarchy.patches.len();
+        if is_whole || self.awakened.covers(awakened) {
+            return true;
+        }
+        let all = self.awakened.joined(awakened);
+        let side = |patch: &Patch| 2 * patch.triangle.index() + usize::from(patch.is_back);
+        let mut is_held = vec![false; 2 * scene.triangles.len()];
+        for patch in &hierarchy.patches[hierarchy.held()] {
+            is_held[side(patch)] = true;
+        }
+        let Some(tree) = PatchTree::build(scene, &|| false) else {
+            return false;
+        };
+        let mut lit = tree.lit(scene, &all).into_iter().zip(&tree.patches);
+        let holds = lit.all(|(is_lit, patch)| !is_lit || is_held[side(patch)]);
+        if holds {
+            self.awakened = all;
+        }
+        holds
     }
 
     /// List what is left out where nothing blocks.
@@ -286,6 +336,20 @@ fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
             "triangles",
             "each lies on another one that looks the same way",
             "light would be there twice",
+        ),
+        (
+            "constant-textures",
+            scene.spared.constant_textures,
+            "textures of one colour",
+            "where faces show them all their pixels are alike, so the materials have that colour instead",
+            "nothing changes but rounding",
+        ),
+        (
+            "unused-textures",
+            scene.spared.unused_textures,
+            "textures",
+            "no face shows them",
+            "nothing changes",
         ),
     ];
     let found = entries.into_iter().filter(|entry| entry.1 > 0);

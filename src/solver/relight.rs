@@ -6,8 +6,8 @@
 //! before, and corners of elements take their share as they did in the light that was solved last, until
 //! [`Solver::finish_relighting`] gathers for each of them: that takes several times as long as all sweeps together.
 //! Links stay those that the light before asked for: a step that follows refines them for the new one.
-//! What the plan left out stays out: it goes by what the scene says, so a surface that is painted may not light what was
-//! dark for being seen from black ones only.
+//! What the plan left out stays out, also where a surface that is painted or begins to shine lights it: then the light is
+//! wrong there, and [`Relit::is_outgrown`] says that a new solve is needed.
 
 use std::sync::Arc;
 
@@ -36,6 +36,9 @@ pub struct Relit {
     pub report: StepReport,
     /// Whether [`Solver::finish_relighting`] would tell more of the light within elements.
     pub is_rough: bool,
+    /// Whether light reaches what was left out of the solve: it is missing, and only a solve that begins anew for these
+    /// appearances will show it.
+    pub is_outgrown: bool,
 }
 
 /// Light that was solved when materials looked so.
@@ -110,6 +113,8 @@ impl Solver {
     pub fn relight(&mut self, wished: &[Appearance], cancel: &Cancel) -> Option<Relit> {
         cancel.proceed()?;
         let appearances = self.scene.allowed(wished);
+        let awakened = self.scene.awakened(&appearances);
+        let is_outgrown = !self.plan.holds_for(&self.scene, &self.hierarchy, &awakened);
         let factor = self.keep_solved(&appearances);
         let shot = self.mix_direct(&appearances, cancel)?;
         self.ray_count += shot;
@@ -126,6 +131,7 @@ impl Solver {
         Some(Relit {
             report,
             is_rough: !self.relighting.is_solved && !self.links.is_empty(),
+            is_outgrown,
         })
     }
 

@@ -115,7 +115,9 @@ impl Run {
                 }
             }
             Event::Stepped(report) => self.reports.push(report),
-            Event::Relit { report, seconds } => {
+            Event::Relit {
+                report, seconds, ..
+            } => {
                 self.relit_secs = seconds.or(self.relit_secs);
                 if let Some(last) = self.reports.last_mut() {
                     *last = report;

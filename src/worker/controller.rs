@@ -295,8 +295,13 @@ impl Controller {
                 run.ask_again();
                 let report = run.dated(relit.report);
                 let seconds = Some(trip.spent.as_secs_f64());
-                self.outbox
-                    .send(generation, Event::Relit { report, seconds });
+                let is_outgrown = relit.is_outgrown;
+                let event = Event::Relit {
+                    report,
+                    seconds,
+                    is_outgrown,
+                };
+                self.outbox.send(generation, event);
                 if matches!(run.aim, Aim::End(reason) if !reason.can_continue()) {
                     // There is more to do for the new light, once it is wished for.
                     run.turn_to(Aim::Rest);
@@ -308,9 +313,12 @@ impl Controller {
                 self.outbox.publish(generation, snapshot);
                 run.ask_again();
                 let report = run.dated(report);
-                let seconds = None;
-                self.outbox
-                    .send(generation, Event::Relit { report, seconds });
+                let event = Event::Relit {
+                    report,
+                    seconds: None,
+                    is_outgrown: false,
+                };
+                self.outbox.send(generation, event);
             }
             Outcome::RelitFinely(None, _) => run.is_rough = true,
             Outcome::Inspected(inspections) => {

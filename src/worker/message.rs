@@ -88,6 +88,9 @@ pub enum Event {
         report: StepReport,
         /// Seconds that it took; nothing where what was shown in haste has been worked out.
         seconds: Option<f64>,
+        /// Whether light is missing that only a run that begins anew will show (see
+        /// [`Relit::is_outgrown`](crate::solver::Relit::is_outgrown)).
+        is_outgrown: bool,
     },
     /// An answer to [`super::WorkerHandle::inspect`].
     Inspected(Arc<Inspection>),

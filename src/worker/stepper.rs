@@ -46,18 +46,14 @@ pub struct Job {
 impl Job {
     /// Prepare the solver for it, unless cancelled.
     pub fn solver(self, cancel: &Cancel) -> Option<Solver> {
-        let mut solver = Solver::with_rays(
+        Solver::with_rays(
             self.scene,
             self.rays,
             self.settings,
             self.memory_limit,
+            self.appearances.as_deref(),
             cancel,
-        )?;
-        if let Some(appearances) = self.appearances {
-            // What may be left out is told from the scene as it was read: what is off may be switched on.
-            solver.relight(&appearances, cancel)?;
-        }
-        Some(solver)
+        )
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod baselines;
 mod error_time;
+mod omissions;
 mod plan;
 mod runs;
 mod scaling;

@@ -47,7 +47,7 @@ pub struct PlanFlags {
     /// Triangles of the rooms in the scaling suite [default: 1022 to 1000000, about fourfold each]
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1_000..=16_000_000), help_heading = "Plan")]
     pub sizes: Vec<u32>,
-    /// Cases of the stability suite to try: groups, or parts of names [default: all]
+    /// Cases of the stability suite to try, or scenes of the plan suite: groups, or parts of names [default: all]
     #[arg(
         long,
         value_name = "NAME",
@@ -55,7 +55,7 @@ pub struct PlanFlags {
         help_heading = "Plan"
     )]
     pub cases: Vec<String>,
-    /// Runs of each kind, of whose times the median is taken; best odd
+    /// Runs of each kind, of whose times the median is taken; best odd; of quick scenes of the plan suite at least 3
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=99), help_heading = "Plan")]
     pub repeats: u32,
 }

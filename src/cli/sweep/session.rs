@@ -1,10 +1,12 @@
 //! What all runs of a report share: scenes, references, threads, limits, progress, and whether to stop.
 
 use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
+        mpsc,
     },
     time::{Duration, Instant},
 };
@@ -19,12 +21,15 @@ use crate::{
     metrics::{ErrorMeasures, MeshLookup, ReferenceFacts, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
     scene::{Scene, builtin::room_of},
-    solver::{DisplayMesh, VertexLight},
+    solver::{Cancel, DisplayMesh, VertexLight},
     worker::RunOptions,
 };
 
 /// Time of a run where none is given: enough for 2 % on most scenes, and not yet a coffee break for a whole plan.
 const USUAL_TIME_LIMIT: Duration = Duration::from_secs(60);
+
+/// How often an interruption is looked for.
+const POLL: Duration = Duration::from_millis(50);
 
 /// Where a scene comes from.
 pub(super) enum Source {
@@ -119,6 +124,46 @@ impl<'a> Session<'a> {
     /// Keep the progress line alive.
     pub(super) fn tick(&mut self) {
         self.progress.show();
+    }
+
+    /// Run something in the pool, and cancel it when its time is over or Ctrl+C is pressed.
+    ///
+    /// # Errors
+    /// A clause that says how it panicked.
+    pub(super) fn watch<T: Send>(
+        &mut self,
+        job: impl FnOnce(&Cancel) -> T + Send,
+    ) -> Result<T, String> {
+        let (cancel, begin, limit) = (Cancel::default(), Instant::now(), self.time_limit());
+        let (done, outcome) = mpsc::sync_channel(1);
+        let job = {
+            let cancel = cancel.clone();
+            move || {
+                let outcome = catch_unwind(AssertUnwindSafe(|| job(&cancel)));
+                // The session listens until there is an outcome.
+                let _ = done.send(outcome);
+            }
+        };
+        let pool = self.pool.clone();
+        let outcome = pool.in_place_scope(|scope| {
+            scope.spawn(|_| job());
+            loop {
+                if let Ok(outcome) = outcome.recv_timeout(POLL) {
+                    return outcome;
+                }
+                self.tick();
+                if begin.elapsed() >= limit || self.is_interrupted() {
+                    cancel.cancel();
+                }
+            }
+        });
+        outcome.map_err(|panic| {
+            let message = panic
+                .downcast_ref::<String>()
+                .map(String::as_str)
+                .or_else(|| panic.downcast_ref::<&str>().copied());
+            format!("panic: {}", message.unwrap_or("of unknown cause"))
+        })
     }
 
     /// How it ended.

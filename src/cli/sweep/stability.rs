@@ -2,9 +2,7 @@
 
 use std::{
     io::{self, Write},
-    panic::{AssertUnwindSafe, catch_unwind},
-    sync::mpsc,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use anyhow::{Result, bail};
@@ -15,11 +13,7 @@ use crate::{
     cli::{UsageError, output::write_whole, report::Machine},
     export::write_csv,
     metrics::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
-    solver::Cancel,
 };
-
-/// How often an interruption is looked for.
-const POLL: Duration = Duration::from_millis(50);
 
 /// Everything in `stability.json`.
 #[derive(Serialize)]
@@ -95,47 +89,10 @@ fn chosen(arguments: &ReportArguments) -> Result<Vec<Case>> {
 
 /// Run one case in the session's pool, and stop it when its time is over or Ctrl+C is pressed.
 fn try_case(session: &mut Session<'_>, case: &Case) -> Outcome {
-    let (cancel, begin) = (Cancel::default(), Instant::now());
-    let limit = session.time_limit();
-    let (done, outcome) = mpsc::sync_channel(1);
-    let job = {
-        let cancel = cancel.clone();
-        move || {
-            let outcome = catch_unwind(AssertUnwindSafe(|| case.run(&cancel)));
-            // The session listens until there is an outcome.
-            let _ = done.send(outcome);
-        }
-    };
-    let interrupted = session.interrupted.clone();
-    let pool = session.pool.clone();
-    let outcome = pool.in_place_scope(|scope| {
-        scope.spawn(|_| job());
-        loop {
-            if let Ok(outcome) = outcome.recv_timeout(POLL) {
-                return outcome;
-            }
-            session.tick();
-            let is_over = begin.elapsed() >= limit;
-            if is_over || interrupted.load(std::sync::atomic::Ordering::Relaxed) {
-                cancel.cancel();
-            }
-        }
-    });
-    match outcome {
-        Ok(outcome) => outcome,
-        Err(panic) => {
-            let message = panic
-                .downcast_ref::<String>()
-                .map(String::as_str)
-                .or_else(|| panic.downcast_ref::<&str>().copied())
-                .unwrap_or("of unknown cause");
-            Outcome::failed(
-                case,
-                format!("panic: {message}"),
-                begin.elapsed().as_secs_f64(),
-            )
-        }
-    }
+    let begin = Instant::now();
+    session
+        .watch(|cancel| case.run(cancel))
+        .unwrap_or_else(|panic| Outcome::failed(case, panic, begin.elapsed().as_secs_f64()))
 }
 
 /// Write all files, each whole or not at all.

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::{
-    error_time, scaling,
+    error_time, omissions, scaling,
     session::{Session, Source},
     stability,
 };
@@ -17,7 +17,7 @@ struct Suite {
 /// The three sizes of Sun, Gong and Pan.
 const PAPER: [&str; 3] = ["room-1022", "room-8621", "room-42879"];
 
-static SUITES: [Suite; 7] = [
+static SUITES: [Suite; 8] = [
     Suite {
         name: "paper",
         run: |session| on_builtins(session, &PAPER),
@@ -51,6 +51,10 @@ static SUITES: [Suite; 7] = [
     Suite {
         name: "stability",
         run: stability::try_cases,
+    },
+    Suite {
+        name: "plan",
+        run: omissions::compare,
     },
 ];
 

@@ -48,6 +48,17 @@ const BLOCKS: [Block; 2] = [
 ];
 
 pub(super) fn cornell() -> SceneBuilder {
+    room_with(&BLOCKS)
+}
+
+/// The Cornell box without its blocks, in which nothing casts a shadow.
+pub fn empty_cornell() -> SceneBuilder {
+    let mut builder = room_with(&[]);
+    "empty-cornell".clone_into(&mut builder.source.name);
+    builder
+}
+
+fn room_with(blocks: &[Block]) -> SceneBuilder {
     let mut builder = SceneBuilder::default();
     let mut paint = |name: &str, reflectance: [f32; 3], emission: [f32; 3]| {
         builder.push_material(Material::plain(
@@ -61,7 +72,7 @@ pub(super) fn cornell() -> SceneBuilder {
     let green = paint("green", [0.14, 0.45, 0.091], [0.0; 3]);
     let light = paint("light", [0.78, 0.78, 0.78], [18.4, 15.6, 8.0]);
 
-    floor(white).add_to(&mut builder, "floor");
+    floor(blocks, white).add_to(&mut builder, "floor");
     ceiling(white).add_to(&mut builder, "ceiling");
     plane(&LIGHT, &[], CEILING, false, light).add_to(&mut builder, "light");
     for (name, material, corners) in [
@@ -101,18 +112,18 @@ pub(super) fn cornell() -> SceneBuilder {
         mesh.quad(corners, material);
         mesh.add_to(&mut builder, name);
     }
-    for block in &BLOCKS {
+    for block in blocks {
         block_mesh(block, white).add_to(&mut builder, block.name);
     }
     builder
 }
 
 /// The floor with a hole under each block.
-fn floor(material: MaterialId) -> Mesh {
+fn floor(blocks: &[Block], material: MaterialId) -> Mesh {
     let outline = [(0.0, 0.0), (552.8, 0.0), (549.6, DEPTH), (0.0, DEPTH)];
     let mut corners: Vec<DVec2> = outline.map(DVec2::from).to_vec();
     let mut holes = Vec::new();
-    for block in &BLOCKS {
+    for block in blocks {
         holes.push(corners.len() as u32);
         corners.extend(block.outline);
     }

@@ -15,6 +15,7 @@ mod soup;
 pub mod stability;
 mod tiled_room;
 
+pub use cornell::empty_cornell;
 pub use furnace::{furnace, sphere_furnace};
 pub use plates::{perpendicular_plates, plates};
 pub use room::room_of;

@@ -29,13 +29,7 @@ impl App {
             Action::Reload => self.reload(),
             Action::PauseContinue => self.pause_or_continue(),
             Action::Stop => self.stop(),
-            Action::Reset => {
-                if self.state.loaded.is_some() {
-                    self.state.inspections.close();
-                    self.state.run.last_change = None;
-                    self.worker.reset();
-                }
-            }
+            Action::Reset => self.begin_again(),
             Action::Settings(settings) => {
                 self.state.settings = settings.clone();
                 let effect = self.worker.change_settings(settings);
@@ -224,6 +218,15 @@ impl App {
                 let text = format!("cannot start a thread: {error}");
                 self.state.messages.push(Severity::Error, text);
             }
+        }
+    }
+
+    /// Light the scene from the beginning.
+    pub(super) fn begin_again(&mut self) {
+        if self.state.loaded.is_some() {
+            self.state.inspections.close();
+            self.state.run.last_change = None;
+            self.worker.reset();
         }
     }
 

@@ -65,6 +65,7 @@ impl App {
 
     fn drain_worker(&mut self) {
         let run = self.worker.generation().number();
+        let mut is_outgrown = false;
         for event in self.worker.events() {
             let state = &mut self.state;
             match &event {
@@ -74,10 +75,19 @@ impl App {
                     state.inspections.note(inspection.clone());
                     state.correct_cluster();
                 }
+                // Later light of the same run may need less again.
+                Event::Relit {
+                    is_outgrown: is_now,
+                    seconds: Some(_),
+                    ..
+                } => is_outgrown = *is_now,
                 _ => {}
             }
             state.truth.note(&event, run, &state.settings);
             state.run.note(event);
+        }
+        if is_outgrown {
+            self.begin_again();
         }
         let held = &self.state.run.snapshot;
         let is_known =
