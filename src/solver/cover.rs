@@ -203,7 +203,9 @@ impl DirectField {
                 normals[vertex as usize] += mesh.elements[leaf].area_vector;
             }
         }
-        let mut chosen: Vec<Option<((bool, f32), u32)>> = vec![None; mesh.vertices.len()];
+        /// How fit a leaf is, and which one it is.
+        type Choice = ((bool, f32), u32);
+        let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
         for leaf in mesh.held_leaves() {
             let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
             for (side, vertex) in element.vertices.into_iter().enumerate() {
@@ -215,7 +217,7 @@ impl DirectField {
                 }
             }
         }
-        let receiver = |(vertex, choice): (usize, Option<((bool, f32), u32)>)| {
+        let receiver = |(vertex, choice): (usize, Option<Choice>)| {
             let (_, leaf) = choice?;
             let patch = hierarchy.patch_of(leaf as usize);
             let centroid = mesh.elements[leaf as usize].centroid;
