@@ -399,6 +399,6 @@ fn what_is_shown_in_haste_is_nearly_what_is_shown_after() {
         let error = (mean_irradiance(&rough) / mean_irradiance(&fine) - 1.0).abs();
         assert!(error.max_element() < 0.01, "{error}");
         let error = difference(&rough.light.irradiance, &fine.light.irradiance);
-        assert!(error < 0.25, "{error}");
+        assert!(error < 0.3, "{error}");
     }
 }
