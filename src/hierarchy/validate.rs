@@ -101,13 +101,18 @@ mod tests {
 
     /// A bumpy sheet of `2 · side²` triangles.
     fn sheet(side: u32, seed: u64) -> SceneBuilder {
+        long_sheet(side, seed, 1.0)
+    }
+
+    /// A bumpy sheet of `2 · side²` triangles that are so many times as long as wide.
+    fn long_sheet(side: u32, seed: u64, length: f64) -> SceneBuilder {
         let mut random = Random::new(seed, 0);
         let mut builder = SceneBuilder::default();
         let material = builder.push_material(Material::plain("grey", Vec3::splat(0.5), Vec3::ONE));
         for row in 0..=side {
             for column in 0..=side {
                 builder.push_position(DVec3::new(
-                    column.into(),
+                    length * f64::from(column),
                     f64::from(random.uniform()),
                     row.into(),
                 ));
@@ -182,8 +187,8 @@ mod tests {
 
     #[test]
     fn random_divisions_stay_balanced() {
-        for seed in 0..5 {
-            let mut hierarchy = hierarchy(sheet(4, seed));
+        for (seed, length) in [(0, 1.0), (1, 1.0), (2, 5.0), (3, 20.0), (4, 100.0)] {
+            let mut hierarchy = hierarchy(long_sheet(4, seed, length));
             let mut random = Random::new(seed, 1);
             for _ in 0..40 {
                 let wanted = random.below(hierarchy.mesh.elements.len() as u32);
@@ -195,20 +200,54 @@ mod tests {
 
     #[test]
     fn deep_division_at_one_corner_stays_balanced() {
-        let mut hierarchy = hierarchy(sheet(3, 3));
-        for _ in 0..8 {
-            let corner = hierarchy
-                .mesh
-                .leaves()
-                .find(|&leaf| hierarchy.mesh.elements[leaf].vertices.contains(&0));
-            hierarchy.mesh.divide(&[corner.unwrap() as u32]);
-            hierarchy.validate().unwrap();
+        for length in [1.0, 30.0] {
+            let mut hierarchy = hierarchy(long_sheet(3, 3, length));
+            for _ in 0..8 {
+                let corner = hierarchy
+                    .mesh
+                    .leaves()
+                    .find(|&leaf| hierarchy.mesh.elements[leaf].vertices.contains(&0));
+                hierarchy.mesh.divide(&[corner.unwrap() as u32]);
+                hierarchy.validate().unwrap();
+            }
         }
     }
 
     #[test]
+    fn division_makes_slivers_shorter() {
+        let mut hierarchy = hierarchy(long_sheet(2, 5, 40.0));
+        // Lengths over heights: their largest, and their mean by area.
+        let lengths = |hierarchy: &Hierarchy| {
+            let (mut most, mut sum, mut whole) = (0.0f32, 0.0, 0.0);
+            for leaf in hierarchy.mesh.leaves() {
+                let [a, b, c] = hierarchy.mesh.corners(leaf);
+                let area = hierarchy.mesh.elements[leaf].area_vector.length();
+                let sides = [a.distance(b), b.distance(c), c.distance(a)];
+                let length = sides.into_iter().fold(0.0, f32::max).powi(2) / (2.0 * area);
+                (most, sum, whole) = (most.max(length), sum + length * area, whole + area);
+            }
+            (most, sum / whole)
+        };
+        let before = lengths(&hierarchy);
+        for _ in 0..10 {
+            let wanted: Vec<u32> = hierarchy.mesh.leaves().map(|leaf| leaf as u32).collect();
+            hierarchy.mesh.divide(&wanted);
+        }
+        hierarchy.validate().unwrap();
+        let after = lengths(&hierarchy);
+        assert!(after.1 < 0.5 * before.1, "{before:?} {after:?}");
+        assert!(after.0 < 2.5 * before.0, "{before:?} {after:?}");
+    }
+
+    #[test]
     fn closed_edges_leave_no_crack() {
-        let mut hierarchy = hierarchy(sheet(3, 4));
+        for length in [1.0, 12.0] {
+            assert_closed(hierarchy(long_sheet(3, 4, length)), length as f32);
+        }
+    }
+
+    /// Divide here and there, and look for open edges.
+    fn assert_closed(mut hierarchy: Hierarchy, length: f32) {
         for _ in 0..4 {
             let wanted: Vec<u32> = hierarchy
                 .mesh
@@ -230,8 +269,9 @@ mod tests {
         }
         let border = |point: u32| {
             let position = hierarchy.mesh.points[point as usize];
+            // The longer side spans the frame.
             let rim = 0.999 * 50.0;
-            (position.x.abs() > rim, position.z.abs() > rim)
+            (position.x.abs() > rim, position.z.abs() * length > rim)
         };
         for ((a, b), sum) in balance {
             let (a, b) = (border(a), border(b));

@@ -18,7 +18,7 @@ const CONTACT_TOLERANCE: f32 = 1.0;
 
 /// Whether an element lies within a solid is looked at if it is this many times larger than those that are not divided
 /// for it, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose contacts are fine anyway.
-const LOOKED_AT: f32 = 16.0;
+const LOOKED_AT: f32 = 64.0;
 
 /// Tangents of the probes' directions against the normal: from within a solid all of them meet it from behind.
 const PROBES: [[f32; 2]; 4] = [[0.0, 0.0], [0.9, 0.1], [-0.4, 0.8], [-0.5, -0.7]];

@@ -1,0 +1,109 @@
+//! Where objects stand on others: in a furnace, where everything emits and reflects alike, all that can be seen is equally
+//! bright, however much of a surface lies under an object.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{f32::consts::PI, sync::Arc};
+
+use glam::{DVec3, Vec3};
+use vecrad::{
+    scene::{Material, MaterialId, SceneBuilder, SceneOptions, Sides},
+    solver::{Cancel, Snapshot, SolveSettings, Solver},
+};
+
+const EMITTED: f32 = 0.25;
+const REFLECTANCE: f32 = 0.5;
+
+/// Half of the box's width; the room is 2 wide.
+const HALF: f64 = 0.37;
+
+/// Six sides of a box, seen from outside or from inside.
+fn cuboid(builder: &mut SceneBuilder, low: DVec3, high: DVec3, inward: bool, paint: MaterialId) {
+    let corner = |index: usize| {
+        let pick = |bit: usize, axis: usize| {
+            if index & bit == 0 {
+                low[axis]
+            } else {
+                high[axis]
+            }
+        };
+        DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2))
+    };
+    let corners: Vec<u32> = (0..8)
+        .map(|index| builder.push_position(corner(index)))
+        .collect();
+    for [a, b, c, d] in [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ] {
+        for [a, b, c] in [[a, b, c], [a, c, d]] {
+            let triangle = if inward { [a, c, b] } else { [a, b, c] };
+            builder.push_triangle(triangle.map(|index: usize| corners[index]), paint);
+        }
+    }
+}
+
+/// A furnace with a box that reaches into its floor.
+fn furnished() -> Snapshot {
+    let mut builder = SceneBuilder::default();
+    let paint = builder.push_material(Material::plain(
+        "glowing",
+        Vec3::splat(REFLECTANCE),
+        Vec3::splat(EMITTED),
+    ));
+    cuboid(
+        &mut builder,
+        DVec3::new(-1.0, 0.0, -1.0),
+        DVec3::new(1.0, 2.0, 1.0),
+        true,
+        paint,
+    );
+    let low = DVec3::new(-HALF, -0.05, -HALF);
+    cuboid(&mut builder, low, DVec3::new(HALF, 0.8, HALF), false, paint);
+    let options = SceneOptions {
+        sides: Sides::One,
+        ..SceneOptions::default()
+    };
+    let scene = Arc::new(builder.finish(&options).unwrap());
+    let settings = SolveSettings::default();
+    let mut solver = Solver::new(scene, settings, None, &Cancel::default()).unwrap();
+    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    solver.snapshot()
+}
+
+#[test]
+fn a_floor_is_as_bright_beside_an_object_as_everywhere() {
+    let snapshot = furnished();
+    let (mesh, light) = (&snapshot.mesh, &snapshot.light);
+    let expected = PI * EMITTED / (1.0 - REFLECTANCE);
+    // Places are in units of the frame; the room's half width is 1 in the file.
+    let unit = mesh.positions.iter().map(|at| at.x).fold(0.0, f32::max);
+    let edge = HALF as f32 * unit;
+    let floor = mesh
+        .positions
+        .iter()
+        .map(|at| at.y)
+        .fold(f32::INFINITY, f32::min);
+    let floor = floor + 0.05 * unit;
+    let (mut beside, mut worst, mut sum) = (0, 0.0f32, 0.0);
+    for vertices in &mesh.indices {
+        let corners = vertices.map(|vertex| mesh.positions[vertex as usize]);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let outside = middle.x.abs().max(middle.z.abs()) - edge;
+        let is_floor = corners.iter().all(|corner| (corner.y - floor).abs() < 0.1);
+        if !is_floor || !(0.0..0.1 * unit).contains(&outside) {
+            continue;
+        }
+        let shown = vertices.map(|vertex| light.irradiance[vertex as usize].x);
+        let shown = shown.iter().sum::<f32>() / 3.0;
+        let error = (shown / expected - 1.0).abs();
+        (beside, worst, sum) = (beside + 1, worst.max(error), sum + error);
+    }
+    assert!(beside > 50, "{beside} triangles beside the box");
+    let mean = sum / beside as f32;
+    assert!(mean < 0.02 && worst < 0.15, "mean {mean}, worst {worst}");
+}
