@@ -13,8 +13,8 @@ use glam::Vec3;
 use super::Patch;
 use crate::scene::{DisjointSets, HalfEdge, Scene, half_edges};
 
-/// Levels of division at most: beyond, single precision cannot tell neighbours apart.
-const DEEPEST_LEVEL: u8 = 14;
+/// Halvings at most, but for what balance asks: beyond, single precision cannot tell neighbours apart.
+const DEEPEST_LEVEL: u8 = 28;
 
 /// Triangles that are longer than so many times their height are halved and not quartered: quarters would be as thin.
 const SLIVER: f32 = 3.0;
@@ -30,7 +30,7 @@ pub struct Element {
     pub patch: u32,
     /// The element above, or `u32::MAX` for a patch.
     pub parent: u32,
-    /// Divisions between the patch and this.
+    /// Halvings between the patch and this; a division into four counts two.
     pub level: u8,
     /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that is
     /// not known.
@@ -229,17 +229,21 @@ impl Mesh {
     }
 
     /// Divide the given leaves, and their neighbours as far as balance asks. Elements that are no leaves are passed
-    /// over, as are those at the deepest level. Returns whether anything was divided.
+    /// over, as are those at the deepest level that are not divided for balance. Returns whether anything was divided.
     pub fn divide(&mut self, wanted: &[u32]) -> bool {
         if self.leaves_at.is_empty() {
             self.index_leaves();
         }
         let before = self.elements.len();
-        let mut pending: Vec<u32> = wanted.to_vec();
+        let is_deepest = |&index: &u32| self.elements[index as usize].level >= DEEPEST_LEVEL;
+        let mut pending: Vec<u32> = wanted
+            .iter()
+            .copied()
+            .filter(|index| !is_deepest(index))
+            .collect();
         while let Some(index) = pending.pop() {
             let element = self.elements[index as usize];
-            if !element.is_leaf() || element.level >= DEEPEST_LEVEL || !self.is_held(index as usize)
-            {
+            if !element.is_leaf() || !self.is_held(index as usize) {
                 continue;
             }
             self.divide_one(index);
@@ -282,7 +286,7 @@ impl Mesh {
             }
         }
         let children = self.parts(parent.vertices, parent.area_vector.length());
-        let share = 1.0 / children.len() as f32;
+        let (share, deeper) = (1.0 / children.len() as f32, children.len() as u8 / 2);
         self.elements[index as usize].first_child = self.elements.len() as u32;
         self.elements[index as usize].child_count = children.len() as u8;
         for vertices in children {
@@ -290,7 +294,7 @@ impl Mesh {
                 vertices,
                 parent.patch,
                 index,
-                parent.level + 1,
+                parent.level + deeper,
                 parent.area_vector * share,
             );
             let child_index = self.elements.len() as u32;

@@ -63,7 +63,7 @@ impl Hierarchy {
                     .ok_or(format!("element {index}: missing child"))?;
                 if child.parent != index as u32
                     || child.patch != element.patch
-                    || child.level != element.level + 1
+                    || child.level != element.level + element.child_count / 2
                 {
                     return Err(format!("element {index}: a child does not belong to it"));
                 }
