@@ -146,10 +146,15 @@ fn time_to_error(curve: impl Iterator<Item = (f64, f64)>, target: f64) -> Option
 }
 
 /// The middle value, or the lower of two; 0 without values.
-fn median(mut values: Vec<f64>) -> f64 {
+fn median(values: Vec<f64>) -> f64 {
+    middle(values).unwrap_or(0.0)
+}
+
+/// The middle value, or the lower of two.
+pub(super) fn middle(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len().saturating_sub(1) / 2;
-    values.get(middle).copied().unwrap_or(0.0)
+    values.get(middle).copied()
 }
 
 #[cfg(test)]

@@ -6,12 +6,16 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
-    contact::{carry_over, told_by},
+    contact::carry_over,
     direct::{DirectLight, Lights, Receiver},
     reconstruct::{LeafLight, project},
     smooth,
 };
-use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
+use crate::{
+    geometry::RayTree,
+    hierarchy::{Element, Hierarchy},
+    transport::luminance,
+};
 
 /// No element is larger than this share of the scene's area: smaller shadows than such an element could be missed by
 /// all its corners. Larger misses more, smaller costs vertices on empty walls.
@@ -161,8 +165,8 @@ impl DirectField {
                 self.lights.bounded(unoccluded * fraction)
             })
             .collect();
-        let told = told_by(&hierarchy.mesh, |element, side| !element.is_covered(side));
-        carry_over(&hierarchy.mesh, told, &mut self.shown);
+        let tells = |element: &Element, side| !element.is_covered(side);
+        carry_over(&hierarchy.mesh, tells, &mut self.shown);
         let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_open();
         let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
             let centre = self.centres.get(leaf).copied().flatten()?;

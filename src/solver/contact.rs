@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Cancel, Solver, adapt::Limits, reconstruct::INSET};
+use super::{Cancel, Solver, reconstruct::INSET};
 use crate::{
     geometry::RayTree,
     hierarchy::{Element, Hierarchy, Mesh},
@@ -28,10 +28,11 @@ const CARRIED: u32 = 2;
 
 impl Solver {
     /// Divide elements that lie under an object in part.
-    pub(super) fn divide_contacts(&mut self, limits: Limits, cancel: &Cancel) -> Option<()> {
+    pub(super) fn divide_contacts(&mut self, cancel: &Cancel) -> Option<()> {
+        let limits = self.direct_limits(1.0);
         loop {
-            self.probe_contacts(limits, cancel)?;
-            let least = self.least_contact(limits);
+            self.probe_contacts(cancel)?;
+            let least = self.least_contact();
             let mesh = &mut self.hierarchy.mesh;
             let is_wanted = |leaf: &usize| {
                 let element = &mesh.elements[*leaf];
@@ -51,8 +52,8 @@ impl Solver {
     }
 
     /// Find out which leaves lie within solids. Of small ones it is only asked where what was divided did.
-    pub(super) fn probe_contacts(&mut self, limits: Limits, cancel: &Cancel) -> Option<()> {
-        let least = self.least_contact(limits);
+    pub(super) fn probe_contacts(&mut self, cancel: &Cancel) -> Option<()> {
+        let least = self.least_contact();
         let elements = &self.hierarchy.mesh.elements;
         let fresh: Vec<usize> = self
             .hierarchy
@@ -83,7 +84,9 @@ impl Solver {
     }
 
     /// Elements in contact that are no larger are not divided, frame units.
-    fn least_contact(&self, limits: Limits) -> f32 {
+    fn least_contact(&self) -> f32 {
+        // The same in all steps, whose tolerances fall.
+        let limits = self.direct_limits(1.0);
         let root = CONTACT_TOLERANCE * limits.tolerance;
         (root * root * self.hierarchy.area as f32).max(limits.min_area)
     }
@@ -125,26 +128,27 @@ fn is_inside(rays: &RayTree, hierarchy: &Hierarchy, element: usize, point: Vec3)
     (is_inside, shot)
 }
 
-/// By vertex: whether any leaf tells what it receives, as far as it lies within no solid.
-pub(super) fn told_by(mesh: &Mesh, tells: impl Fn(&Element, usize) -> bool) -> Vec<bool> {
-    let mut told = vec![false; mesh.vertices.len()];
+/// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,
+/// the mean of those of these elements at which one does.
+pub(super) fn carry_over(
+    mesh: &Mesh,
+    tells: impl Fn(&Element, usize) -> bool,
+    values: &mut [Vec4],
+) {
+    let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
+    let contacts: Vec<usize> = mesh.held_leaves().filter(is_contact).collect();
+    if contacts.is_empty() {
+        return;
+    }
+    let mut told = vec![false; values.len()];
     for leaf in mesh.held_leaves() {
         let element = &mesh.elements[leaf];
         for (side, vertex) in element.vertices.into_iter().enumerate() {
             told[vertex as usize] |= tells(element, side);
         }
     }
-    told
-}
-
-/// Give vertices of elements that lie within a solid in part, of which nothing is told, the mean of those of these
-/// elements that something is told of.
-pub(super) fn carry_over(mesh: &Mesh, mut told: Vec<bool>, values: &mut [Vec4]) {
-    let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
-    let contacts: Vec<usize> = mesh.held_leaves().filter(is_contact).collect();
     for _ in 0..CARRIED {
-        let mut sums =
-            vec![(Vec4::ZERO, 0.0f32); if contacts.is_empty() { 0 } else { values.len() }];
+        let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
         for &leaf in &contacts {
             let element = &mesh.elements[leaf];
             let area = element.area_vector.length();

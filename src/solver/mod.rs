@@ -201,7 +201,7 @@ impl Solver {
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(1.0);
         self.divide_coarse(limits);
-        self.divide_contacts(limits, cancel)?;
+        self.divide_contacts(cancel)?;
         if let Some(field) = &mut self.direct {
             let (count, seed) = (first_samples(&self.hierarchy, limits), limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
@@ -251,7 +251,7 @@ impl Solver {
         cancel.proceed()?;
         self.estimate_mean();
         report.epsilon = self.refine(report.epsilon, cancel)?;
-        self.probe_contacts(self.direct_limits(1.0), cancel)?;
+        self.probe_contacts(cancel)?;
         self.iterate(&mut report, cancel)?;
         self.leaves =
             reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
@@ -363,7 +363,7 @@ impl Solver {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
             self.is_full |= field.is_full;
         }
-        self.probe_contacts(self.direct_limits(1.0), cancel)?;
+        self.probe_contacts(cancel)?;
         self.extend_to_new_elements();
         Some(())
     }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     Cancel,
     closure::{Closure, Closures},
-    contact::{carry_over, told_by},
+    contact::carry_over,
 };
 use crate::{
     geometry::Vectors4,
@@ -315,8 +315,11 @@ impl VertexMeans {
             irradiance[index] /= weight[index];
             error[index] /= weight[index];
         }
-        let told = told_by(&hierarchy.mesh, |element, _| element.is_open());
-        carry_over(&hierarchy.mesh, told, &mut irradiance);
+        carry_over(
+            &hierarchy.mesh,
+            |element, _| element.is_open(),
+            &mut irradiance,
+        );
         let centres = leaves
             .iter()
             .map(|leaf| (leaf.element as usize, leaf.centre))

@@ -6,7 +6,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{Judge, Judgement, Link, element_form_factor, element_form_factors};
+use super::{
+    Judge, Judgement, Link, clear::inner_points, element_form_factor, element_form_factors,
+};
 use glam::Vec3;
 
 use crate::{
@@ -497,15 +499,7 @@ fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f3
     if distance > 2.0 * (from.radius + to.radius) {
         return element_form_factor(hierarchy, source, to.centroid, normal);
     }
-    // A rule of degree 3 whose points lie inside: centroid and three points towards the corners (Strang and Fix's
-    // would have a negative weight, so the four are weighed alike at three fifths of the way).
-    let [a, b, c] = hierarchy
-        .mesh
-        .corners(receiver)
-        .map(|corner| to.centroid.lerp(corner, 0.6));
-    let (points, normals) = (
-        Vectors4::new([to.centroid, a, b, c]),
-        Vectors4::splat(normal),
-    );
+    let points = inner_points(hierarchy.mesh.corners(receiver));
+    let normals = Vectors4::splat(normal);
     element_form_factors(hierarchy, source, &points, &normals).element_sum() * 0.25
 }

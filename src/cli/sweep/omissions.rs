@@ -5,12 +5,12 @@ use std::{
     sync::Arc,
 };
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, anyhow};
 use serde::Serialize;
 
-use super::{ReportArguments, session::Session};
+use super::session::Session;
 use crate::{
-    cli::{UsageError, output::write_whole, report::Machine},
+    cli::{output::write_whole, report::Machine},
     export::write_csv,
     metrics::omissions::{
         Comparison, Exhibit, Row, Trial, exhibits, omissions_markdown, overhead_markdown,
@@ -39,7 +39,9 @@ struct Report<'a> {
 /// Run every scene that is asked for in all its ways, and write the files after each.
 pub(super) fn compare(session: &mut Session<'_>) -> Result<()> {
     let settings = session.arguments.setting_flags.settings();
-    let chosen = chosen(session.arguments)?;
+    let is_meant = |exhibit: &Exhibit, word: &str| exhibit.name.contains(word);
+    let plan = &session.arguments.plan;
+    let chosen = plan.chosen(exhibits().to_vec(), is_meant, "scene of the plan")?;
     let mut comparisons = Vec::new();
     for exhibit in &chosen {
         if session.is_interrupted() {
@@ -52,23 +54,6 @@ pub(super) fn compare(session: &mut Session<'_>) -> Result<()> {
         write(session, &settings, &comparisons)?;
     }
     Ok(())
-}
-
-/// The scenes whose names hold one of the given words; all where none is given.
-fn chosen(arguments: &ReportArguments) -> Result<Vec<Exhibit>> {
-    let words = &arguments.plan.cases;
-    let is_meant = |exhibit: &Exhibit, word: &String| exhibit.name.contains(word);
-    let mut chosen = exhibits().to_vec();
-    if let Some(word) = words
-        .iter()
-        .find(|word| !chosen.iter().any(|exhibit| is_meant(exhibit, word)))
-    {
-        bail!(UsageError(format!(
-            "no scene of the plan suite is named '{word}'"
-        )));
-    }
-    chosen.retain(|exhibit| words.is_empty() || words.iter().any(|word| is_meant(exhibit, word)));
-    Ok(chosen)
 }
 
 /// All runs on one scene, round by round, so that a machine that slows down does so for all; `None` when one of them was

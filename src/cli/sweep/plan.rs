@@ -3,11 +3,12 @@
 //! The first of each list is the base; the others are tried one at a time, so that a plan grows as the sum of its
 //! lists. `--full` asks for their product.
 
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 
 use crate::{
     cli::{
-        Preset, SettingFlags,
+        Preset, SettingFlags, UsageError,
         flags::{MethodFlag, OracleFlag, at_least_zero},
     },
     solver::{Method, Oracle, SolveSettings},
@@ -84,6 +85,27 @@ pub(super) struct Configuration {
 const MANY_SAMPLES: u32 = 16;
 
 impl PlanFlags {
+    /// Those of a suite's cases that one of `--cases` means; all where none is given.
+    ///
+    /// # Errors
+    /// A usage error that calls them `what`, where a word means none.
+    pub(super) fn chosen<T>(
+        &self,
+        mut cases: Vec<T>,
+        is_meant: impl Fn(&T, &str) -> bool,
+        what: &str,
+    ) -> Result<Vec<T>> {
+        let words = &self.cases;
+        if let Some(word) = words
+            .iter()
+            .find(|word| !cases.iter().any(|case| is_meant(case, word)))
+        {
+            bail!(UsageError(format!("no {what} suite is named '{word}'")));
+        }
+        cases.retain(|case| words.is_empty() || words.iter().any(|word| is_meant(case, word)));
+        Ok(cases)
+    }
+
     /// The solver runs, the base first, none twice.
     pub(super) fn configurations(&self, setting_flags: &SettingFlags) -> Vec<Configuration> {
         let base = setting_flags.settings();

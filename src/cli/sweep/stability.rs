@@ -8,9 +8,9 @@ use std::{
 use anyhow::{Result, bail};
 use serde::Serialize;
 
-use super::{ReportArguments, session::Session};
+use super::session::Session;
 use crate::{
-    cli::{UsageError, output::write_whole, report::Machine},
+    cli::{output::write_whole, report::Machine},
     export::write_csv,
     metrics::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
 };
@@ -29,7 +29,9 @@ struct Report<'a> {
 
 /// Try every case that is asked for, and write the files after each.
 pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
-    let cases = chosen(session.arguments)?;
+    let is_meant = |case: &Case, word: &str| case.name.contains(word) || case.group.name() == word;
+    let plan = &session.arguments.plan;
+    let cases = plan.chosen(stability_cases(), is_meant, "case of the stability")?;
     let mut outcomes: Vec<Outcome> = Vec::new();
     for (number, case) in cases.iter().enumerate() {
         if session.is_interrupted() {
@@ -67,24 +69,6 @@ pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
         );
     }
     Ok(())
-}
-
-/// The cases whose names hold one of the given words, or whose group is one of them; all where none is given.
-fn chosen(arguments: &ReportArguments) -> Result<Vec<Case>> {
-    let words = &arguments.plan.cases;
-    let is_meant =
-        |case: &Case, word: &String| case.name.contains(word) || case.group.name() == word;
-    let mut cases = stability_cases();
-    if let Some(word) = words
-        .iter()
-        .find(|word| !cases.iter().any(|case| is_meant(case, word)))
-    {
-        bail!(UsageError(format!(
-            "no case of the stability suite is named '{word}'"
-        )));
-    }
-    cases.retain(|case| words.is_empty() || words.iter().any(|word| is_meant(case, word)));
-    Ok(cases)
 }
 
 /// Run one case in the session's pool, and stop it when its time is over or Ctrl+C is pressed.

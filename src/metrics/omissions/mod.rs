@@ -15,7 +15,7 @@ use std::{f64::consts::PI, sync::Arc, time::Instant};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::MeshLookup;
+use super::{MeshLookup, trajectory::middle};
 use crate::{
     geometry::RayTree,
     reference::{PathSettings, PathTracer, ReferencePoint},
@@ -277,10 +277,8 @@ fn power(light: &[DVec3]) -> f64 {
 }
 
 /// The middle one, or the lower of the two; not a number where there is none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len().saturating_sub(1) / 2;
-    values.get(middle).copied().unwrap_or(f64::NAN)
+fn median(values: Vec<f64>) -> f64 {
+    middle(values).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
