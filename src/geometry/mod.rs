@@ -9,7 +9,9 @@ mod sampling;
 pub use lanes::Vectors4;
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};
 pub use rays::{Hit, RAY_OFFSET, RayTree};
-pub use sampling::{Random, cosine_direction, low_discrepancy_2d, triangle_point};
+pub use sampling::{
+    Random, SphericalTriangle, cosine_direction, low_discrepancy_2d, triangle_point,
+};
 
 use glam::Vec3;
 

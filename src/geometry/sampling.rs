@@ -1,6 +1,6 @@
 //! Reproducible random numbers, low-discrepancy points, and the maps from the unit square to surfaces and directions.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// A small counter-based generator (PCG's output permutation over a 64-bit state).
 /// Streams are made from any two numbers, so that a value depends on what is sampled and never on which thread does.
@@ -73,6 +73,65 @@ pub fn triangle_point(square: Vec2) -> Vec3 {
         u -= v;
     }
     Vec3::new(u, v, 1.0 - u - v)
+}
+
+/// Uniform directions to a triangle from a point: its spherical triangle, set up once (Arvo, "Stratified Sampling of
+/// Spherical Triangles", 1995).
+#[derive(Clone, Copy, Debug)]
+pub struct SphericalTriangle {
+    /// Unit directions to the corners.
+    corners: [Vec3; 3],
+    /// Cosine of the arc from the first corner to the second.
+    first_arc: f32,
+    /// Sine and cosine of the angle at the first corner.
+    first_angle: [f32; 2],
+    /// The angle at the first corner.
+    angle: f32,
+    /// Solid angle, steradian; above 0.
+    pub solid_angle: f32,
+}
+
+impl SphericalTriangle {
+    /// Smaller solid angles are seen alike from all sides: points uniform over the area do as well.
+    const LEAST: f64 = 0.01;
+
+    /// Of a triangle seen from a point; `None` where it is seen edge-on, or is small.
+    pub fn new(point: Vec3, corners: [Vec3; 3]) -> Option<Self> {
+        // Solid angles are small differences of angles.
+        let [a, b, c] = corners.map(|corner| (corner - point).as_dvec3().normalize_or_zero());
+        let across = |from: DVec3, to: DVec3| from.cross(to).try_normalize();
+        let (ab, bc, ca) = (across(a, b)?, across(b, c)?, across(c, a)?);
+        let angle = |one: DVec3, next: DVec3| (-one.dot(next)).clamp(-1.0, 1.0).acos();
+        let alpha = angle(ab, ca);
+        let solid_angle = alpha + angle(ab, bc) + angle(bc, ca) - std::f64::consts::PI;
+        (solid_angle > Self::LEAST).then_some(Self {
+            corners: [a, b, c].map(|corner| corner.as_vec3()),
+            first_arc: a.dot(b) as f32,
+            first_angle: [alpha.sin() as f32, alpha.cos() as f32],
+            angle: alpha as f32,
+            solid_angle: solid_angle as f32,
+        })
+    }
+
+    /// A unit direction from a point of the unit square.
+    pub fn direction(&self, square: Vec2) -> Vec3 {
+        let [a, b, c] = self.corners;
+        let [sin_alpha, cos_alpha] = self.first_angle;
+        let (s, t) = (square.x * self.solid_angle - self.angle).sin_cos();
+        let u = t - cos_alpha;
+        let v = s + sin_alpha * self.first_arc;
+        let below = (v * s + u * t) * sin_alpha;
+        let cos_arc = if below.abs() > f32::MIN_POSITIVE {
+            (((v * t - u * s) * cos_alpha - v) / below).clamp(-1.0, 1.0)
+        } else {
+            1.0
+        };
+        // The corner that cuts off the wanted part of the area, on the arc from the first to the third.
+        let towards = |from: Vec3, to: Vec3| (to - from * to.dot(from)).normalize_or_zero();
+        let cut = a * cos_arc + towards(a, c) * (1.0 - cos_arc * cos_arc).max(0.0).sqrt();
+        let height = 1.0 - square.y * (1.0 - cut.dot(b));
+        (b * height + towards(b, cut) * (1.0 - height * height).max(0.0).sqrt()).normalize_or(b)
+    }
 }
 
 /// Cosine-weighted direction about a unit normal from a point of the unit square; its density is cos θ / π.
@@ -178,5 +237,42 @@ mod tests {
             (sum - normal * (2.0 / 3.0)).length() < 1.5 * TOLERANCE,
             "{sum}"
         );
+    }
+
+    #[test]
+    fn directions_to_a_triangle_are_uniform() {
+        let corners = [
+            Vec3::new(0.2, 0.1, 0.4),
+            Vec3::new(1.5, -0.3, 0.5),
+            Vec3::new(0.1, 1.2, 0.3),
+        ];
+        let seen = SphericalTriangle::new(Vec3::ZERO, corners).unwrap();
+        // The solid angle by Van Oosterom and Strackee.
+        let [a, b, c] = corners.map(|corner| corner.normalize_or_zero());
+        let below = 1.0 + a.dot(b) + b.dot(c) + c.dot(a);
+        let expected = 2.0 * a.dot(b.cross(c)).abs().atan2(below);
+        assert!((seen.solid_angle - expected).abs() < 1e-5);
+        // Every direction meets the triangle; their mean is the irradiance vector over the solid angle.
+        let inward = [a.cross(b), b.cross(c), c.cross(a)];
+        let mean = mean(|random| {
+            let direction = seen.direction(random.uniform_2d());
+            assert!((direction.length() - 1.0).abs() < 1e-5);
+            assert!(inward.iter().all(|side| side.dot(direction) > -1e-5));
+            direction
+        });
+        let edges = [[a, b], [b, c], [c, a]].map(|[from, to]| {
+            from.cross(to).normalize_or_zero() * (0.5 * from.dot(to).clamp(-1.0, 1.0).acos())
+        });
+        let vector = edges.into_iter().sum::<Vec3>() / seen.solid_angle;
+        assert!(mean.distance(vector) < TOLERANCE, "{mean} {vector}");
+    }
+
+    #[test]
+    fn triangles_seen_edge_on_or_from_afar_have_no_solid_angle() {
+        let corners = [Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.0)];
+        assert!(SphericalTriangle::new(Vec3::new(3.0, 0.5, 0.0), corners).is_none());
+        assert!(SphericalTriangle::new(Vec3::new(0.5, 0.5, 20.0), corners).is_none());
+        assert!(SphericalTriangle::new(Vec3::X, corners).is_none());
+        assert!(SphericalTriangle::new(Vec3::new(0.8, 0.8, 0.1), corners).is_some());
     }
 }

@@ -6,7 +6,7 @@
 
 use std::{f32::consts::PI, ops::Range};
 
-use glam::{Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -14,7 +14,9 @@ use super::{
     panel::{Panel, panels},
 };
 use crate::{
-    geometry::{Random, RayTree, low_discrepancy_2d, point_irradiance, triangle_point},
+    geometry::{
+        Random, RayTree, SphericalTriangle, low_discrepancy_2d, point_irradiance, triangle_point,
+    },
     hierarchy::{Hierarchy, Patch},
     scene::{MaterialId, Scene, TriangleId},
     transport::luminance,
@@ -226,45 +228,46 @@ impl Lights {
             .map(|x| u64::from(x.to_bits()));
         let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
         let shift = Random::new(seed, place).uniform_2d();
-        // Each range of the rays is stratified by itself.
+        // Each range of the rays is stratified by itself, and those to one target follow each other.
         let mut random = Random::new(seed ^ (u64::from(samples.start + 1) << 32), place);
         let count = samples.len() as f32;
+        let (mut target, mut bundle) = (usize::MAX, Bundle::default());
         for (stratum, sample) in samples.enumerate() {
-            let target = (stratum as f32 + random.uniform()) / count * total;
-            let chosen = sums
-                .partition_point(|part| part.until <= target)
-                .min(sums.len() - 1);
-            let before = if chosen > 0 {
-                sums[chosen - 1].until
-            } else {
-                0.0
-            };
-            let (share, panel) = (
-                sums[chosen].until - before,
-                &self.panels[sums[chosen].panel],
-            );
-            let (emitter, area) = match sums[chosen].emitter {
-                Some(emitter) => (&self.emitters[emitter], self.emitters[emitter].area),
-                None => {
-                    let place = (target - before) / share;
-                    (&self.emitters[panel.emitter_at(place)], panel.area())
-                }
-            };
-            let at = triangle_point(low_discrepancy_2d(sample, shift));
-            let [a, b, c] = emitter.corners;
-            let point = a * at.x + b * at.y + c * at.z;
-            // The share is the mean of the transfer over the area, so the weight is about 1 where that is small.
-            let weight = area * emitter.transfer(receiver, point) / share;
+            let at = (stratum as f32 + random.uniform()) / count * total;
+            let chosen = sums.partition_point(|part| part.until <= at);
+            let chosen = chosen.min(sums.len() - 1);
+            if chosen != target {
+                light.count(&bundle);
+                (target, bundle) = (chosen, self.bundle(receiver, &sums[chosen]));
+            }
+            let before = chosen.checked_sub(1).map_or(0.0, |last| sums[last].until);
+            let place = (at - before) / (sums[chosen].until - before);
+            let emitter = sums[chosen]
+                .emitter
+                .unwrap_or_else(|| self.panels[sums[chosen].panel].emitter_at(place));
+            let emitter = &self.emitters[emitter];
+            bundle.rays += 1;
+            let square = low_discrepancy_2d(sample, shift);
+            let (point, weight) = emitter.aim(receiver, bundle.seen.as_ref(), square);
             if !(weight.is_finite() && weight > 0.0) {
                 continue;
             }
             let ends = [Some(receiver.triangle), Some(emitter.triangle)];
-            let is_visible = !rays.occluded(receiver.point, point, ends);
-            light.count(
-                weight,
-                emitter.radiosity / luminance(emitter.radiosity),
-                is_visible,
-            );
+            bundle.count(weight, !rays.occluded(receiver.point, point, ends));
+        }
+        light.count(&bundle);
+    }
+
+    /// Rays that are about to be shot to a panel or an emitter.
+    fn bundle(&self, receiver: &Receiver, arriving: &Arriving) -> Bundle {
+        let first = self.panels[arriving.panel].emitters.start;
+        let emitter = &self.emitters[arriving.emitter.unwrap_or(first)];
+        let is_one = arriving.emitter.is_some();
+        let seen = || SphericalTriangle::new(receiver.point, emitter.corners);
+        Bundle {
+            color: emitter.radiosity / luminance(emitter.radiosity),
+            seen: is_one.then(seen).flatten(),
+            ..Bundle::default()
         }
     }
 
@@ -316,13 +319,60 @@ fn brightest(emitters: &[Emitter]) -> Vec4 {
 }
 
 impl Emitter {
-    /// Irradiance (luminance) at a receiver per area of the emitter at one of its points.
-    fn transfer(&self, receiver: &Receiver, point: Vec3) -> f32 {
+    /// A point of the emitter for a point of the unit square, and the light that it stands for at a receiver, up to a
+    /// factor. Of an emitter that is `seen` under a large angle all directions are as likely; elsewhere all points are.
+    fn aim(
+        &self,
+        receiver: &Receiver,
+        seen: Option<&SphericalTriangle>,
+        square: Vec2,
+    ) -> (Vec3, f32) {
+        if let Some(seen) = seen {
+            let direction = seen.direction(square);
+            let height = (self.corners[0] - receiver.point).dot(self.normal);
+            let distance = height / direction.dot(self.normal);
+            let cosine = direction.dot(receiver.normal);
+            let is_met = distance.is_finite() && distance > 0.0;
+            let weight = if is_met { cosine } else { 0.0 };
+            return (receiver.point + direction * distance, weight);
+        }
+        let at = triangle_point(square);
+        let [a, b, c] = self.corners;
+        let point = a * at.x + b * at.y + c * at.z;
         let separation = point - receiver.point;
         let squared = separation.length_squared();
         let cosines =
             separation.dot(receiver.normal).max(0.0) * (-separation.dot(self.normal)).max(0.0);
-        luminance(self.radiosity) * cosines / (PI * squared * squared)
+        (point, cosines / (squared * squared))
+    }
+}
+
+/// Shadow rays from a point to one panel or emitter. How much unoccluded light comes from there is known, so of their
+/// weights only the ratios count: else a few rays that weigh much would speak for all targets.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bundle {
+    /// Radiosity over its luminance.
+    color: Vec4,
+    /// The emitter, where it fills a large angle.
+    seen: Option<SphericalTriangle>,
+    /// Rays tried.
+    rays: u32,
+    shot: u32,
+    visible: u32,
+    /// Weights of the rays shot.
+    sent: f32,
+    /// Weights of those that got through.
+    arrived: f32,
+}
+
+impl Bundle {
+    fn count(&mut self, weight: f32, is_visible: bool) {
+        self.sent += weight;
+        self.shot += 1;
+        if is_visible {
+            self.arrived += weight;
+            self.visible += 1;
+        }
     }
 }
 
@@ -344,12 +394,13 @@ pub(super) struct DirectLight {
 }
 
 impl DirectLight {
-    fn count(&mut self, weight: f32, color: Vec4, is_visible: bool) {
-        self.sent += color * weight;
-        self.shot += 1;
-        if is_visible {
-            self.arrived += color * weight;
-            self.visible += 1;
+    fn count(&mut self, bundle: &Bundle) {
+        self.shot += bundle.shot;
+        self.visible += bundle.visible;
+        if bundle.sent > 0.0 {
+            let color = bundle.color * bundle.rays as f32;
+            self.sent += color;
+            self.arrived += color * (bundle.arrived / bundle.sent);
         }
     }
 
