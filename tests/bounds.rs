@@ -69,7 +69,7 @@ fn the_interval_of_a_link_holds_what_brute_force_finds() {
         let tables = Tables::new(&hierarchy, |leaf| {
             (Vec3::splat(radiosities[leaf].powi(4))).extend(1.0)
         });
-        let areas = PatchSums::of_area(&hierarchy);
+        let areas = PatchSums::of_area(&hierarchy, &tables);
         let powers = PatchSums::of_power(&hierarchy, &tables);
         let kernel = Kernel {
             hierarchy: &hierarchy,

@@ -75,7 +75,7 @@ fn furnished() -> Snapshot {
     solver.snapshot()
 }
 
-/// Light over links is still up to a quarter too low next to the box; a smudge would be far darker.
+/// Light is lost only where triangles reach under the box; a smudge would be far darker.
 #[test]
 fn no_smudge_shows_beside_an_object() {
     let snapshot = furnished();
@@ -106,5 +106,5 @@ fn no_smudge_shows_beside_an_object() {
     }
     assert!(beside > 50, "{beside} triangles beside the box");
     let mean = sum / beside as f32;
-    assert!(mean < 0.22 && worst < 0.5, "mean {mean}, worst {worst}");
+    assert!(mean < 0.06 && worst < 0.25, "mean {mean}, worst {worst}");
 }

@@ -65,7 +65,7 @@ fn visible(radiosity: impl Fn(bool) -> f32 + Sync, estimates: u32, rays_each: u3
         .expect("one face looks down");
     let receiver = hierarchy.element_node(ElementId(receiver as u32));
     let (areas, powers) = (
-        PatchSums::of_area(&hierarchy),
+        PatchSums::of_area(&hierarchy, &tables),
         PatchSums::of_power(&hierarchy, &tables),
     );
     let sampler = PairSampler {

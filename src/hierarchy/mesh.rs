@@ -60,6 +60,11 @@ impl Element {
         !matches!(self.covered, 0 | Self::BURIED | Self::UNPROBED)
     }
 
+    /// Whether all of it lies within a solid.
+    pub fn is_buried(&self) -> bool {
+        self.covered == Self::BURIED
+    }
+
     /// Whether none of it is known to lie within a solid.
     pub fn is_open(&self) -> bool {
         matches!(self.covered, 0 | Self::UNPROBED)

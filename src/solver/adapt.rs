@@ -141,11 +141,16 @@ impl DirectField {
         (self.vertices, self.centres) = (Vec::new(), Vec::new());
     }
 
-    /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid.
+    /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
+    /// solid in part, that of its open part.
     pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
-        let [a, b, c] = hierarchy.mesh.elements[element]
-            .vertices
-            .map(|vertex| self.corner(vertex));
+        let leaf = &hierarchy.mesh.elements[element];
+        if leaf.is_contact() {
+            let open = (0..3).filter(|&side| !leaf.is_covered(side));
+            let known = open.clone().map(|side| self.corner(leaf.vertices[side]));
+            return known.sum::<Vec4>() / (open.count().max(1) as f32);
+        }
+        let [a, b, c] = leaf.vertices.map(|vertex| self.corner(vertex));
         let corners = a + b + c;
         match self.centres.get(element).copied().flatten() {
             Some(centre) => {

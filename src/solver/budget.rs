@@ -24,7 +24,6 @@ impl Solver {
             + self.rays.memory_bytes()
             + self.power.memory_bytes()
             + self.links.memory_bytes()
-            + self.areas.memory_bytes()
             + self.closures.memory_bytes()
             + size_of_val(self.linked.as_slice())
             + size_of_val(self.leaves.as_slice())

@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Cancel, Solver};
+use super::{Cancel, Solver, contact::open_places};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::Hierarchy,
@@ -46,6 +46,10 @@ const MOST_PROBED_CELLS: usize = 60_000;
 /// Rays per cell at most.
 const MOST_CELL_RAYS: usize = 8192;
 
+/// Neighbouring cells of open groups count as closed if that many rays from them met nothing but lit sides. Fewer, and
+/// what leaks goes unseen; more, and few cells of small open scenes are known to be closed.
+const CLOSED_RAYS: f32 = 512.0;
+
 /// Form factors that add to less than this share of the closure are not trusted to stand for what is missing.
 /// Nearer to 1, and coarse links stay as wrong as they are; further, and the noise of a few rays is blown up.
 const LEAST_ROW: f32 = 0.3;
@@ -77,22 +81,21 @@ impl Closure {
         deviation: f32::INFINITY,
     };
 
-    /// From how many of some rays met a lit side.
-    fn of(hits: u32, rays: usize) -> Self {
-        // Half a hit and half a miss more, so that no finite number of rays proves a certainty.
-        let (hits, rays) = (hits as f32 + 0.5, rays as f32 + 1.0);
-        let share = hits / rays;
+    /// From what the rays of a cell met, and what those of its neighbourhood did.
+    fn of(met: Met, around: Met) -> Self {
         Self {
-            share,
-            deviation: (share * (1.0 - share) / rays).sqrt(),
+            // One ray more that met what those about it do on average: few rays say little.
+            share: (met.hits + around.share()) / (met.rays + 1.0),
+            deviation: met.deviation(met.rays),
         }
     }
 
     /// As [`Self::of`] for cells that share their rays: of each it is known no better than by a few of its own.
-    fn shared(hits: u32, rays: usize) -> Self {
-        let share = Self::of(hits, rays).share;
-        let deviation = (share * (1.0 - share) / LEAST_CELL_RAYS as f32).sqrt();
-        Self { share, deviation }
+    fn shared(met: Met) -> Self {
+        Self {
+            share: met.share(),
+            deviation: met.deviation(LEAST_CELL_RAYS as f32),
+        }
     }
 
     /// Whether it is known without doubt, and so for every part of the cell.
@@ -124,6 +127,49 @@ impl Closure {
         } else {
             self.factor(weighted / area)
         }
+    }
+}
+
+/// What the rays of a cell met.
+#[derive(Clone, Copy, Debug, Default)]
+struct Met {
+    /// Rays that met a lit side.
+    hits: f32,
+    /// Rays that count.
+    rays: f32,
+}
+
+impl Met {
+    /// Half a hit and half a miss more, so that no finite number of rays proves a certainty.
+    fn share(self) -> f32 {
+        (self.hits + 0.5) / (self.rays + 1.0)
+    }
+
+    /// Standard error of the share, if it is that of so many rays.
+    fn deviation(self, rays: f32) -> f32 {
+        (self.share() * (1.0 - self.share()) / (rays + 1.0)).sqrt()
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            hits: self.hits + other.hits,
+            rays: self.rays + other.rays,
+        }
+    }
+}
+
+/// The closures of cells in the order of the tree, from what their rays met. Neighbours all of whose rays met lit sides
+/// are closed if these are enough to tell; the others are halved for as long as they are several.
+fn pooled(cells: &[Met], around: Met, closures: &mut Vec<Closure>) {
+    let met = cells.iter().copied().fold(Met::default(), Met::and);
+    if met.hits >= met.rays && met.rays >= CLOSED_RAYS {
+        closures.resize(closures.len() + cells.len(), Closure::CLOSED);
+    } else if let [cell] = cells {
+        closures.push(Closure::of(*cell, around));
+    } else {
+        let (first, second) = cells.split_at(cells.len() / 2);
+        pooled(first, met, closures);
+        pooled(second, met, closures);
     }
 }
 
@@ -247,8 +293,8 @@ impl Prober<'_> {
         (rays as f32 / self.cost) as usize
     }
 
-    /// Whether one ray from a cell meets a lit side, as 0 or 1.
-    fn meets(&self, cell: usize, number: usize) -> u32 {
+    /// What one ray from a cell meets.
+    fn look(&self, cell: usize, number: usize) -> Met {
         self.probe(cell, 1, number as u32)
     }
 
@@ -257,7 +303,10 @@ impl Prober<'_> {
         let look = |group: &[usize], first: usize, count: usize| {
             (0..count).all(|ray| {
                 !self.cancel.is_cancelled()
-                    && self.meets(group[ray * group.len() / count], first + ray) == 1
+                    && self
+                        .look(group[ray * group.len() / count], first + ray)
+                        .hits
+                        > 0.0
             })
         };
         let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
@@ -307,11 +356,11 @@ impl Prober<'_> {
             } else if is_shared {
                 vec![self.probe_together(group, count(even)); group.len()]
             } else {
-                let of = |&cell: &usize| {
-                    let count = count_of(cell);
-                    Closure::of(self.probe(cell, count as u32, 0), count)
-                };
-                group.iter().map(of).collect()
+                let met = |&cell: &usize| self.probe(cell, count_of(cell) as u32, 0);
+                let met: Vec<Met> = group.iter().map(met).collect();
+                let mut closures = Vec::with_capacity(met.len());
+                pooled(&met, Met::default(), &mut closures);
+                closures
             }
         });
         (found.collect(), shot)
@@ -319,26 +368,35 @@ impl Prober<'_> {
 
     /// One closure for all cells of a group.
     fn probe_together(&self, group: &[usize], count: usize) -> Closure {
-        let hits = (0..count).map(|ray| self.meets(group[ray * group.len() / count], ray));
-        Closure::shared(hits.sum(), count)
+        let met = (0..count).map(|ray| self.look(group[ray * group.len() / count], ray));
+        Closure::shared(met.fold(Met::default(), Met::and))
     }
 
-    /// How many of some cosine-weighted rays from an element meet a lit side; `first` numbers them within the element.
-    fn probe(&self, element: usize, count: u32, first: u32) -> u32 {
+    /// What some cosine-weighted rays from an element meet; `first` numbers them within the element. Of an element that
+    /// lies within a solid in part it is what its open places see: its links are scaled to that.
+    fn probe(&self, element: usize, count: u32, first: u32) -> Met {
         let mut random = Random::new(self.seed, (u64::from(first) << 32) | element as u64);
         let shift = random.uniform_2d();
         let [a, b, c] = self.hierarchy.mesh.corners(element);
         let patch = self.hierarchy.patch_of(element);
-        let mut is_met = |index: u32| {
+        let places = open_places(self.hierarchy, element);
+        let mut met = Met::default();
+        for index in 0..count {
             // Only the directions are stratified: a point from the same sequence would go with its direction.
             let at = triangle_point(random.uniform_2d());
-            let origin: Vec3 = a * at.x + b * at.y + c * at.z;
+            let place = (random.uniform() * places.len() as f32) as usize;
+            let origin: Vec3 = match places.get(place) {
+                Some(&open) => open,
+                None => a * at.x + b * at.y + c * at.z,
+            };
             let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
-            self.rays
-                .closest(origin, direction, Some(patch.triangle))
-                .is_some_and(|hit| self.hierarchy.patch_met(hit.triangle, direction).is_some())
-        };
-        (0..count).filter(|&index| is_met(index)).count() as u32
+            let hit = self.rays.closest(origin, direction, Some(patch.triangle));
+            let is_lit =
+                hit.is_some_and(|hit| self.hierarchy.patch_met(hit.triangle, direction).is_some());
+            met.hits += f32::from(u8::from(is_lit));
+            met.rays += 1.0;
+        }
+        met
     }
 }
 

@@ -20,8 +20,24 @@ const CONTACT_TOLERANCE: f32 = 1.0;
 /// for it, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose contacts are fine anyway.
 const LOOKED_AT: f32 = 64.0;
 
-/// Tangents of the probes' directions against the normal: from within a solid all of them meet it from behind.
-const PROBES: [[f32; 2]; 4] = [[0.0, 0.0], [0.9, 0.1], [-0.4, 0.8], [-0.5, -0.7]];
+/// Tangents of the probes' directions against the normal. Of the first, one at least must meet a back before the others
+/// are shot; they look further down, between the first.
+const PROBES: [[f32; 2]; 8] = [
+    [0.0, 0.0],
+    [0.9, 0.1],
+    [-0.4, 0.8],
+    [-0.5, -0.7],
+    [1.3, 1.5],
+    [-2.0, 0.1],
+    [0.9, -1.8],
+    [0.1, 2.6],
+];
+
+/// See [`PROBES`].
+const FIRST_PROBES: usize = 4;
+
+/// Backs that the probes must meet.
+const LEAST_BACKS: usize = 2;
 
 /// Elements over which light is carried at most: vertices under an object and those beside them.
 const CARRIED: u32 = 2;
@@ -98,14 +114,8 @@ fn probe(rays: &RayTree, hierarchy: &Hierarchy, element: usize) -> (u8, u64) {
     if rays.is_clear() {
         return (0, 0);
     }
-    let [a, b, c] = hierarchy.mesh.corners(element);
-    let centroid = hierarchy.mesh.elements[element].centroid;
-    let corner = |corner: Vec3| corner.lerp(centroid, INSET);
     let (mut covered, mut shot) = (0, 0);
-    for (place, point) in [corner(a), corner(b), corner(c), centroid]
-        .into_iter()
-        .enumerate()
-    {
+    for (place, point) in places(hierarchy, element).into_iter().enumerate() {
         let (is_inside, count) = is_inside(rays, hierarchy, element, point);
         covered |= u8::from(is_inside) << place;
         shot += count;
@@ -113,19 +123,46 @@ fn probe(rays: &RayTree, hierarchy: &Hierarchy, element: usize) -> (u8, u64) {
     (covered, shot)
 }
 
-/// Whether a point of an element lies within a solid: whatever is met from there is met from behind. And the rays shot.
+/// Where an element is probed: its corners, a little inside, and its centroid.
+fn places(hierarchy: &Hierarchy, element: usize) -> [Vec3; 4] {
+    let centroid = hierarchy.mesh.elements[element].centroid;
+    let [a, b, c] = hierarchy.mesh.corners(element);
+    let [a, b, c] = [a, b, c].map(|corner| corner.lerp(centroid, INSET));
+    [a, b, c, centroid]
+}
+
+/// Of an element that lies within a solid in part, the probed places that do not; nothing of others.
+pub(super) fn open_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
+    let covered = hierarchy.mesh.elements[element].covered;
+    if !hierarchy.mesh.elements[element].is_contact() {
+        return Vec::new();
+    }
+    let is_open = |(place, _): &(usize, Vec3)| covered & (1 << place) == 0;
+    let places = places(hierarchy, element).into_iter().enumerate();
+    places.filter(is_open).map(|(_, point)| point).collect()
+}
+
+/// Whether a point of an element lies within a solid, or beyond a wall: backs are met from there and nothing that is lit.
+/// And the rays shot.
 fn is_inside(rays: &RayTree, hierarchy: &Hierarchy, element: usize, point: Vec3) -> (bool, u64) {
     let patch = hierarchy.patch_of(element);
     let tangent = patch.normal.any_orthonormal_vector();
     let other = patch.normal.cross(tangent);
-    let mut shot = 0;
-    let is_inside = PROBES.iter().all(|&[x, y]| {
+    let (mut backs, mut shot) = (0, 0);
+    for [x, y] in PROBES {
+        if shot == FIRST_PROBES && backs == 0 {
+            break;
+        }
         let direction = (patch.normal + tangent * x + other * y).normalize_or_zero();
         shot += 1;
-        rays.closest(point, direction, Some(patch.triangle))
-            .is_some_and(|hit| hierarchy.patch_met(hit.triangle, direction).is_none())
-    });
-    (is_inside, shot)
+        match rays.closest(point, direction, Some(patch.triangle)) {
+            Some(hit) if hierarchy.patch_met(hit.triangle, direction).is_some() => {
+                return (false, shot as u64);
+            }
+            hit => backs += usize::from(hit.is_some()),
+        }
+    }
+    (backs >= LEAST_BACKS, shot as u64)
 }
 
 /// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,

@@ -112,7 +112,6 @@ pub struct Solver {
     /// Blocks nothing where the plan says so.
     rays: Arc<RayTree>,
     hierarchy: Hierarchy,
-    areas: PatchSums,
     /// What links carry: reflected light, and emission where it is linked.
     power: Tables,
     links: LinkStore,
@@ -169,7 +168,6 @@ impl Solver {
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
         let mut solver = Self {
             closures: Closures::default(),
-            areas: PatchSums::of_area(&hierarchy),
             power: Tables::default(),
             links: LinkStore::default(),
             direct: (!lights.is_empty()).then(|| DirectField::new(lights)),
@@ -323,8 +321,11 @@ impl Solver {
             .map_or(Vec4::ZERO, |field| field.element(&self.hierarchy, element))
     }
 
-    /// Radiosity that a leaf sends over links.
+    /// Radiosity that a leaf sends over links, and in `w` 1: nothing where it lies within a solid.
     fn radiosity(&self, element: usize) -> Vec4 {
+        if self.hierarchy.mesh.elements[element].is_buried() {
+            return Vec4::ZERO;
+        }
         let patch = self.hierarchy.patch_of(element);
         let reflected =
             patch.reflectance * (self.linked[element] + self.direct_of(element)).truncate();
@@ -441,11 +442,12 @@ impl Solver {
                 Vec::new()
             };
             let refinement = {
+                let areas = PatchSums::of_area(&self.hierarchy, &self.power);
                 let powers = PatchSums::of_power(&self.hierarchy, &self.power);
                 let sampler = PairSampler {
                     hierarchy: &self.hierarchy,
                     tables: &self.power,
-                    areas: &self.areas,
+                    areas: &areas,
                     powers: &powers,
                     rays: &self.rays,
                 };

@@ -69,11 +69,13 @@ impl Solver {
     fn fill_row_sums(&self, report: &mut StepReport) {
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut sum, mut whole) = (0.0f64, 0.0f64);
-        for leaf in self.hierarchy.mesh.held_leaves() {
+        let elements = &self.hierarchy.mesh.elements;
+        let seen = |leaf: &usize| !elements[*leaf].is_buried();
+        for leaf in self.hierarchy.mesh.held_leaves().filter(seen) {
             let row = self.linked[leaf].w;
             least = least.min(row);
             most = most.max(row);
-            let area = f64::from(self.hierarchy.mesh.elements[leaf].area_vector.length());
+            let area = f64::from(elements[leaf].area_vector.length());
             sum += f64::from(row) * area;
             whole += area;
         }

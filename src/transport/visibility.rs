@@ -56,9 +56,12 @@ impl Facet {
     }
 }
 
-/// A node that many points are drawn on by area: an element as a whole, whatever its parts.
+/// A node that many points are drawn on by area.
 enum Receiver {
+    /// An element as a whole, whatever its parts.
     Element(Facet),
+    /// An element with parts that do not count.
+    Parts(usize),
     /// The patches of a cluster.
     Patches(Range<usize>),
 }
@@ -80,9 +83,9 @@ struct Source {
 pub struct PatchSums(Vec<f64>);
 
 impl PatchSums {
-    /// Of the areas of the patches, frame units.
-    pub fn of_area(hierarchy: &Hierarchy) -> Self {
-        Self::of(hierarchy, |_, area| area)
+    /// Of the areas of the patches, frame units, as far as they send anything.
+    pub fn of_area(hierarchy: &Hierarchy, tables: &Tables) -> Self {
+        Self::of(hierarchy, |patch, area| tables.elements[patch].w * area)
     }
 
     /// Of what the patches send (luminance of radiosity, times area).
@@ -198,18 +201,30 @@ impl PairSampler<'_> {
 
     fn receiver(&self, node: NodeId) -> Receiver {
         match self.hierarchy.kind(node) {
-            Kind::Element(index) => Receiver::Element(self.facet(index)),
+            Kind::Element(index) if self.is_whole(index) => Receiver::Element(self.facet(index)),
+            Kind::Element(index) => Receiver::Parts(index),
             Kind::Cluster(index) => Receiver::Patches(self.hierarchy.clusters[index].patches()),
         }
+    }
+
+    /// Whether all of an element counts, or none, or its parts are not known.
+    fn is_whole(&self, element: usize) -> bool {
+        let part = self.tables.elements[element].w;
+        part >= 1.0 || part <= 0.0 || self.hierarchy.mesh.elements[element].is_leaf()
     }
 
     /// Uniform over the area of a node.
     fn sample(&self, receiver: &Receiver, random: &mut Random) -> Sample {
         match receiver {
             Receiver::Element(facet) => facet.sample(random),
+            Receiver::Parts(element) => self.sample_leaf(*element, false, random),
             Receiver::Patches(patches) => {
                 let patch = self.areas.choose(patches, random.uniform());
-                self.facet(patch).sample(random)
+                if self.is_whole(patch) {
+                    self.facet(patch).sample(random)
+                } else {
+                    self.sample_leaf(patch, false, random)
+                }
             }
         }
     }
@@ -219,10 +234,9 @@ impl PairSampler<'_> {
         let (leaf, area, power) = match kind {
             Kind::Element(index) => {
                 let element = &self.hierarchy.mesh.elements[index];
-                let area = element.area_vector.length();
-                let power = luminance(self.tables.elements[index]) * area;
+                let (area, sent) = (element.area_vector.length(), self.tables.elements[index]);
                 let leaf = element.is_leaf().then(|| self.facet(index));
-                (leaf, area, power)
+                (leaf, area * sent.w, luminance(sent) * area)
             }
             Kind::Cluster(index) => {
                 let patches = self.hierarchy.clusters[index].patches();
@@ -283,7 +297,7 @@ impl PairSampler<'_> {
             if by_power {
                 luminance(self.tables.elements[child]).max(0.0)
             } else {
-                1.0
+                self.tables.elements[child].w
             }
         };
         let target = at * children.clone().map(weight).sum::<f32>();

@@ -169,7 +169,7 @@ fn pairs(criterion: &mut Criterion, scene: &Scene) {
         .collect();
     tables_and_links(criterion, kernel, &seen);
     let (areas, powers, rays) = (
-        PatchSums::of_area(&hierarchy),
+        PatchSums::of_area(&hierarchy, &tables),
         PatchSums::of_power(&hierarchy, &tables),
         RayTree::new(scene),
     );
