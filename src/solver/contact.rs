@@ -17,7 +17,8 @@ use crate::{
 const CONTACT_TOLERANCE: f32 = 1.0;
 
 /// Whether an element lies within a solid is looked at if it is this many times larger than those that are not divided
-/// for it, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose contacts are fine anyway.
+/// for it, or a whole patch was, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose
+/// contacts are fine anyway.
 const LOOKED_AT: f32 = 64.0;
 
 /// Tangents of the probes' directions against the normal. Of the first, one at least must meet a back before the others
@@ -82,8 +83,12 @@ impl Solver {
             .map(|&leaf| {
                 let element = &elements[leaf];
                 let above = elements.get(element.parent as usize);
+                let whole = elements[element.patch as usize].area_vector.length();
                 let may_be = element.area_vector.length() > LOOKED_AT * least
-                    || above.is_some_and(|parent| parent.covered != 0);
+                    || above.is_some_and(|parent| match parent.covered {
+                        Element::UNPROBED => whole > LOOKED_AT * least,
+                        covered => covered != 0,
+                    });
                 if may_be && !cancel.is_cancelled() {
                     probe(&self.rays, &self.hierarchy, leaf)
                 } else {
