@@ -31,6 +31,12 @@ impl Vectors4 {
         }
     }
 
+    /// Put a vector into a lane.
+    #[inline]
+    pub fn set(&mut self, lane: usize, vector: Vec3) {
+        (self.x[lane], self.y[lane], self.z[lane]) = (vector.x, vector.y, vector.z);
+    }
+
     /// The vector of each lane.
     pub fn to_array(&self) -> [Vec3; 4] {
         [0, 1, 2, 3].map(|lane| Vec3::new(self.x[lane], self.y[lane], self.z[lane]))
@@ -93,6 +99,20 @@ impl Vectors4 {
     }
 }
 
+impl std::ops::Div<Vec4> for Vectors4 {
+    type Output = Self;
+
+    /// Each vector by the number of its lane.
+    #[inline]
+    fn div(self, by: Vec4) -> Self {
+        Self {
+            x: self.x / by,
+            y: self.y / by,
+            z: self.z / by,
+        }
+    }
+}
+
 impl std::ops::Sub for Vectors4 {
     type Output = Self;
 
@@ -123,6 +143,9 @@ mod tests {
         assert_eq!(these.to_array(), a);
         assert_eq!(Vectors4::splat(b[2]).to_array(), [b[2]; 4]);
         assert_eq!(these.rotated().to_array(), [a[1], a[2], a[3], a[0]]);
+        let mut changed = these;
+        changed.set(2, b[0]);
+        assert_eq!(changed.to_array(), [a[0], a[1], b[0], a[3]]);
         let mut sum = Vec3::ZERO;
         for lane in 0..4 {
             let close = |found: Vec3, expected: Vec3| {
@@ -134,6 +157,10 @@ mod tests {
             assert!((these.dot(&those)[lane] - a[lane].dot(b[lane])).abs() < 1e-6);
             close(these.cross(&those).to_array()[lane], a[lane].cross(b[lane]));
             close((these - those).to_array()[lane], a[lane] - b[lane]);
+            close(
+                (these / (share + 1.0)).to_array()[lane],
+                a[lane] / (share[lane] + 1.0),
+            );
             let between = a[lane].lerp(b[lane], share[lane]);
             close(these.lerp(&those, share).to_array()[lane], between);
             let chosen = if lane < 2 { a[lane] } else { b[lane] };

@@ -69,6 +69,8 @@ impl Plane {
 struct Marked {
     patches: Vec<bool>,
     clusters: Vec<bool>,
+    /// The smallest cluster that holds all of them, and how many hold it.
+    smallest: (usize, u32),
 }
 
 impl PatchTree {
@@ -84,18 +86,25 @@ impl PatchTree {
         let mut lit: Vec<bool> = self
             .patches
             .par_iter()
-            .map(|patch| emits(patch) && self.faces_any(scene, patch, &all))
+            .map_init(Vec::new, |pending, patch| {
+                emits(patch) && self.faces_any(scene, patch, &all, pending)
+            })
             .collect();
         let mut senders = self.marked(|index| lit[index]);
         let mut dark: Vec<usize> = (0..lit.len()).filter(|&index| !lit[index]).collect();
         for _ in 0..MOST_ROUNDS {
-            let (reached, rest): (Vec<usize>, Vec<usize>) = dark
-                .into_par_iter()
-                .partition(|&index| self.faces_any(scene, &self.patches[index], &senders));
+            let reached: Vec<usize> = dark
+                .par_iter()
+                .map_init(Vec::new, |pending, &index| {
+                    self.faces_any(scene, &self.patches[index], &senders, pending)
+                        .then_some(index)
+                })
+                .flatten()
+                .collect();
             for &index in &reached {
                 lit[index] = true;
             }
-            dark = rest;
+            dark.retain(|&index| !lit[index]);
             if dark.is_empty() || reached.is_empty() {
                 return lit;
             }
@@ -119,14 +128,41 @@ impl PatchTree {
                 clusters[first] || clusters[first + 1]
             };
         }
-        Marked { patches, clusters }
+        let smallest = self.smallest_marked(&clusters);
+        Marked {
+            patches,
+            clusters,
+            smallest,
+        }
     }
 
-    /// Whether a patch faces one of the marked patches, or it would take long to tell.
-    fn faces_any(&self, scene: &Scene, patch: &Patch, marked: &Marked) -> bool {
+    /// See [`Marked::smallest`].
+    fn smallest_marked(&self, clusters: &[bool]) -> (usize, u32) {
+        let (mut index, mut above) = (0, 0);
+        while !self.clusters[index].is_leaf() {
+            let first = self.clusters[index].first_child as usize;
+            index = match [clusters[first], clusters[first + 1]] {
+                [true, false] => first,
+                [false, true] => first + 1,
+                _ => break,
+            };
+            above += 1;
+        }
+        (index, above)
+    }
+
+    /// Whether a patch faces one of the marked patches, or it would take long to tell. `pending` is scratch space.
+    fn faces_any(
+        &self,
+        scene: &Scene,
+        patch: &Patch,
+        marked: &Marked,
+        pending: &mut Vec<usize>,
+    ) -> bool {
         let plane = Plane::of(scene, patch);
-        let mut visits = 0;
-        let mut pending = vec![0usize];
+        let (smallest, mut visits) = marked.smallest;
+        pending.clear();
+        pending.push(smallest);
         while let Some(index) = pending.pop() {
             let cluster = &self.clusters[index];
             if !marked.clusters[index] || !plane.sees_box(cluster.min, cluster.max) {

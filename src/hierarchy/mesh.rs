@@ -6,11 +6,15 @@
 //! crease or of a material border have vertices of their own at the same point.
 //! Neighbours stay within one level, so that an edge of a leaf carries at most one hanging point.
 
-use std::{collections::HashMap, ops::Range};
+use std::ops::Range;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
-use super::Patch;
+use super::{
+    Patch,
+    edge_leaves::{Edge, EdgeLeaves, EdgeMap},
+};
 use crate::scene::{DisjointSets, HalfEdge, Scene, half_edges};
 
 /// Halvings at most, but for what balance asks: beyond, single precision cannot tell neighbours apart.
@@ -95,6 +99,8 @@ impl Element {
 pub struct Vertex {
     /// Index into [`Mesh::points`].
     pub point: u32,
+    /// Where that is.
+    pub place: Vec3,
     /// The vertices between which this one was made, or `None` for a corner of the scene.
     pub ends: Option<[u32; 2]>,
 }
@@ -110,14 +116,14 @@ pub struct Mesh {
     /// Number of the patches for which light is computed; the elements of those that follow are never divided.
     held: u32,
     /// Midpoint of the edge between two points, lower index first.
-    point_between: HashMap<(u32, u32), u32>,
+    point_between: EdgeMap<u32>,
     /// Midpoint vertex of the edge between two vertices, lower index first.
-    vertex_between: HashMap<(u32, u32), u32>,
-    /// Leaves at each side of an edge between points, for balance: element ids by edge.
-    leaves_at: HashMap<(u32, u32), Vec<u32>>,
+    vertex_between: EdgeMap<u32>,
+    /// Elements at each edge between points, for balance; none before the first division.
+    leaves_at: Option<EdgeLeaves>,
 }
 
-fn edge(a: u32, b: u32) -> (u32, u32) {
+fn edge(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
 
@@ -142,22 +148,22 @@ impl Mesh {
         let mut mesh = Self {
             points: scene.positions.clone(),
             vertices,
-            elements: Vec::with_capacity(patches.len()),
+            elements: Vec::new(),
             held: held as u32,
-            point_between: HashMap::new(),
-            vertex_between: HashMap::new(),
-            leaves_at: HashMap::new(),
+            point_between: EdgeMap::default(),
+            vertex_between: EdgeMap::default(),
+            leaves_at: None,
         };
-        for (index, patch) in patches.iter().enumerate() {
-            let element = mesh.element(
+        let element = |(index, patch): (usize, &Patch)| {
+            mesh.element(
                 vertex_of[index],
                 index as u32,
                 u32::MAX,
                 0,
                 patch.area_vector,
-            );
-            mesh.elements.push(element);
-        }
+            )
+        };
+        mesh.elements = patches.par_iter().enumerate().map(element).collect();
         Some(mesh)
     }
 
@@ -191,7 +197,7 @@ impl Mesh {
 
     /// Where a vertex is.
     pub fn position(&self, vertex: u32) -> Vec3 {
-        self.points[self.vertices[vertex as usize].point as usize]
+        self.vertices[vertex as usize].place
     }
 
     /// The corners of an element.
@@ -236,8 +242,8 @@ impl Mesh {
     /// Divide the given leaves, and their neighbours as far as balance asks. Elements that are no leaves are passed
     /// over, as are those at the deepest level that are not divided for balance. Returns whether anything was divided.
     pub fn divide(&mut self, wanted: &[u32]) -> bool {
-        if self.leaves_at.is_empty() {
-            self.index_leaves();
+        if self.leaves_at.is_none() {
+            self.leaves_at = Some(EdgeLeaves::new(self.patch_edges()));
         }
         let before = self.elements.len();
         let is_deepest = |&index: &u32| self.elements[index as usize].level >= DEEPEST_LEVEL;
@@ -259,37 +265,28 @@ impl Mesh {
             // An edge of the new children may lie on a neighbour's half edge: then the neighbour is two levels
             // above and must be divided, too.
             for half in self.edges_above(index) {
-                if let Some(coarse) = self.leaf_over(half) {
-                    pending.extend(coarse);
-                }
+                pending.extend(self.leaves_over(half));
             }
         }
         self.elements.len() > before
     }
 
     /// The three edges of an element, as pairs of points.
-    fn point_edges(&self, vertices: [u32; 3]) -> [(u32, u32); 3] {
+    fn point_edges(&self, vertices: [u32; 3]) -> [Edge; 3] {
         let [a, b, c] = vertices.map(|vertex| self.vertices[vertex as usize].point);
         [edge(a, b), edge(b, c), edge(c, a)]
     }
 
-    fn index_leaves(&mut self) {
-        for index in 0..self.elements.len() {
-            if self.elements[index].is_leaf() && self.is_held(index) {
-                for key in self.point_edges(self.elements[index].vertices) {
-                    self.leaves_at.entry(key).or_default().push(index as u32);
-                }
-            }
-        }
+    /// The edges of the patches that light is computed for.
+    fn patch_edges(&self) -> impl Iterator<Item = (u32, [Edge; 3])> + Clone + '_ {
+        (0..self.held).map(|patch| {
+            let vertices = self.elements[patch as usize].vertices;
+            (patch, self.point_edges(vertices))
+        })
     }
 
     fn divide_one(&mut self, index: u32) {
         let parent = self.elements[index as usize];
-        for key in self.point_edges(parent.vertices) {
-            if let Some(leaves) = self.leaves_at.get_mut(&key) {
-                leaves.retain(|&leaf| leaf != index);
-            }
-        }
         let children = self.parts(parent.vertices, parent.area_vector.length());
         let (share, deeper) = (1.0 / children.len() as f32, children.len() as u8 / 2);
         self.elements[index as usize].first_child = self.elements.len() as u32;
@@ -304,8 +301,9 @@ impl Mesh {
             );
             let child_index = self.elements.len() as u32;
             self.elements.push(child);
-            for key in self.point_edges(vertices) {
-                self.leaves_at.entry(key).or_default().push(child_index);
+            let edges = self.point_edges(vertices);
+            if let Some(leaves_at) = &mut self.leaves_at {
+                leaves_at.push(child_index, edges);
             }
         }
     }
@@ -333,7 +331,7 @@ impl Mesh {
     }
 
     /// Edges that those of the divided element are halves of, where a leaf may still lie undivided.
-    fn edges_above(&self, index: u32) -> Vec<(u32, u32)> {
+    fn edges_above(&self, index: u32) -> Vec<Edge> {
         let mut edges = Vec::new();
         let mut above = self.elements[index as usize].parent;
         while let Some(element) = self.elements.get(above as usize) {
@@ -348,16 +346,19 @@ impl Mesh {
     }
 
     /// Leaves that have a whole edge where others already have quarters of it.
-    fn leaf_over(&self, key: (u32, u32)) -> Option<Vec<u32>> {
-        let middle = *self.point_between.get(&key)?;
-        let quartered = [edge(key.0, middle), edge(middle, key.1)]
-            .iter()
-            .any(|half| self.point_between.contains_key(half));
-        if !quartered {
-            return None;
-        }
-        let leaves = self.leaves_at.get(&key)?;
-        (!leaves.is_empty()).then(|| leaves.clone())
+    fn leaves_over(&self, key: Edge) -> impl Iterator<Item = u32> + '_ {
+        let elements = self.leaves_at.as_ref().filter(|_| self.is_quartered(key));
+        let elements = elements.into_iter().flat_map(move |all| all.at(key));
+        elements.filter(|&element| self.elements[element as usize].is_leaf())
+    }
+
+    /// Whether an edge is divided, and a half of it, too.
+    fn is_quartered(&self, key: Edge) -> bool {
+        self.point_between.get(&key).is_some_and(|&middle| {
+            [edge(key.0, middle), edge(middle, key.1)]
+                .iter()
+                .any(|half| self.point_between.contains_key(half))
+        })
     }
 
     /// The vertex in the middle between two vertices, made if it is not there.
@@ -378,6 +379,7 @@ impl Mesh {
         let vertex = self.vertices.len() as u32;
         self.vertices.push(Vertex {
             point,
+            place,
             ends: Some([a, b]),
         });
         self.vertex_between.insert(key, vertex);
@@ -387,15 +389,8 @@ impl Mesh {
     /// Whether an edge of a leaf carries more than one hanging point.
     pub(super) fn hangs_twice(&self, leaf: usize) -> bool {
         self.point_edges(self.elements[leaf].vertices)
-            .iter()
-            .any(|key| {
-                self.point_between.get(key).is_some_and(|&middle| {
-                    let halves = [edge(key.0, middle), edge(middle, key.1)];
-                    halves
-                        .iter()
-                        .any(|half| self.point_between.contains_key(half))
-                })
-            })
+            .into_iter()
+            .any(|key| self.is_quartered(key))
     }
 
     /// The leaves as triangles without T-junctions between those that light is computed for, each with the element that
@@ -432,7 +427,7 @@ impl Mesh {
             + size_of_val(self.vertices.as_slice())
             + size_of_val(self.elements.as_slice())
             + SLOT * (self.point_between.capacity() + self.vertex_between.capacity())
-            + 3 * SLOT * self.leaves_at.capacity()
+            + self.leaves_at.as_ref().map_or(0, EdgeLeaves::memory_bytes)
     }
 }
 
@@ -517,6 +512,7 @@ fn share_vertices(
                     *slot = vertices.len() as u32;
                     vertices.push(Vertex {
                         point: points[side],
+                        place: scene.positions[points[side] as usize],
                         ends: None,
                     });
                 }

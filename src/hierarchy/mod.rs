@@ -7,6 +7,7 @@
 
 mod build;
 mod directional;
+mod edge_leaves;
 mod facing;
 mod mesh;
 mod subtrees;

@@ -1,6 +1,6 @@
 //! From raw faces in world coordinates to a [`Scene`] that keeps its promises.
 
-use std::{cell::Cell, collections::HashMap};
+use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -250,7 +250,7 @@ impl SceneBuilder {
     fn drop_unusable_faces(&mut self) -> Vec<Skipped> {
         let positions = std::mem::take(&mut self.positions);
         let material_count = self.materials.len().max(1);
-        let skipped = self.drop_faces(|face| unusable(face, &positions, material_count));
+        let skipped = self.drop_faces(|_, face| unusable(face, &positions, material_count));
         self.positions = positions;
         skipped
     }
@@ -258,7 +258,7 @@ impl SceneBuilder {
     /// Remove faces that shrink to a line or a point in the frame's single precision.
     fn drop_vanished_faces(&mut self, frame: &Frame, corner_of: &[u32]) -> Vec<Skipped> {
         let positions = std::mem::take(&mut self.positions);
-        let skipped = self.drop_faces(|face| {
+        let skipped = self.drop_faces(|_, face| {
             let [a, b, c] = face.corners.map(|corner| corner_of[corner as usize]);
             let area = area_vector(face.corners.map(|corner| positions[corner as usize]), frame);
             // Of areas whose square underflows there is no direction either.
@@ -278,16 +278,23 @@ impl SceneBuilder {
             .map(|face| face.corners.map(|corner| corner_of[corner as usize]))
             .collect();
         let coincident = sidedness::Coincident::of(&corners);
-        let index = Cell::new(0);
-        self.drop_faces(|_| {
-            let is_double = coincident.is_double(index.replace(index.get() + 1));
-            is_double.then_some(DOUBLED)
-        });
+        self.drop_faces(|index, _| coincident.is_double(index).then_some(DOUBLED));
     }
 
-    /// Remove the faces for which there is a reason, count them by reason, and keep objects at their first faces.
-    fn drop_faces(&mut self, reason: impl Fn(&Face) -> Option<&'static str>) -> Vec<Skipped> {
+    /// Remove the faces for which there is a reason, count them by reason, and keep objects at their first faces. The
+    /// reason is asked for by the place among the faces and the face.
+    fn drop_faces(
+        &mut self,
+        reason: impl Fn(usize, &Face) -> Option<&'static str> + Sync,
+    ) -> Vec<Skipped> {
         let mut skipped: Vec<Skipped> = Vec::new();
+        let faces = self.faces.par_iter().enumerate();
+        if !faces
+            .clone()
+            .any(|(index, face)| reason(index, face).is_some())
+        {
+            return skipped;
+        }
         let (mut index, mut kept) = (0, 0);
         let objects = &mut self.objects;
         let mut next_object = 0;
@@ -300,7 +307,7 @@ impl SceneBuilder {
                 next_object += 1;
             }
             index += 1;
-            let Some(reason) = reason(face) else {
+            let Some(reason) = reason(index - 1, face) else {
                 kept += 1;
                 return true;
             };
@@ -471,35 +478,54 @@ impl SceneBuilder {
 
     /// The frame that fits the corners in use.
     fn frame(&self) -> Frame {
-        let (mut min, mut max) = (DVec3::MAX, DVec3::MIN);
-        for face in &self.faces {
-            for corner in face.corners {
-                min = min.min(self.positions[corner as usize]);
-                max = max.max(self.positions[corner as usize]);
-            }
-        }
+        let corners = self
+            .faces
+            .par_iter()
+            .map(|face| face.corners.map(|corner| self.positions[corner as usize]));
+        let (min, max) = corners
+            .map(|[a, b, c]| (a.min(b).min(c), a.max(b).max(c)))
+            .reduce(
+                || (DVec3::MAX, DVec3::MIN),
+                |a, b| (a.0.min(b.0), a.1.max(b.1)),
+            );
         Frame::fitting(min, max)
     }
 
     /// Merge corners that fall on the same frame position; returns the positions and where each old one went.
     fn weld(&self, frame: &Frame) -> (Vec<Vec3>, Vec<u32>) {
-        let mut merged: HashMap<[u32; 3], u32> = HashMap::with_capacity(self.positions.len());
+        let place = |corner: u32| {
+            // Adding 0 turns -0 into 0, so that both have the same bits.
+            frame.from_world(self.positions[corner as usize]) + 0.0
+        };
+        let first_equal = self.first_equal(place);
         let mut positions = Vec::new();
-        let mut corner_of = vec![u32::MAX; self.positions.len()];
+        let mut number = vec![u32::MAX; self.positions.len()];
+        let mut corner_of = number.clone();
         for corner in self.faces.iter().flat_map(|face| face.corners) {
-            let slot = &mut corner_of[corner as usize];
-            if *slot == u32::MAX {
-                // Adding 0 turns -0 into 0, so that both have the same bits.
-                let position = frame.from_world(self.positions[corner as usize]) + 0.0;
-                *slot = *merged
-                    .entry(position.to_array().map(f32::to_bits))
-                    .or_insert_with(|| {
-                        positions.push(position);
-                        positions.len() as u32 - 1
-                    });
+            let number = &mut number[first_equal[corner as usize] as usize];
+            if *number == u32::MAX {
+                *number = positions.len() as u32;
+                positions.push(place(corner));
             }
+            corner_of[corner as usize] = *number;
         }
         (positions, corner_of)
+    }
+
+    /// By corner: the first one in the same place, bit by bit.
+    fn first_equal(&self, place: impl Fn(u32) -> Vec3 + Sync) -> Vec<u32> {
+        let mut places: Vec<([u32; 3], u32)> = (0..self.positions.len() as u32)
+            .into_par_iter()
+            .map(|corner| (place(corner).to_array().map(f32::to_bits), corner))
+            .collect();
+        places.par_sort_unstable();
+        let mut first_equal = vec![0; places.len()];
+        for equal in places.chunk_by(|a, b| a.0 == b.0) {
+            for &(_, corner) in equal {
+                first_equal[corner as usize] = equal[0].1;
+            }
+        }
+        first_equal
     }
 
     /// Area vectors from the file's own digits, and the means of reflectance and emission.

@@ -16,20 +16,48 @@ pub struct HalfEdge {
 }
 
 /// The sides of triangles given by the points of their corners, sorted.
-pub fn half_edges(triangles: impl ExactSizeIterator<Item = [u32; 3]>) -> Vec<HalfEdge> {
-    let mut edges = Vec::with_capacity(3 * triangles.len());
-    for (triangle, [a, b, c]) in triangles.enumerate() {
-        for (side, (from, to)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
-            edges.push(HalfEdge {
-                ends: [from.min(to), from.max(to)],
-                is_forward: from < to,
-                triangle: triangle as u32,
-                side: side as u8,
-            });
-        }
+pub fn half_edges(triangles: impl Iterator<Item = [u32; 3]> + Clone) -> Vec<HalfEdge> {
+    let edges = triangles.enumerate().flat_map(|(triangle, [a, b, c])| {
+        [(0, a, b), (1, b, c), (2, c, a)].map(|(side, from, to)| HalfEdge {
+            ends: [from.min(to), from.max(to)],
+            is_forward: from < to,
+            triangle: triangle as u32,
+            side,
+        })
+    });
+    sorted_by(edges, |edge| edge.ends[0])
+}
+
+/// Sort items whose order begins with a number: each goes among those of its number, and those are sorted. Takes memory
+/// for the largest number.
+pub(super) fn sorted_by<T: Copy + Ord + Send + Sync>(
+    items: impl Iterator<Item = T> + Clone,
+    number: impl Fn(&T) -> u32 + Sync,
+) -> Vec<T> {
+    let Some(first) = items.clone().next() else {
+        return Vec::new();
+    };
+    let last = items.clone().map(|item| number(&item)).max();
+    // Where the items of each number begin.
+    let mut starts = vec![0; last.map_or(0, |last| last as usize + 2)];
+    items.clone().for_each(|item| {
+        starts[number(&item) as usize + 1] += 1;
+    });
+    let mut sum = 0;
+    for start in &mut starts {
+        sum += *start;
+        *start = sum;
     }
-    edges.par_sort_unstable();
-    edges
+    let mut sorted = vec![first; sum];
+    items.for_each(|item| {
+        let start = &mut starts[number(&item) as usize];
+        sorted[*start] = item;
+        *start += 1;
+    });
+    sorted
+        .par_chunk_by_mut(|a, b| number(a) == number(b))
+        .for_each(<[T]>::sort_unstable);
+    sorted
 }
 
 /// Disjoint sets with path halving.
@@ -77,6 +105,17 @@ mod tests {
             .map(|edge| (edge.is_forward, edge.triangle, edge.side));
         assert_eq!(found.collect::<Vec<_>>(), [(false, 1, 0), (true, 0, 1)]);
         assert!(edges.is_sorted());
+    }
+
+    #[test]
+    fn items_are_sorted_whatever_their_numbers() {
+        for count in [0, 1, 2, 50, 3000] {
+            // Some numbers have none, some have many.
+            let items = (0..count).map(|i: u32| (i * 7919 % 101 / 3, i * 31 % 17, i));
+            let mut expected: Vec<_> = items.clone().collect();
+            expected.sort_unstable();
+            assert_eq!(sorted_by(items, |item| item.0), expected, "{count}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! the clamp, non-negative emission.
 //! Units: radiance in W·sr⁻¹·m⁻², lengths in units of the frame (see [`Frame`]).
 
+mod ahead;
 mod build;
 pub mod builtin;
 mod clean;

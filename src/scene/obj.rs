@@ -1,18 +1,18 @@
 //! Reading an OBJ file with its MTL files and textures into a [`Scene`].
 //!
-//! The file passes [`ObjCleaner`], then the parser, then [`Triangulator`], and ends in [`SceneBuilder`]. What can be
+//! The file passes [`ObjCleaner`], beside it the parser, then [`Triangulator`], and ends in [`SceneBuilder`]. What can be
 //! skipped is skipped, counted and named with its line; only what leaves no scene is an error.
 
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _};
-use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
+use super::ahead::parse_ahead;
 use super::build::{BuildError, Face, SceneBuilder, SceneOptions, Source};
-use super::clean::{MAX_LIBRARIES, Mention, Notes, ObjCleaner};
+use super::clean::{FaceNote, MAX_LIBRARIES, Mention, Notes, ObjCleaner};
 use super::locate::{Missing, locate};
 use super::mtl::{MtlMaterial, TextureReference, read_mtl};
 use super::source;
@@ -140,30 +140,33 @@ fn folder_of(path: &Path) -> PathBuf {
 /// Run the parser over the clean text.
 fn parse(
     path: &Path,
-    mut cleaner: ObjCleaner<impl BufRead>,
+    cleaner: ObjCleaner<impl BufRead + Send>,
 ) -> Result<(Vec<tobj::Model>, Notes), ReadError> {
     let options = tobj::LoadOptions::default();
-    // The clean text is valid for the parser; should it panic nevertheless, the window must survive.
-    let parsed = std::panic::catch_unwind(AssertUnwindSafe(|| {
-        tobj::load_obj_buf(&mut cleaner, &options, |_| {
-            Err(tobj::LoadError::OpenFileFailed)
-        })
-    }));
-    let notes = cleaner.notes;
+    let parsed = parse_ahead(cleaner, |text| {
+        tobj::load_obj_buf(text, &options, |_| Err(tobj::LoadError::OpenFileFailed))
+    });
     let path = path.to_owned();
+    let parsed = match parsed {
+        Ok(parsed) => parsed,
+        Err(error) => {
+            let reason = error.to_string();
+            return Err(ReadError::Unreadable { reason, path });
+        }
+    };
+    let (Some(models), Some(notes)) = (parsed.value, parsed.notes) else {
+        let reason = "internal failure".to_owned();
+        return Err(ReadError::Parser { reason, path });
+    };
     if let Some(reason) = notes.failure {
         return Err(ReadError::Unreadable { reason, path });
     }
-    match parsed {
-        Ok(Ok(_)) if !notes.any_text => Err(ReadError::Empty { path }),
-        Ok(Ok(_)) if notes.statements == 0 => Err(ReadError::NotObj { path }),
-        Ok(Ok((models, _))) => Ok((models, notes)),
-        Ok(Err(error)) => Err(ReadError::Parser {
+    match models {
+        Ok(_) if !notes.any_text => Err(ReadError::Empty { path }),
+        Ok(_) if notes.statements == 0 => Err(ReadError::NotObj { path }),
+        Ok((models, _)) => Ok((models, notes)),
+        Err(error) => Err(ReadError::Parser {
             reason: error.to_string(),
-            path,
-        }),
-        Err(_) => Err(ReadError::Parser {
-            reason: "internal failure".to_owned(),
             path,
         }),
     }
@@ -471,8 +474,9 @@ impl Import<'_> {
     /// Copy all parsed faces into the builder.
     fn models(&mut self, models: &[tobj::Model]) {
         let mut triangulator = Triangulator::default();
-        let lines = std::mem::take(&mut self.notes.face_lines);
-        let mut lines = lines.into_iter();
+        let faces = std::mem::take(&mut self.notes.faces);
+        self.builder.faces.reserve(faces.len());
+        let mut faces = faces.into_iter();
         for model in models {
             let segment = model.name.parse::<usize>().ok();
             let Some(segment) = segment.and_then(|segment| self.notes.segments.get(segment)) else {
@@ -489,7 +493,7 @@ impl Import<'_> {
                 Some(material) => self.slots[material],
                 None => self.default_slot(),
             };
-            self.mesh(&model.mesh, slot, &mut triangulator, &mut lines);
+            self.mesh(&model.mesh, slot, &mut triangulator, &mut faces);
         }
     }
 
@@ -506,7 +510,7 @@ impl Import<'_> {
         mesh: &tobj::Mesh,
         slot: Slot,
         triangulator: &mut Triangulator,
-        lines: &mut impl Iterator<Item = u32>,
+        faces: &mut impl Iterator<Item = FaceNote>,
     ) {
         let base = self.builder.positions.len();
         let points = mesh.positions.as_chunks::<3>().0;
@@ -515,11 +519,12 @@ impl Import<'_> {
             .extend(points.iter().map(|&point| DVec3::from_array(point)));
         let mut start = 0;
         let mut polygon = Vec::new();
-        let mut arities = mesh.face_arities.iter();
         while start < mesh.indices.len() {
-            let count = arities.next().map_or(3, |&count| count as usize);
+            let Some(FaceNote { line, corner_count }) = faces.next() else {
+                break;
+            };
+            let count = corner_count as usize;
             let corners = Corners { mesh, slot, start };
-            let line = lines.next().unwrap_or(0);
             if count == 3 {
                 self.push_face(&corners, [0, 1, 2], base, line);
             } else {

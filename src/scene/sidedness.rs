@@ -9,6 +9,7 @@ use std::f32::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::edges::sorted_by;
 use super::{DisjointSets, Sides, Triangle, half_edges};
 
 /// The shells of a scene.
@@ -45,17 +46,13 @@ pub(super) struct Coincident {
 }
 
 impl Coincident {
-    /// Compare the corners of triangles; takes the time of sorting them.
+    /// Compare the corners of triangles.
     pub(super) fn of(corners: &[[u32; 3]]) -> Self {
-        let mut keyed: Vec<([u32; 3], bool, u32)> = corners
-            .par_iter()
-            .enumerate()
-            .map(|(triangle, corners)| {
-                let (key, is_turned) = sorted_corners(*corners);
-                (key, is_turned, triangle as u32)
-            })
-            .collect();
-        keyed.par_sort_unstable();
+        let keyed = corners.iter().enumerate().map(|(triangle, corners)| {
+            let (key, is_turned) = sorted_corners(*corners);
+            (key, is_turned, triangle as u32)
+        });
+        let keyed: Vec<([u32; 3], bool, u32)> = sorted_by(keyed, |&(key, _, _)| key[0]);
         let mut found = Self {
             doubles: vec![false; corners.len()],
             opposites: vec![false; corners.len()],
@@ -93,7 +90,7 @@ fn sorted_corners([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
 }
 
 impl Shells {
-    /// Find the shells; takes the time of sorting the edges.
+    /// Find the shells.
     pub(super) fn of(triangles: &[Triangle]) -> Self {
         let edges = half_edges(triangles.iter().map(|triangle| triangle.corners));
         // Connect triangles over shared edges.
@@ -128,6 +125,18 @@ impl Shells {
             closed,
         }
     }
+
+    /// The box about each shell, least corner first.
+    fn boxes(&self, triangles: &[Triangle], positions: &[Vec3]) -> Vec<[Vec3; 2]> {
+        let mut boxes = vec![[Vec3::MAX, Vec3::MIN]; self.closed.len()];
+        for (triangle, &shell) in triangles.iter().zip(&self.of_triangle) {
+            let [min, max] = &mut boxes[shell as usize];
+            for corner in triangle.corners.map(|corner| positions[corner as usize]) {
+                (*min, *max) = (min.min(corner), max.max(corner));
+            }
+        }
+        boxes
+    }
 }
 
 /// Lights that are looked at; each costs a pass over the triangles.
@@ -153,25 +162,33 @@ pub(super) fn inverted_shell_count(
             .sum();
         return usize::from(volume > 0.0);
     }
-    let mut inverted = vec![false; shells.closed.len()];
+    let boxes = shells.boxes(triangles, positions);
     let step = emitters.len().div_ceil(MAX_LIGHTS).max(1);
-    for &light in emitters.iter().step_by(step) {
+    let lights: Vec<usize> = emitters.into_iter().step_by(step).collect();
+    let around = |light: usize| {
         let [a, b, c] = corners(light);
         let point = (a + b + c) / 3.0;
-        let own = shells.of_triangle[light] as usize;
+        // Others than its own that may hold it.
+        let mut may_hold: Vec<bool> = boxes
+            .iter()
+            .zip(&shells.closed)
+            .map(|(&[min, max], &closed)| closed && (point.cmpge(min) & point.cmple(max)).all())
+            .collect();
+        may_hold[shells.of_triangle[light] as usize] = false;
         // The solid angle under which a closed shell is seen from inside is the full sphere, signed by its winding.
         let mut solid_angle = vec![0.0_f64; shells.closed.len()];
-        for triangle in 0..triangles.len() {
-            let shell = shells.of_triangle[triangle] as usize;
-            if shells.closed[shell] && shell != own {
-                solid_angle[shell] += signed_solid_angle(corners(triangle), point);
+        for (triangle, &shell) in shells.of_triangle.iter().enumerate() {
+            if may_hold[shell as usize] {
+                solid_angle[shell as usize] += signed_solid_angle(corners(triangle), point);
             }
         }
-        for (inverted, angle) in inverted.iter_mut().zip(solid_angle) {
-            *inverted |= angle > f64::from(2.0 * PI);
-        }
-    }
-    inverted.iter().filter(|&&inverted| inverted).count()
+        let is_inverted = move |&shell: &usize| solid_angle[shell] > f64::from(2.0 * PI);
+        (0..shells.closed.len()).filter(is_inverted)
+    };
+    let mut inverted: Vec<usize> = lights.into_par_iter().flat_map_iter(around).collect();
+    inverted.sort_unstable();
+    inverted.dedup();
+    inverted.len()
 }
 
 /// Solid angle of a triangle (Van Oosterom and Strackee 1983), positive where its back is seen.

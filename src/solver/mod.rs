@@ -158,13 +158,21 @@ impl Solver {
             scene.awakened(&scene.allowed(wished))
         });
         let (plan, tree) = Plan::make(&scene, &settings, awakened, &is_cancelled)?;
-        let hierarchy = Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &is_cancelled)?;
+        // Both take about as long, and neither keeps all processors busy.
+        let (hierarchy, rays) = rayon::join(
+            || {
+                Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &|| {
+                    cancel.is_cancelled()
+                })
+            },
+            || match rays {
+                _ if plan.is_clear => Arc::new(RayTree::clear()),
+                Some(rays) => rays,
+                None => Arc::new(RayTree::new(&scene)),
+            },
+        );
+        let hierarchy = hierarchy?;
         cancel.proceed()?;
-        let rays = match rays {
-            _ if plan.is_clear => Arc::new(RayTree::clear()),
-            Some(rays) => rays,
-            None => Arc::new(RayTree::new(&scene)),
-        };
         let lights = Lights::new(&scene, &hierarchy, settings.direct);
         let mut solver = Self {
             closures: Closures::default(),

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     geometry::Vectors4,
     hierarchy::{Hierarchy, Kind, NodeId},
-    transport::{Kernel, Link, LinkStore, Sight, self_irradiance},
+    transport::{Kernel, Link, LinkStore, Sights, self_irradiance},
 };
 
 /// Corners are moved this share of the way to the centroid before light is evaluated there: exactly on an edge, a
@@ -62,6 +62,7 @@ pub(super) fn gather_leaves(
                 links,
                 closures,
                 path: Vec::new(),
+                spare: Vec::new(),
                 found: Vec::new(),
             };
             if !cancel.is_cancelled() {
@@ -95,7 +96,7 @@ struct Chain<'a> {
     /// Irradiance that is the same everywhere.
     even: Vec4,
     /// Sources that are far enough to look alike from everywhere, with their transmissions.
-    sights: Vec<(Sight, Vec4)>,
+    sights: Sights,
     /// The others.
     rest: Vec<&'a Link>,
     /// Links of elements, whose light is wanted at the corners of the leaves.
@@ -105,6 +106,17 @@ struct Chain<'a> {
 }
 
 impl<'a> Chain<'a> {
+    /// As new, with its memory.
+    fn emptied(mut self) -> Self {
+        self.sights.clear();
+        self.rest.clear();
+        Self {
+            sights: self.sights,
+            rest: self.rest,
+            ..Self::default()
+        }
+    }
+
     /// Take a link over. It is worked out if its source looks alike from everywhere in a ball.
     fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, radius: f32) {
         let far = SIGHT_DISTANCE * radius;
@@ -113,7 +125,7 @@ impl<'a> Chain<'a> {
                 if centre.distance_squared(kernel.tables.centres[index]) > far * far =>
             {
                 let sight = kernel.sight(index, centre);
-                self.sights.push((sight, link.transmission()));
+                self.sights.push(&sight, link.transmission());
             }
             _ => self.rest.push(link),
         }
@@ -121,10 +133,7 @@ impl<'a> Chain<'a> {
 
     /// Irradiance over the links that are worked out.
     fn known(&self, point: Vec3, normal: Vec3) -> Vec4 {
-        let sights = self.sights.iter();
-        sights.fold(self.even, |sum, (sight, transmission)| {
-            sum + sight.incident(point).on_face(normal) * *transmission
-        })
+        self.sights.add_to(self.even, point, normal)
     }
 }
 
@@ -135,6 +144,8 @@ struct Walk<'a> {
     closures: &'a Closures,
     /// Of the nodes above the current one.
     path: Vec<Chain<'a>>,
+    /// Those that are no longer needed, for their memory.
+    spare: Vec<Chain<'a>>,
     found: Vec<LeafLight>,
 }
 
@@ -153,7 +164,7 @@ impl<'a> Walk<'a> {
         }
         let mut pending = vec![(group, self.path.len())];
         while let Some((cluster, depth)) = pending.pop() {
-            self.path.truncate(depth);
+            self.leave(depth);
             self.push_cluster(cluster);
             if hierarchy.clusters[cluster].is_leaf() {
                 for patch in hierarchy.clusters[cluster].patches() {
@@ -163,6 +174,13 @@ impl<'a> Walk<'a> {
                 let children = hierarchy.children(NodeId(cluster as u32));
                 pending.extend(children.rev().map(|child| (child as usize, depth + 1)));
             }
+        }
+    }
+
+    /// Cut the path to a length.
+    fn leave(&mut self, depth: usize) {
+        while self.path.len() > depth {
+            self.spare.extend(self.path.pop().map(Chain::emptied));
         }
     }
 
@@ -178,7 +196,7 @@ impl<'a> Walk<'a> {
 
     fn push_cluster(&mut self, index: usize) {
         let cluster = &self.kernel.hierarchy.clusters[index];
-        let mut chain = Chain::default();
+        let mut chain = self.spare.pop().unwrap_or_default();
         for link in self.links.of(NodeId(index as u32)) {
             chain.error += link.error;
             if link.source.index() == index {
@@ -200,21 +218,19 @@ impl<'a> Walk<'a> {
         let mut pending = vec![(patch, above)];
         while let Some((index, depth)) = pending.pop() {
             let element = &hierarchy.mesh.elements[index];
-            self.path.truncate(depth);
+            self.leave(depth);
             let own = self.links.of(NodeId(base + index as u32));
             if element.is_leaf() {
                 let light = self.leaf_light(index, normal, own);
                 self.found.push(light);
                 continue;
             }
-            let chain = Chain {
-                own,
-                ..Chain::default()
-            };
+            let mut chain = self.spare.pop().unwrap_or_default();
+            chain.own = own;
             self.push(element.centroid, element.radius, chain);
             pending.extend(element.children().rev().map(|child| (child, depth + 1)));
         }
-        self.path.truncate(above);
+        self.leave(above);
         // Leaves come depth first, so those of a cell follow each other.
         let cell = |leaf: &LeafLight| self.closures.cell(hierarchy, leaf.element as usize);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {

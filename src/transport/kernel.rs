@@ -52,13 +52,13 @@ impl Incident {
 #[derive(Clone, Copy, Debug)]
 pub struct Sight {
     /// Where the power comes from.
-    centre: Vec3,
+    pub(super) centre: Vec3,
     /// Projected power along the way to the point.
-    power: Vec4,
+    pub(super) power: Vec4,
     /// Largest radiosity.
-    brightest: Vec4,
+    pub(super) brightest: Vec4,
     /// Square of the radius over which the light spreads, 0 if it does not.
-    extent: f32,
+    pub(super) extent: f32,
 }
 
 impl Sight {

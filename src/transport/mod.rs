@@ -5,6 +5,7 @@ mod kernel;
 mod link;
 mod oracle;
 mod refine;
+mod sights;
 mod visibility;
 
 pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};
@@ -12,6 +13,7 @@ pub use link::{Link, LinkStore};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};
 pub use refine::{LinkBudget, Refinement, Refiner};
+pub use sights::Sights;
 pub use visibility::{PairSampler, PatchSums};
 
 pub use crate::hierarchy::luminance;
