@@ -432,6 +432,7 @@ impl Solver {
     /// they have: where links do not fit into memory, those from before stay, and the first ones are made coarser.
     fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
         let (mut passes, mut raises) = (0, 0);
+        let mut judged = None;
         while passes < MOST_PASSES {
             let is_first = self.links.is_empty();
             let most_links = self.most_links();
@@ -461,6 +462,7 @@ impl Solver {
                         sampler,
                     },
                     links_of: |node| self.links.of(node),
+                    judged,
                     threshold: epsilon * self.mean_irradiance,
                     min_area: self.min_area(),
                     seed: self.settings.seed,
@@ -499,6 +501,7 @@ impl Solver {
                 .mesh
                 .fits(&refinement.wanted, self.most_elements());
             self.is_full |= !fits;
+            judged = Some(self.hierarchy.node_count());
             if !fits || !self.hierarchy.mesh.divide(&refinement.wanted) {
                 break;
             }
