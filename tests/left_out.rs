@@ -86,7 +86,7 @@ fn an_empty_closed_room_takes_no_ray_and_few_elements_and_is_exact() {
 }
 
 #[test]
-fn an_empty_open_room_takes_no_ray_and_a_third_of_links_and_elements() {
+fn an_empty_open_room_takes_no_ray_and_half_the_links() {
     let options = SceneOptions::default();
     let scene = Arc::new(builtin::empty_cornell().finish(&options).unwrap());
     let (lean, few) = solve(&scene, draft(Keep::NONE));
@@ -100,7 +100,7 @@ fn an_empty_open_room_takes_no_ray_and_a_third_of_links_and_elements() {
         2 * few.links < many.links && 3 * few.elements < 2 * many.elements,
         "{few:?} {many:?}"
     );
-    // A draft is good to a few per cent; of the two, each is within one of the truth.
+    // At draft each is within one per cent of the truth.
     assert_same_power(&lean, &kept, 0.02);
 }
 
