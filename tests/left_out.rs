@@ -86,6 +86,25 @@ fn an_empty_closed_room_takes_no_ray_and_few_elements_and_is_exact() {
 }
 
 #[test]
+fn an_empty_open_room_takes_no_ray_and_half_the_links() {
+    let options = SceneOptions::default();
+    let scene = Arc::new(builtin::empty_cornell().finish(&options).unwrap());
+    let (lean, few) = solve(&scene, draft(Keep::NONE));
+    assert_eq!(
+        names(&lean),
+        ["unlit", "unlit", "rays", "elements", "clusters"]
+    );
+    let (kept, many) = solve(&scene, draft(Keep::ALL));
+    assert!(few.shadow_rays == 0 && many.shadow_rays > 100_000);
+    assert!(
+        2 * few.links < many.links && 3 * few.elements < 2 * many.elements,
+        "{few:?} {many:?}"
+    );
+    // At draft each is within one per cent of the truth.
+    assert_same_power(&lean, &kept, 0.02);
+}
+
+#[test]
 fn without_rays_alone_direct_light_has_the_same_bits_and_all_light_the_same_power() {
     let others = [Omission::Elements];
     for name in ["plates", "perpendicular-plates"] {

@@ -202,9 +202,8 @@ impl Mesh {
 
     /// The corners of an element.
     pub fn corners(&self, element: usize) -> [Vec3; 3] {
-        self.elements[element]
-            .vertices
-            .map(|vertex| self.position(vertex))
+        let [a, b, c] = self.elements[element].vertices;
+        [self.position(a), self.position(b), self.position(c)]
     }
 
     /// The leaves in order.

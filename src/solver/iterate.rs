@@ -115,12 +115,13 @@ impl Solver {
         cancel: &Cancel,
     ) -> Option<Ending> {
         let weights = self.leaf_shares();
+        let direct = self.direct_of_leaves();
         let ceiling = CEILING_SLACK * self.most_power();
         let mut acceleration = Anderson::new(DEPTH);
         let mut growing = 0;
         for _ in 0..MOST_SWEEPS {
             cancel.proceed()?;
-            let sweep = self.sweep(bounds_rows, cancel)?;
+            let sweep = self.sweep(&direct, bounds_rows, cancel)?;
             report.sweeps += 1;
             cancel.proceed()?;
             let next = acceleration.next(&weights, &self.linked, &sweep.image);
@@ -154,13 +155,12 @@ impl Solver {
         Some(Ending::Unsettled)
     }
 
-    /// Gather once, and measure what came of it; `None` when cancelled.
-    fn sweep(&self, bounds_rows: bool, cancel: &Cancel) -> Option<Sweep> {
+    /// Gather once, and measure what came of it beside the direct light; `None` when cancelled.
+    fn sweep(&self, direct: &[Vec4], bounds_rows: bool, cancel: &Cancel) -> Option<Sweep> {
         let mut image = gather::gather(self.kernel(), &self.links, self.settings.push, cancel)?;
         let returned = |image: &[Vec4]| {
             self.leaf_sum(|leaf| {
-                self.hierarchy.patch_of(leaf).reflectance.extend(0.0)
-                    * (image[leaf] + self.direct_of(leaf))
+                self.hierarchy.patch_of(leaf).reflectance.extend(0.0) * (image[leaf] + direct[leaf])
             })
         };
         let returned_unscaled = returned(&image);
@@ -170,7 +170,7 @@ impl Solver {
             sent: self.leaf_sum(|leaf| self.power.elements[leaf]) + self.sampled_power(),
             returned: returned(&image),
             returned_unscaled,
-            arrived: self.leaf_sum(|leaf| image[leaf] + self.direct_of(leaf)),
+            arrived: self.leaf_sum(|leaf| image[leaf] + direct[leaf]),
             change: self.power_between(&image, &self.linked),
             image,
         })
@@ -182,6 +182,20 @@ impl Solver {
 
     pub(super) fn leaf_sum(&self, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
         gather::area_sum(&self.hierarchy, of).element_sum()
+    }
+
+    /// Direct irradiance of the leaves, 0 for other elements: the same in every sweep.
+    fn direct_of_leaves(&self) -> Vec<Vec4> {
+        let elements = self.hierarchy.mesh.elements.par_iter().enumerate();
+        elements
+            .map(|(index, element)| {
+                if element.is_leaf() {
+                    self.direct_of(index)
+                } else {
+                    Vec4::ZERO
+                }
+            })
+            .collect()
     }
 
     /// Areas of the leaves, 0 for other elements.
@@ -242,9 +256,10 @@ fn note_unscaled_growth(report: &mut StepReport, gain: f64) {
 }
 
 impl Solver {
-    /// Bytes that an iteration needs beside what the solver holds: its memory, and the light before and after.
+    /// Bytes that an iteration needs beside what the solver holds: its memory, the light before and after, and the direct
+    /// light.
     pub(super) const fn iteration_bytes(element_count: usize) -> usize {
-        const VECTORS: usize = 3;
+        const VECTORS: usize = 4;
         Anderson::memory_bytes(DEPTH, element_count) + VECTORS * element_count * size_of::<Vec4>()
     }
 }

@@ -441,6 +441,7 @@ impl Solver {
     /// they have: where links do not fit into memory, those from before stay, and the first ones are made coarser.
     fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
         let (mut passes, mut raises) = (0, 0);
+        let mut judged = None;
         while passes < MOST_PASSES {
             let is_first = self.links.is_empty();
             let most_links = self.most_links();
@@ -471,6 +472,7 @@ impl Solver {
                         sampler,
                     },
                     links_of: |node| self.links.of(node),
+                    judged,
                     threshold: epsilon * self.mean_irradiance,
                     min_area: self.min_area(),
                     seed: self.settings.seed,
@@ -509,6 +511,7 @@ impl Solver {
                 .mesh
                 .fits(&refinement.wanted, self.most_elements());
             self.is_full |= !fits;
+            judged = Some(self.hierarchy.node_count());
             if !fits || !self.hierarchy.mesh.divide(&refinement.wanted) {
                 break;
             }
@@ -534,4 +537,59 @@ fn displayable(color: Vec4) -> Vec3 {
     color
         .truncate()
         .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        hierarchy::NodeId,
+        scene::{
+            SceneOptions,
+            builtin::{empty_cornell, find_builtin},
+        },
+    };
+
+    /// Receivers and sources of all links, in order.
+    fn pairs(solver: &Solver) -> Vec<(u32, u32)> {
+        let receivers = 0..solver.hierarchy.node_count() as u32;
+        let of = |receiver: u32| {
+            let links = solver.links.of(NodeId(receiver)).iter();
+            links.map(move |link| (receiver, link.source.0))
+        };
+        let mut pairs: Vec<(u32, u32)> = receivers.flat_map(of).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    #[test]
+    fn links_that_later_passes_leave_as_they_are_would_be_kept_if_they_were_judged_anew() {
+        let cornell = find_builtin("cornell").unwrap().builder();
+        for builder in [empty_cornell(), cornell] {
+            let scene = Arc::new(builder.finish(&SceneOptions::default()).unwrap());
+            let cancel = Cancel::default();
+            let mut solver = Solver::new(scene, SolveSettings::draft(), None, &cancel).unwrap();
+            solver.step(&cancel).unwrap();
+            solver.step(&cancel).unwrap();
+            // The links of another step, and what judging all of them anew by the same threshold makes of them.
+            solver.estimate_mean();
+            let elements = solver.hierarchy.mesh.elements.len();
+            solver.refine(SolveSettings::draft().epsilon, &cancel);
+            assert!(
+                solver.hierarchy.mesh.elements.len() > elements,
+                "there was a second pass"
+            );
+            let found = pairs(&solver);
+            solver.refine(SolveSettings::draft().epsilon, &cancel);
+            let anew = pairs(&solver);
+            let is_other = |pair: &&(u32, u32)| found.binary_search(pair).is_err();
+            let changed = anew.iter().filter(is_other).count();
+            assert!(
+                changed * 100 < found.len(),
+                "{}: {changed} of {}",
+                solver.scene.name,
+                found.len()
+            );
+        }
+    }
 }

@@ -8,12 +8,12 @@
 use glam::{Vec3, Vec4};
 
 use super::{
-    Judgement, Link, PairSampler, element_form_factor, element_form_factors, luminance,
+    Link, PairSampler, element_form_factor, element_form_factors, luminance,
     refine::{Decision, Refinement, Refiner},
 };
 use crate::{
     geometry::{Random, Vectors4, centroid, point_irradiances},
-    hierarchy::{Hierarchy, Kind, NodeId},
+    hierarchy::{ElementId, Hierarchy, Kind, NodeId},
 };
 
 /// Points of a receiver at which form factors of clusters are summed. One would miss how uneven they are near an edge; many
@@ -117,13 +117,10 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             }
             [_, Kind::Cluster(_)] if self.is_by_patch => Some(Decision::DivideReceiver),
             [Kind::Element(from), Kind::Element(to)] if self.follows_light && from != to => {
-                let mut random = self.random(source, receiver);
-                match self.judge.judge(source, receiver, &mut random) {
-                    Judgement::Nothing => Some(Decision::Drop),
-                    Judgement::Transfer { bound, .. } => {
-                        Some(self.decide_in_view([from, to], known, weight, bound, out))
-                    }
+                if !self.judge.face_each_other(source, receiver) {
+                    return Some(Decision::Drop);
                 }
+                Some(self.decide_in_view([from, to], known, weight, out))
             }
             _ => None,
         }
@@ -135,10 +132,11 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         [from, to]: [usize; 2],
         known: Option<&Link>,
         weight: f32,
-        bound: f32,
         out: &mut Refinement,
     ) -> Decision {
         let hierarchy = self.hierarchy();
+        let [source_node, receiver_node] =
+            [from, to].map(|element| hierarchy.element_node(ElementId(element as u32)));
         let (source, receiver) = (&hierarchy.mesh.elements[from], &hierarchy.mesh.elements[to]);
         let seen = match known {
             // What a leaf receives stays as it is, and only the source may have become uneven.
@@ -160,10 +158,13 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             out.wanted.push(from as u32);
         }
         Decision::Keep(Link {
-            source: NodeId((hierarchy.clusters.len() + from) as u32),
+            source: source_node,
             visibility: 1.0,
             // What is seen at a few points tells more than bounds that hold for all.
-            error: bound.min(of_source + mean * seen.change),
+            error: self
+                .judge
+                .bound(source_node, receiver_node)
+                .min(of_source + mean * seen.change),
             form_factor: seen.mean,
         })
     }

@@ -235,9 +235,14 @@ impl Kernel<'_> {
             Kind::Element(index) => {
                 let normals = Vectors4::splat(normal);
                 let factors = element_form_factors(self.hierarchy, index, points, &normals);
-                factors
-                    .to_array()
-                    .map(|factor| self.tables.elements[index] * factor)
+                let radiosity = self.tables.elements[index];
+                // Written out: as a `map` it becomes a call for every link.
+                [
+                    radiosity * factors.x,
+                    radiosity * factors.y,
+                    radiosity * factors.z,
+                    radiosity * factors.w,
+                ]
             }
         }
     }

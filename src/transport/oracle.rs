@@ -68,13 +68,18 @@ impl Judge<'_> {
 
     /// Judge a pair of different nodes, neither above the other.
     pub fn judge(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> Judgement {
-        if !self.can_face(source, receiver) || !self.can_face(receiver, source) {
+        if !self.face_each_other(source, receiver) {
             return Judgement::Nothing;
         }
         match self.estimate {
             Estimate::Interval => self.interval(source, receiver),
             Estimate::Samples(count) => self.samples(source, receiver, count, random),
         }
+    }
+
+    /// Whether some point of each node can look at the other.
+    pub(super) fn face_each_other(&self, source: NodeId, receiver: NodeId) -> bool {
+        self.can_face(source, receiver) && self.can_face(receiver, source)
     }
 
     /// Whether two nodes may touch, and at least one of them is a cluster: then neither knows the other as more than a
@@ -174,18 +179,19 @@ impl Judge<'_> {
         Judgement::Transfer {
             irradiance,
             error: (upper - lower).max(0.0),
-            bound: self.bound(source, receiver, self.brightest(source)),
+            bound: self.bound(source, receiver),
         }
     }
 
-    /// Bound of the error of a face's irradiance for two nodes that do not touch.
+    /// Bound of the error of a face's irradiance.
     ///
     /// Seen from any point of the receiver, light of the source comes along directions within an angle α of the one
     /// between the centres. So what arrives per area facing it lies between (L − α T)/π far² and (U + α T)/π near², with
     /// T the total and L, U the bounds of the table; a cosine at the face is off by at most α; and the spread of a near
     /// source adds half of itself.
-    fn bound(&self, source: NodeId, receiver: NodeId, brightest: f32) -> f32 {
+    pub(super) fn bound(&self, source: NodeId, receiver: NodeId) -> f32 {
         let hierarchy = self.hierarchy();
+        let brightest = self.brightest(source);
         let (from, to) = (
             self.tables().centre(hierarchy, source),
             hierarchy.centroid(receiver),

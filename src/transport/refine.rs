@@ -84,6 +84,9 @@ pub struct Refiner<'a, F> {
     pub judge: Judge<'a>,
     /// The links that a receiver has so far.
     pub links_of: F,
+    /// Nodes that there were when these links were last judged by this threshold; `None` where that was another one. Links
+    /// of which neither end was divided since stay as they are.
+    pub judged: Option<usize>,
     /// Largest error of a link, times the root of the receiver's share of the area (luminance irradiance).
     pub threshold: f32,
     /// Elements below this area are not divided.
@@ -156,6 +159,17 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         (self.cancelled)() || self.budget.is_spent()
     }
 
+    /// Whether nothing that decides about a link has changed since it was judged.
+    fn is_settled(&self, source: NodeId, receiver: NodeId) -> bool {
+        let hierarchy = self.hierarchy();
+        // What a division makes comes after all that was there before.
+        self.judged.is_some_and(|count| {
+            [source, receiver]
+                .iter()
+                .all(|&node| hierarchy.children(node).end as usize <= count)
+        })
+    }
+
     pub(super) fn hierarchy(&self) -> &'a Hierarchy {
         self.judge.kernel.hierarchy
     }
@@ -216,6 +230,10 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mut is_wanted = false;
         let mut pending: Vec<NodeId> = Vec::new();
         for link in (self.links_of)(receiver) {
+            if self.is_settled(link.source, receiver) {
+                out.links.push(*link);
+                continue;
+            }
             let decision = self.decide(link.source, receiver, Some(link), out);
             self.apply(
                 &decision,
