@@ -151,6 +151,31 @@ impl RayTree {
         })
     }
 
+    /// How many solids a ray of unit direction leaves on its way, less how many it enters: of those that hold its origin
+    /// each counts once. `bounds` tells which triangles bound solids.
+    pub fn solids_left(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+        bounds: impl Fn(TriangleId) -> bool,
+    ) -> i32 {
+        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        let mut left = 0;
+        // Nothing counts as met, so that the ray goes through everything.
+        self.tree
+            .ray_traverse(ray, &mut RayHit::none(), |ray, primitive| {
+                let id = TriangleId(self.tree.primitive_indices[primitive]);
+                let triangle = &self.triangles[primitive];
+                if bounds(id) && from != Some(id) && triangle.intersect(ray) < f32::INFINITY {
+                    let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
+                    left += if is_back { 1 } else { -1 };
+                }
+                f32::INFINITY
+            });
+        left
+    }
+
     /// Bytes that the tree holds.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.tree.nodes.as_slice())

@@ -411,6 +411,7 @@ impl SceneBuilder {
             corners: face.corners.map(|corner| corner_of[corner as usize]),
             material: face.material,
             two_sided: false,
+            bounds_solid: false,
         };
         let mut list: Vec<Triangle> = self.faces.iter().map(make).collect();
         debug_assert!(positions.iter().all(|position| position.is_finite()));
@@ -418,6 +419,10 @@ impl SceneBuilder {
         let flags = sidedness::two_sided(&shells, &list, options.sides);
         for (triangle, two_sided) in list.iter_mut().zip(flags) {
             triangle.two_sided = two_sided;
+        }
+        let solids = shells.bound_solids(&list, positions);
+        for (triangle, &shell) in list.iter_mut().zip(&shells.of_triangle) {
+            triangle.bounds_solid = solids[shell as usize] && !triangle.two_sided;
         }
         ShelledTriangles { list, shells }
     }

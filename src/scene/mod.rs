@@ -108,6 +108,9 @@ pub struct Triangle {
     pub material: MaterialId,
     /// Whether the back reflects and emits as the front does. The back of a one-sided triangle is black but blocks.
     pub two_sided: bool,
+    /// Whether it bounds a solid: it is of a closed shell that looks outward, or of a hollow in one. The shell of a room
+    /// around everything bounds none.
+    pub bounds_solid: bool,
 }
 
 /// The quantities of a triangle that transport needs, with textures averaged over its area.

@@ -126,6 +126,33 @@ impl Shells {
         }
     }
 
+    /// By shell: whether it bounds a solid. Of closed shells those do that look outward, and those that look inward
+    /// within the box of one that looks outward: others are rooms around what is in them.
+    pub(super) fn bound_solids(&self, triangles: &[Triangle], positions: &[Vec3]) -> Vec<bool> {
+        let mut volumes = vec![0.0; self.closed.len()];
+        for (triangle, &shell) in triangles.iter().zip(&self.of_triangle) {
+            let [a, b, c] = triangle
+                .corners
+                .map(|corner| positions[corner as usize].as_dvec3());
+            volumes[shell as usize] += a.dot(b.cross(c));
+        }
+        let boxes = self.boxes(triangles, positions);
+        let looks_outward = |shell: usize| self.closed[shell] && volumes[shell] > 0.0;
+        let outward: Vec<[Vec3; 2]> = (0..self.closed.len())
+            .filter(|&shell| looks_outward(shell))
+            .map(|shell| boxes[shell])
+            .collect();
+        let is_hollow = |shell: usize| {
+            let [min, max] = boxes[shell];
+            let holds = |&[low, high]: &[Vec3; 2]| low.cmple(min).all() && max.cmple(high).all();
+            self.closed[shell] && outward.iter().any(holds)
+        };
+        (0..self.closed.len())
+            .into_par_iter()
+            .map(|shell| looks_outward(shell) || is_hollow(shell))
+            .collect()
+    }
+
     /// The box about each shell, least corner first.
     fn boxes(&self, triangles: &[Triangle], positions: &[Vec3]) -> Vec<[Vec3; 2]> {
         let mut boxes = vec![[Vec3::MAX, Vec3::MIN]; self.closed.len()];
@@ -210,6 +237,7 @@ mod tests {
             corners,
             material: MaterialId(0),
             two_sided: false,
+            bounds_solid: false,
         };
         corners.iter().map(make).collect()
     }
@@ -264,6 +292,41 @@ mod tests {
         let mut doubled = TETRAHEDRON.to_vec();
         doubled.push(TETRAHEDRON[0]);
         assert_eq!(flags(&doubled), [true; 5]);
+    }
+
+    #[test]
+    fn solids_and_their_hollows_are_told_from_rooms() {
+        // Tetrahedra of edge 8, 4 and 1 within each other, and one beside them; some are turned inward.
+        let edges = [8.0, 4.0, 1.0, 1.0];
+        let corner =
+            |edge: f32, at: Vec3| [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|c| at + c * edge);
+        let places = [Vec3::ZERO, Vec3::splat(0.5), Vec3::ONE, Vec3::splat(9.0)];
+        let positions: Vec<Vec3> = edges
+            .into_iter()
+            .zip(places)
+            .flat_map(|(edge, at)| corner(edge, at))
+            .collect();
+        let solids = |inward: [bool; 4]| {
+            let faces: Vec<[u32; 3]> = (0..4)
+                .flat_map(|shell| TETRAHEDRON.map(|face| (shell, face)))
+                .map(|(shell, [a, b, c])| {
+                    let face = if inward[shell as usize] {
+                        [a, c, b]
+                    } else {
+                        [a, b, c]
+                    };
+                    face.map(|vertex| vertex + 4 * shell)
+                })
+                .collect();
+            let list = triangles(&faces);
+            Shells::of(&list).bound_solids(&list, &positions)
+        };
+        let (outward, inward) = (false, true);
+        assert_eq!(solids([outward; 4]), [true; 4]);
+        assert_eq!(
+            solids([inward, outward, inward, inward]),
+            [false, true, true, false]
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{Cancel, Solver, contact::open_places};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
-    hierarchy::Hierarchy,
+    hierarchy::{Element, Hierarchy},
 };
 
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
@@ -39,9 +39,12 @@ const OPEN_RAYS: usize = 100_000;
 /// Rays per cell at least.
 const LEAST_CELL_RAYS: usize = 16;
 
-/// Open cells that are probed one by one. Beyond, those of a group share their rays: a large open scene would wait long
-/// for its first picture, and where all its triangles cross each other, each ray takes long, too.
+/// Open cells that are probed one by one. Beyond, neighbours share their rays: a large open scene would wait long for its
+/// first picture, and where all its triangles cross each other, each ray takes long, too.
 const MOST_PROBED_CELLS: usize = 60_000;
+
+/// Groups of neighbours that share their rays, about.
+const MOST_SHARES: usize = 15_000;
 
 /// Rays per cell at most.
 const MOST_CELL_RAYS: usize = 8192;
@@ -81,20 +84,24 @@ impl Closure {
         deviation: f32::INFINITY,
     };
 
-    /// From what the rays of a cell met, and what those of its neighbourhood did.
-    fn of(met: Met, around: Met) -> Self {
+    /// Within a solid, where nothing is seen.
+    const BURIED: Self = Self {
+        share: 0.0,
+        deviation: 0.0,
+    };
+
+    /// From what the rays of `sharing` cells met, and what those of their neighbourhood did.
+    fn of(met: Met, around: Met, sharing: usize) -> Self {
+        // Of cells that share their rays it is known no better than by a few of their own.
+        let rays = if sharing > 1 {
+            LEAST_CELL_RAYS as f32
+        } else {
+            met.rays
+        };
         Self {
             // One ray more that met what those about it do on average: few rays say little.
             share: (met.hits + around.share()) / (met.rays + 1.0),
-            deviation: met.deviation(met.rays),
-        }
-    }
-
-    /// As [`Self::of`] for cells that share their rays: of each it is known no better than by a few of its own.
-    fn shared(met: Met) -> Self {
-        Self {
-            share: met.share(),
-            deviation: met.deviation(LEAST_CELL_RAYS as f32),
+            deviation: met.deviation(rays),
         }
     }
 
@@ -158,18 +165,18 @@ impl Met {
     }
 }
 
-/// The closures of cells in the order of the tree, from what their rays met. Neighbours all of whose rays met lit sides
+/// The closures of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of whose rays met lit sides
 /// are closed if these are enough to tell; the others are halved for as long as they are several.
-fn pooled(cells: &[Met], around: Met, closures: &mut Vec<Closure>) {
+fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure>) {
     let met = cells.iter().copied().fold(Met::default(), Met::and);
     if met.hits >= met.rays && met.rays >= CLOSED_RAYS {
         closures.resize(closures.len() + cells.len(), Closure::CLOSED);
     } else if let [cell] = cells {
-        closures.push(Closure::of(*cell, around));
+        closures.push(Closure::of(*cell, around, sharing));
     } else {
         let (first, second) = cells.split_at(cells.len() / 2);
-        pooled(first, met, closures);
-        pooled(second, met, closures);
+        pooled(first, met, sharing, closures);
+        pooled(second, met, sharing, closures);
     }
 }
 
@@ -266,11 +273,17 @@ pub(super) fn closures(
         .groups((GROUP_PATCHES as f32 * prober.cost) as u32)
         .into_par_iter()
         .map(|group| cells(hierarchy, group))
+        .filter(|cells| !cells.is_empty())
         .collect();
     let (open, looked) = prober.open_groups(&groups);
     let (found, probed) = prober.probe_groups(&open);
     cancel.proceed()?;
-    let mut closures = vec![Closure::CLOSED; hierarchy.mesh.elements.len()];
+    let elements = &hierarchy.mesh.elements;
+    let untold = |element: &Element| match element.is_buried() {
+        true => Closure::BURIED,
+        false => Closure::CLOSED,
+    };
+    let mut closures: Vec<Closure> = elements.iter().map(untold).collect();
     for (&cell, closure) in open.into_iter().flatten().zip(found.into_iter().flatten()) {
         closures[cell] = closure;
     }
@@ -331,45 +344,48 @@ impl Prober<'_> {
         (open.map(|(group, _)| group.as_slice()).collect(), shot)
     }
 
-    /// The closures of all cells of some groups, group by group, and the rays spent on them.
+    /// The closures of all cells of some groups, group by group, and the rays spent on them. Where there are many cells,
+    /// neighbours share their rays.
     fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<Closure>>, usize) {
-        let area = |cell: usize| self.hierarchy.mesh.elements[cell].area_vector.length();
+        let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
         let cells = || groups.iter().copied().flatten();
-        let (cell_count, whole): (usize, f32) =
-            (cells().count(), cells().map(|&cell| area(cell)).sum());
+        let (cell_count, whole): (usize, f32) = (cells().count(), cells().map(area).sum());
         let is_shared = cell_count > self.budget(MOST_PROBED_CELLS);
-        let sharing = if is_shared { groups.len() } else { cell_count };
-        let even = 1.0 / sharing.max(1) as f32;
-        let count = |share: f32| {
+        let sharing = if is_shared {
+            cell_count.div_ceil(self.budget(MOST_SHARES).max(1))
+        } else {
+            1
+        };
+        let even = sharing as f32 / cell_count.max(1) as f32;
+        let count = |part: &[usize]| {
+            let share = part.iter().map(area).sum::<f32>() / whole;
             let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
             (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
         };
-        let count_of = |cell: usize| count(area(cell) / whole);
-        let shot = if is_shared {
-            groups.len() * count(even)
-        } else {
-            cells().map(|&cell| count_of(cell)).sum()
+        let look = |part: &[usize]| match part {
+            [cell] => self.probe(*cell, count(part) as u32, 0),
+            _ => {
+                let count = count(part);
+                let cell = |ray: usize| part[ray * part.len() / count];
+                let met = (0..count).map(|ray| self.look(cell(ray), ray));
+                met.fold(Met::default(), Met::and)
+            }
         };
         let found = groups.par_iter().map(|group| {
             if self.cancel.is_cancelled() {
-                Vec::new()
-            } else if is_shared {
-                vec![self.probe_together(group, count(even)); group.len()]
-            } else {
-                let met = |&cell: &usize| self.probe(cell, count_of(cell) as u32, 0);
-                let met: Vec<Met> = group.iter().map(met).collect();
-                let mut closures = Vec::with_capacity(met.len());
-                pooled(&met, Met::default(), &mut closures);
-                closures
+                return Vec::new();
             }
+            let met: Vec<Met> = group.chunks(sharing).map(look).collect();
+            let mut closures = Vec::with_capacity(met.len());
+            pooled(&met, Met::default(), sharing, &mut closures);
+            let parts = group.chunks(sharing).zip(closures);
+            parts
+                .flat_map(|(part, closure)| std::iter::repeat_n(closure, part.len()))
+                .collect()
         });
+        let shot = groups.iter().flat_map(|group| group.chunks(sharing));
+        let shot = shot.map(count).sum();
         (found.collect(), shot)
-    }
-
-    /// One closure for all cells of a group.
-    fn probe_together(&self, group: &[usize], count: usize) -> Closure {
-        let met = (0..count).map(|ray| self.look(group[ray * group.len() / count], ray));
-        Closure::shared(met.fold(Met::default(), Met::and))
     }
 
     /// What some cosine-weighted rays from an element meet; `first` numbers them within the element. Of an element that
@@ -400,13 +416,13 @@ impl Prober<'_> {
     }
 }
 
-/// The leaf elements of a cluster, in the order of its patches.
+/// The leaf elements of a cluster that are not buried, in the order of its patches.
 fn cells(hierarchy: &Hierarchy, cluster: usize) -> Vec<usize> {
     let mut cells = Vec::new();
     let mut pending: Vec<usize> = hierarchy.clusters[cluster].patches().rev().collect();
     while let Some(index) = pending.pop() {
         let element = &hierarchy.mesh.elements[index];
-        if element.is_leaf() {
+        if element.is_leaf() && !element.is_buried() {
             cells.push(index);
         }
         pending.extend(element.children().rev());
