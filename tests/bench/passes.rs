@@ -71,7 +71,8 @@ fn building(criterion: &mut Criterion, scene: &Scene) {
 /// Links per second where light is solved anew on those that there are, and where leaves gather for their vertices.
 fn sweeping(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("sweeping");
-    for name in ["room-1022", "cornell"] {
+    group.sample_size(20);
+    for name in ["room-1022", "cornell", "room-42879"] {
         let cancel = Cancel::default();
         let mut solver = Solver::new(room(name), SolveSettings::draft(), None, &cancel).unwrap();
         while !solver.step(&cancel).unwrap().is_final {}
@@ -103,6 +104,18 @@ fn sweeps(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, solver: &mut Sol
             for wished in [&dark, &usual] {
                 black_box(solver.relight(wished, &cancel).unwrap());
             }
+        });
+    });
+    group.throughput(Throughput::Elements(1));
+    let mut dimmed = usual.clone();
+    for appearance in &mut dimmed {
+        appearance.emission *= 0.5;
+    }
+    let mut changes = [&dimmed, &usual].into_iter().cycle();
+    group.bench_function(format!("dim all lights/{name}"), |bencher| {
+        bencher.iter(|| {
+            let wished = changes.next().unwrap_or(&usual);
+            black_box(solver.relight(wished, &cancel).unwrap());
         });
     });
 }
