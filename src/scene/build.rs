@@ -177,6 +177,7 @@ impl SceneBuilder {
             spared: self.spared,
             max_reflectance: options.max_reflectance.clamp(0.0, 1.0),
         };
+        mark_solids(&mut scene, &triangles.shells);
         warn_of_orientation(&mut scene, &triangles.shells, options.sides);
         if !scene.has_emitter() {
             scene.warnings.push(Warning {
@@ -208,6 +209,15 @@ fn no_faces(skipped: &[Skipped]) -> BuildError {
         None => String::new(),
     };
     BuildError::NoFaces { detail }
+}
+
+/// Find the triangles that bound solids.
+fn mark_solids(scene: &mut Scene, shells: &Shells) {
+    let emits = |triangle: usize| scene.surfaces[triangle].emission != Vec3::ZERO;
+    let solids = shells.bound_solids(&scene.triangles, &scene.positions, emits);
+    for (triangle, &shell) in scene.triangles.iter_mut().zip(&shells.of_triangle) {
+        triangle.bounds_solid = solids[shell as usize] && !triangle.two_sided;
+    }
 }
 
 /// Say so when a room's faces look away from its light.
@@ -419,10 +429,6 @@ impl SceneBuilder {
         let flags = sidedness::two_sided(&shells, &list, options.sides);
         for (triangle, two_sided) in list.iter_mut().zip(flags) {
             triangle.two_sided = two_sided;
-        }
-        let solids = shells.bound_solids(&list, positions);
-        for (triangle, &shell) in list.iter_mut().zip(&shells.of_triangle) {
-            triangle.bounds_solid = solids[shell as usize] && !triangle.two_sided;
         }
         ShelledTriangles { list, shells }
     }

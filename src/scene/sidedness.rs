@@ -126,9 +126,15 @@ impl Shells {
         }
     }
 
-    /// By shell: whether it bounds a solid. Of closed shells those do that look outward, and those that look inward
-    /// within the box of one that looks outward: others are rooms around what is in them.
-    pub(super) fn bound_solids(&self, triangles: &[Triangle], positions: &[Vec3]) -> Vec<bool> {
+    /// By shell: whether it bounds a solid. Of closed shells those do that look outward, unless a light of another shell
+    /// lies wholly in their box: they may be rooms that are turned inside out. And those that look inward within the box of one
+    /// that does: others are rooms around what is in them.
+    pub(super) fn bound_solids(
+        &self,
+        triangles: &[Triangle],
+        positions: &[Vec3],
+        emits: impl Fn(usize) -> bool,
+    ) -> Vec<bool> {
         let mut volumes = vec![0.0; self.closed.len()];
         for (triangle, &shell) in triangles.iter().zip(&self.of_triangle) {
             let [a, b, c] = triangle
@@ -137,9 +143,26 @@ impl Shells {
             volumes[shell as usize] += a.dot(b.cross(c));
         }
         let boxes = self.boxes(triangles, positions);
-        let looks_outward = |shell: usize| self.closed[shell] && volumes[shell] > 0.0;
+        let emitters: Vec<usize> = (0..triangles.len()).filter(|&at| emits(at)).collect();
+        let step = emitters.len().div_ceil(MAX_INNER_LIGHTS).max(1);
+        let lights: Vec<usize> = emitters.into_iter().step_by(step).collect();
+        let is_lit_within = |shell: usize| {
+            let [min, max] = boxes[shell];
+            let is_within = |at: Vec3| at.cmpge(min).all() && at.cmple(max).all();
+            lights.iter().any(|&light| {
+                let corners = triangles[light].corners;
+                self.of_triangle[light] as usize != shell
+                    && corners
+                        .iter()
+                        .all(|&corner| is_within(positions[corner as usize]))
+            })
+        };
+        let is_solid: Vec<bool> = (0..self.closed.len())
+            .into_par_iter()
+            .map(|shell| self.closed[shell] && volumes[shell] > 0.0 && !is_lit_within(shell))
+            .collect();
         let outward: Vec<[Vec3; 2]> = (0..self.closed.len())
-            .filter(|&shell| looks_outward(shell))
+            .filter(|&shell| is_solid[shell])
             .map(|shell| boxes[shell])
             .collect();
         let is_hollow = |shell: usize| {
@@ -149,7 +172,7 @@ impl Shells {
         };
         (0..self.closed.len())
             .into_par_iter()
-            .map(|shell| looks_outward(shell) || is_hollow(shell))
+            .map(|shell| is_solid[shell] || volumes[shell] < 0.0 && is_hollow(shell))
             .collect()
     }
 
@@ -165,6 +188,9 @@ impl Shells {
         boxes
     }
 }
+
+/// Lights that are looked for within shells; each is compared with the box of every shell.
+const MAX_INNER_LIGHTS: usize = 256;
 
 /// Lights that are looked at; each costs a pass over the triangles.
 const MAX_LIGHTS: usize = 16;
@@ -306,7 +332,7 @@ mod tests {
             .zip(places)
             .flat_map(|(edge, at)| corner(edge, at))
             .collect();
-        let solids = |inward: [bool; 4]| {
+        let solids = |inward: [bool; 4], lit: bool| {
             let faces: Vec<[u32; 3]> = (0..4)
                 .flat_map(|shell| TETRAHEDRON.map(|face| (shell, face)))
                 .map(|(shell, [a, b, c])| {
@@ -319,13 +345,20 @@ mod tests {
                 })
                 .collect();
             let list = triangles(&faces);
-            Shells::of(&list).bound_solids(&list, &positions)
+            let shells = Shells::of(&list);
+            let emits = |triangle: usize| lit && triangle / 4 == 2;
+            shells.bound_solids(&list, &positions, emits)
         };
         let (outward, inward) = (false, true);
-        assert_eq!(solids([outward; 4]), [true; 4]);
+        assert_eq!(solids([outward; 4], false), [true; 4]);
         assert_eq!(
-            solids([inward, outward, inward, inward]),
+            solids([inward, outward, inward, inward], false),
             [false, true, true, false]
+        );
+        assert_eq!(
+            solids([outward; 4], true),
+            [false, false, true, true],
+            "around a light there is a room"
         );
     }
 
