@@ -44,7 +44,7 @@ fn cuboid(builder: &mut SceneBuilder, low: DVec3, high: DVec3, inward: bool, pai
     }
 }
 
-/// A furnace with a box that reaches into its floor, from 1 below to 1 above in the file's units.
+/// A furnace with a box in it, whose floor runs from -1 to 1 both ways at height 0; places as in the file.
 fn furnished(low: DVec3, high: DVec3) -> Snapshot {
     let mut builder = SceneBuilder::default();
     let paint = builder.push_material(Material::plain(

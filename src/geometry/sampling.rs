@@ -87,8 +87,8 @@ pub struct SphericalTriangle {
     first_angle: [f32; 2],
     /// The angle at the first corner.
     angle: f32,
-    /// Solid angle, steradian; above 0.
-    pub solid_angle: f32,
+    /// Steradian, above 0.
+    solid_angle: f32,
 }
 
 impl SphericalTriangle {

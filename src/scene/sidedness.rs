@@ -135,26 +135,16 @@ impl Shells {
         positions: &[Vec3],
         emits: impl Fn(usize) -> bool,
     ) -> Vec<bool> {
-        let mut volumes = vec![0.0; self.closed.len()];
-        for (triangle, &shell) in triangles.iter().zip(&self.of_triangle) {
-            let [a, b, c] = triangle
-                .corners
-                .map(|corner| positions[corner as usize].as_dvec3());
-            volumes[shell as usize] += a.dot(b.cross(c));
-        }
+        let volumes = self.volumes(triangles, positions);
         let boxes = self.boxes(triangles, positions);
-        let emitters: Vec<usize> = (0..triangles.len()).filter(|&at| emits(at)).collect();
-        let step = emitters.len().div_ceil(MAX_INNER_LIGHTS).max(1);
-        let lights: Vec<usize> = emitters.into_iter().step_by(step).collect();
+        let lights = some_emitters(triangles.len(), emits, MAX_INNER_LIGHTS);
         let is_lit_within = |shell: usize| {
-            let [min, max] = boxes[shell];
-            let is_within = |at: Vec3| at.cmpge(min).all() && at.cmple(max).all();
             lights.iter().any(|&light| {
                 let corners = triangles[light].corners;
                 self.of_triangle[light] as usize != shell
                     && corners
                         .iter()
-                        .all(|&corner| is_within(positions[corner as usize]))
+                        .all(|&corner| holds(boxes[shell], positions[corner as usize]))
             })
         };
         let is_solid: Vec<bool> = (0..self.closed.len())
@@ -167,13 +157,25 @@ impl Shells {
             .collect();
         let is_hollow = |shell: usize| {
             let [min, max] = boxes[shell];
-            let holds = |&[low, high]: &[Vec3; 2]| low.cmple(min).all() && max.cmple(high).all();
-            self.closed[shell] && outward.iter().any(holds)
+            let is_around = |&outer: &[Vec3; 2]| holds(outer, min) && holds(outer, max);
+            self.closed[shell] && outward.iter().any(is_around)
         };
         (0..self.closed.len())
             .into_par_iter()
             .map(|shell| is_solid[shell] || volumes[shell] < 0.0 && is_hollow(shell))
             .collect()
+    }
+
+    /// Six times the volume in each closed shell, negative where it looks inward; of others it says nothing.
+    fn volumes(&self, triangles: &[Triangle], positions: &[Vec3]) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.closed.len()];
+        for (triangle, &shell) in triangles.iter().zip(&self.of_triangle) {
+            let [a, b, c] = triangle
+                .corners
+                .map(|corner| positions[corner as usize].as_dvec3());
+            volumes[shell as usize] += a.dot(b.cross(c));
+        }
+        volumes
     }
 
     /// The box about each shell, least corner first.
@@ -187,6 +189,18 @@ impl Shells {
         }
         boxes
     }
+}
+
+/// Whether a point lies in a box, least corner first.
+fn holds([min, max]: [Vec3; 2], point: Vec3) -> bool {
+    (point.cmpge(min) & point.cmple(max)).all()
+}
+
+/// Triangles that emit, at most so many spread over all of them.
+fn some_emitters(count: usize, emits: impl Fn(usize) -> bool, most: usize) -> Vec<usize> {
+    let emitters: Vec<usize> = (0..count).filter(|&triangle| emits(triangle)).collect();
+    let step = emitters.len().div_ceil(most).max(1);
+    emitters.into_iter().step_by(step).collect()
 }
 
 /// Lights that are looked for within shells; each is compared with the box of every shell.
@@ -203,21 +217,12 @@ pub(super) fn inverted_shell_count(
     emits: impl Fn(usize) -> bool,
     shells: &Shells,
 ) -> usize {
-    let emitters = (0..triangles.len()).filter(|&triangle| emits(triangle));
-    let emitters = emitters.collect::<Vec<_>>();
+    let lights = some_emitters(triangles.len(), emits, MAX_LIGHTS);
     let corners = |triangle: usize| triangles[triangle].corners.map(|i| positions[i as usize]);
-    if shells.closed == [true] && !emitters.is_empty() {
-        let volume: f64 = (0..triangles.len())
-            .map(|triangle| {
-                let [a, b, c] = corners(triangle).map(Vec3::as_dvec3);
-                a.dot(b.cross(c))
-            })
-            .sum();
-        return usize::from(volume > 0.0);
+    if shells.closed == [true] && !lights.is_empty() {
+        return usize::from(shells.volumes(triangles, positions)[0] > 0.0);
     }
     let boxes = shells.boxes(triangles, positions);
-    let step = emitters.len().div_ceil(MAX_LIGHTS).max(1);
-    let lights: Vec<usize> = emitters.into_iter().step_by(step).collect();
     let around = |light: usize| {
         let [a, b, c] = corners(light);
         let point = (a + b + c) / 3.0;
@@ -225,7 +230,7 @@ pub(super) fn inverted_shell_count(
         let mut may_hold: Vec<bool> = boxes
             .iter()
             .zip(&shells.closed)
-            .map(|(&[min, max], &closed)| closed && (point.cmpge(min) & point.cmple(max)).all())
+            .map(|(&extent, &closed)| closed && holds(extent, point))
             .collect();
         may_hold[shells.of_triangle[light] as usize] = false;
         // The solid angle under which a closed shell is seen from inside is the full sphere, signed by its winding.

@@ -165,8 +165,8 @@ impl Met {
     }
 }
 
-/// The closures of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of whose rays met lit sides
-/// are closed if these are enough to tell; the others are halved for as long as they are several.
+/// The closures of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of
+/// whose rays met lit sides are closed if these are enough to tell; the others are halved for as long as they are several.
 fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure>) {
     let met = cells.iter().copied().fold(Met::default(), Met::and);
     if met.hits >= met.rays && met.rays >= CLOSED_RAYS {

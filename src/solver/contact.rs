@@ -169,6 +169,12 @@ pub(super) fn open_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
     places.filter(is_open).map(|(_, point)| point).collect()
 }
 
+/// A unit direction off a normal, by the tangents of its angles with it along two axes of the plane.
+fn tilted(normal: Vec3, [x, y]: [f32; 2]) -> Vec3 {
+    let tangent = normal.any_orthonormal_vector();
+    (normal + tangent * x + normal.cross(tangent) * y).normalize_or_zero()
+}
+
 /// Whether a point of an element lies within a solid of the scene. A ray may slip through an edge: so if one says that it
 /// does, two of three must. And the rays shot.
 fn is_in_solid(
@@ -179,10 +185,8 @@ fn is_in_solid(
     point: Vec3,
 ) -> (bool, u64) {
     let patch = hierarchy.patch_of(element);
-    let tangent = patch.normal.any_orthonormal_vector();
-    let other = patch.normal.cross(tangent);
-    let is_left = |[x, y]: [f32; 2]| {
-        let direction = (patch.normal + tangent * x + other * y).normalize_or_zero();
+    let is_left = |tangents| {
+        let direction = tilted(patch.normal, tangents);
         let bounds = |triangle: TriangleId| scene.triangles[triangle.index()].bounds_solid;
         rays.solids_left(point, direction, Some(patch.triangle), bounds) > 0
     };
@@ -197,14 +201,12 @@ fn is_in_solid(
 /// Whether a point of an element lies beyond a wall: backs are met from there and nothing that is lit. And the rays shot.
 fn is_beyond(rays: &RayTree, hierarchy: &Hierarchy, element: usize, point: Vec3) -> (bool, u64) {
     let patch = hierarchy.patch_of(element);
-    let tangent = patch.normal.any_orthonormal_vector();
-    let other = patch.normal.cross(tangent);
     let (mut backs, mut shot) = (0, 0);
-    for [x, y] in PROBES {
+    for tangents in PROBES {
         if shot == FIRST_PROBES && backs == 0 {
             break;
         }
-        let direction = (patch.normal + tangent * x + other * y).normalize_or_zero();
+        let direction = tilted(patch.normal, tangents);
         shot += 1;
         match rays.closest(point, direction, Some(patch.triangle)) {
             Some(hit) if hierarchy.patch_met(hit.triangle, direction).is_some() => {

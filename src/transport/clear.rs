@@ -92,8 +92,8 @@ impl InView {
     }
 }
 
-/// The centroid of a triangle, and three points on the way to its corners. Weighed alike they are nearly a rule of degree 2 whose
-/// points lie inside.
+/// The centroid of a triangle, and three points on the way to its corners. Weighed alike they are nearly a rule of degree
+/// 2 whose points lie inside.
 pub(super) fn inner_points(corners: [Vec3; 3]) -> Vectors4 {
     let middle = centroid(corners);
     let [a, b, c] = corners.map(|corner| middle.lerp(corner, TOWARDS_CORNER));
