@@ -208,7 +208,12 @@ impl Mesh {
 
     /// The leaves in order.
     pub fn leaves(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.elements.len()).filter(|&index| self.elements[index].is_leaf())
+        self.leaves_among(0..self.elements.len())
+    }
+
+    /// The leaves among some elements, in order.
+    pub fn leaves_among(&self, elements: Range<usize>) -> impl Iterator<Item = usize> + '_ {
+        elements.filter(|&index| self.elements[index].is_leaf())
     }
 
     /// Area of the leaves about each vertex.

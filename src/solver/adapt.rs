@@ -53,6 +53,8 @@ pub(super) struct DirectField {
     pub(super) vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
     pub(super) centres: Vec<Option<DirectLight>>,
+    /// Elements whose corners are all sampled: those that come after are new.
+    pub(super) covered: usize,
     /// Irradiance to show by vertex; shorter than the vertices where some are new.
     shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
@@ -131,6 +133,7 @@ impl DirectField {
             lights,
             vertices: Vec::new(),
             centres: Vec::new(),
+            covered: 0,
             shown: Vec::new(),
             is_full: false,
         }
@@ -138,7 +141,7 @@ impl DirectField {
 
     /// Nothing is known any more: what was, came of too few rays.
     pub(super) fn forget(&mut self) {
-        (self.vertices, self.centres) = (Vec::new(), Vec::new());
+        (self.vertices, self.centres, self.covered) = (Vec::new(), Vec::new(), 0);
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
@@ -217,10 +220,13 @@ impl DirectField {
     ) -> Option<u64> {
         let mut ray_count = 0;
         self.is_full = false;
-        for _ in 0..MOST_ROUNDS {
+        for round in 0..=MOST_ROUNDS {
             ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
             ray_count += self.settle(rays, hierarchy, limits, mean, cancel)?;
+            if round == MOST_ROUNDS {
+                break;
+            }
             ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, limits, mean);
             self.is_full = !hierarchy.mesh.fits(&wanted, limits.most_elements);
@@ -228,9 +234,6 @@ impl DirectField {
                 break;
             }
         }
-        ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
-        let mean = self.mean(hierarchy);
-        ray_count += self.settle(rays, hierarchy, limits, mean, cancel)?;
         Some(ray_count)
     }
 
@@ -278,9 +281,9 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         self.centres.resize(hierarchy.mesh.elements.len(), None);
-        let unknown: Vec<usize> = hierarchy
-            .mesh
-            .held_leaves()
+        let leaves: Vec<usize> = hierarchy.mesh.held_leaves().collect();
+        let unknown: Vec<usize> = leaves
+            .into_par_iter()
             .filter(|&leaf| {
                 hierarchy.mesh.elements[leaf].is_open()
                     && self.centres[leaf].is_none()

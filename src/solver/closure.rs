@@ -12,6 +12,13 @@ use crate::{
     hierarchy::{Element, Hierarchy},
 };
 
+/// Share of all rays that is shot for the first steps, whose links are coarse. Larger, and the first picture comes later;
+/// smaller, and open places take light that is not theirs until the other rays are shot.
+const ROUGH_SHARE: f32 = 0.125;
+
+/// Steps with a fineness of this or more make do with [`ROUGH_SHARE`]. Smaller, and all rays are shot earlier.
+const ROUGH_FINENESS: f32 = 4.0;
+
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
 const GROUP_PATCHES: u32 = 64;
 
@@ -182,12 +189,17 @@ fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure
 
 /// Closures of the cells of a mesh: of its leaves as they were before light was known.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Closures(Vec<Closure>);
+pub(super) struct Closures {
+    /// By element, as many as there were then.
+    of: Vec<Closure>,
+    /// Whether only a share of the rays was shot.
+    are_rough: bool,
+}
 
 impl Closures {
     /// The cell that an element lies in, or is.
     pub(super) fn cell(&self, hierarchy: &Hierarchy, mut element: usize) -> usize {
-        while element >= self.0.len() {
+        while element >= self.of.len() {
             element = hierarchy.mesh.elements[element].parent as usize;
         }
         element
@@ -195,22 +207,25 @@ impl Closures {
 
     /// The same closure of all patches.
     pub(super) fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
-        Self(vec![closure; hierarchy.patches.len()])
+        Self {
+            of: vec![closure; hierarchy.patches.len()],
+            are_rough: false,
+        }
     }
 
-    /// Whether nothing was probed yet.
-    pub(super) fn is_empty(&self) -> bool {
-        self.0.is_empty()
+    /// Whether they are good enough for links of a fineness.
+    pub(super) fn serve(&self, fineness: f32) -> bool {
+        !self.of.is_empty() && (!self.are_rough || fineness >= ROUGH_FINENESS)
     }
 
     /// The closure of a cell.
     pub(super) fn of(&self, cell: usize) -> Closure {
-        self.0[cell]
+        self.of[cell]
     }
 
     /// Bytes held.
     pub(super) fn memory_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
+        size_of_val(self.of.as_slice())
     }
 }
 
@@ -219,7 +234,7 @@ impl Solver {
     /// `bounds_rows`.
     pub(super) fn scale_to_closure(&self, irradiance: &mut [Vec4], bounds_rows: bool) {
         let elements = &self.hierarchy.mesh.elements;
-        let cell_count = self.closures.0.len();
+        let cell_count = self.closures.of.len();
         let cell = |index| self.closures.cell(&self.hierarchy, index);
         // Area and sum of form factors times area, by cell.
         let part = |index: usize| {
@@ -255,39 +270,47 @@ impl Solver {
     }
 }
 
-/// Closures of all cells, which are the leaves of the mesh as it is now, and the rays shot; `None` when cancelled.
+/// Closures of all cells for links of a fineness, and the rays shot; `None` when cancelled. The cells are those of what
+/// is `known`, or, where nothing is, the leaves of the mesh as it is now.
 pub(super) fn closures(
     hierarchy: &Hierarchy,
     rays: &RayTree,
+    (known, fineness): (&Closures, f32),
     seed: u64,
     cancel: &Cancel,
 ) -> Option<(Closures, u64)> {
+    let are_rough = fineness >= ROUGH_FINENESS;
+    let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
     let prober = Prober {
         hierarchy,
         rays,
         seed,
         cancel,
-        cost: (rays.crossings() / USUAL_CROSSINGS).max(1.0),
+        share: if are_rough { ROUGH_SHARE } else { 1.0 } / cost,
+    };
+    let count = match known.of.len() {
+        0 => hierarchy.mesh.elements.len(),
+        count => count,
     };
     let groups: Vec<Vec<usize>> = hierarchy
-        .groups((GROUP_PATCHES as f32 * prober.cost) as u32)
+        .groups((GROUP_PATCHES as f32 * cost) as u32)
         .into_par_iter()
-        .map(|group| cells(hierarchy, group))
+        .map(|group| cells(hierarchy, group, count))
         .filter(|cells| !cells.is_empty())
         .collect();
     let (open, looked) = prober.open_groups(&groups);
     let (found, probed) = prober.probe_groups(&open);
     cancel.proceed()?;
-    let elements = &hierarchy.mesh.elements;
+    let elements = &hierarchy.mesh.elements[..count];
     let untold = |element: &Element| match element.is_buried() {
         true => Closure::BURIED,
         false => Closure::CLOSED,
     };
-    let mut closures: Vec<Closure> = elements.iter().map(untold).collect();
+    let mut of: Vec<Closure> = elements.iter().map(untold).collect();
     for (&cell, closure) in open.into_iter().flatten().zip(found.into_iter().flatten()) {
-        closures[cell] = closure;
+        of[cell] = closure;
     }
-    Some((Closures(closures), (looked + probed) as u64))
+    Some((Closures { of, are_rough }, (looked + probed) as u64))
 }
 
 /// Shoots the rays of closures. When cancelled, what it finds is incomplete.
@@ -296,14 +319,14 @@ struct Prober<'a> {
     rays: &'a RayTree,
     seed: u64,
     cancel: &'a Cancel,
-    /// What a ray costs, in usual rays; at least 1.
-    cost: f32,
+    /// Rays that are shot, of all that would be if each cost what usual ones do.
+    share: f32,
 }
 
 impl Prober<'_> {
-    /// As many rays as cost what so many usual ones do.
+    /// What is shot of so many rays.
     fn budget(&self, rays: usize) -> usize {
-        (rays as f32 / self.cost) as usize
+        (rays as f32 * self.share) as usize
     }
 
     /// What one ray from a cell meets.
@@ -416,16 +439,19 @@ impl Prober<'_> {
     }
 }
 
-/// The leaf elements of a cluster that are not buried, in the order of its patches.
-fn cells(hierarchy: &Hierarchy, cluster: usize) -> Vec<usize> {
+/// The elements of a cluster that are not buried and were leaves when there were `count` elements, in the order of its
+/// patches.
+fn cells(hierarchy: &Hierarchy, cluster: usize, count: usize) -> Vec<usize> {
     let mut cells = Vec::new();
     let mut pending: Vec<usize> = hierarchy.clusters[cluster].patches().rev().collect();
     while let Some(index) = pending.pop() {
         let element = &hierarchy.mesh.elements[index];
-        if element.is_leaf() && !element.is_buried() {
+        let is_cell = element.is_leaf() || element.children().start >= count;
+        if !is_cell {
+            pending.extend(element.children().rev());
+        } else if !element.is_buried() {
             cells.push(index);
         }
-        pending.extend(element.children().rev());
     }
     cells
 }

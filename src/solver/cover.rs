@@ -1,6 +1,8 @@
 //! Where shadow rays are shot: first few from each vertex, more where neighbours disagree, and as many more as noise calls
 //! for.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use super::{
@@ -43,14 +45,19 @@ impl DirectField {
         seed: u64,
         cancel: &Cancel,
     ) -> Option<u64> {
+        let elements = self.covered..hierarchy.mesh.elements.len();
+        if elements.is_empty() {
+            return Some(0);
+        }
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
-        let receivers = self.receivers(hierarchy, |_, light| light.is_none());
+        // A vertex without light is new, and so are all elements about it.
+        let receivers = self.receivers(hierarchy, elements.clone(), |_, light| light.is_none());
         for &(vertex, _) in &receivers {
             self.vertices[vertex as usize] = Some(DirectLight::default());
         }
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, |_| probing, seed, cancel);
-        let disputed = self.disputed(hierarchy);
+        let disputed = self.disputed(hierarchy, elements.clone());
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
@@ -63,6 +70,7 @@ impl DirectField {
             }
             return None;
         }
+        self.covered = elements.end;
         Some(self.shot(&receivers))
     }
 
@@ -84,7 +92,8 @@ impl DirectField {
         if !known.any(|(vertex, light)| is_noisy(vertex, *light)) {
             return Some(0);
         }
-        let receivers = self.receivers(hierarchy, is_noisy);
+        let elements = 0..hierarchy.mesh.elements.len();
+        let receivers = self.receivers(hierarchy, elements, is_noisy);
         let before = self.shot(&receivers);
         let weights: Vec<f32> = receivers
             .iter()
@@ -172,10 +181,10 @@ impl DirectField {
         self.learn(receivers, known);
     }
 
-    /// Which vertices share an element with one whose rays had another outcome.
-    fn disputed(&self, hierarchy: &Hierarchy) -> Vec<bool> {
+    /// Which vertices share one of these elements with one whose rays had another outcome.
+    fn disputed(&self, hierarchy: &Hierarchy, elements: Range<usize>) -> Vec<bool> {
         let mut disputed = vec![false; self.vertices.len()];
-        for leaf in hierarchy.mesh.leaves() {
+        for leaf in hierarchy.mesh.leaves_among(elements) {
             let corners = hierarchy.mesh.elements[leaf]
                 .vertices
                 .map(|vertex| vertex as usize);
@@ -189,16 +198,17 @@ impl DirectField {
         disputed
     }
 
-    /// Where to sample each corner of a leaf that is wanted: a little inside the leaf whose normal is nearest to the mean
+    /// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal is nearest to the mean
     /// normal about the vertex, of those that are not within a solid there.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
+        elements: Range<usize>,
         is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,
     ) -> Vec<(u32, Receiver)> {
         let mesh = &hierarchy.mesh;
         let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
-        for leaf in mesh.leaves() {
+        for leaf in mesh.leaves_among(elements.clone()) {
             for &vertex in &mesh.elements[leaf].vertices {
                 normals[vertex as usize] += mesh.elements[leaf].area_vector;
             }
@@ -206,7 +216,10 @@ impl DirectField {
         /// How fit a leaf is, and which one it is.
         type Choice = ((bool, f32), u32);
         let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
-        for leaf in mesh.held_leaves() {
+        for leaf in mesh
+            .leaves_among(elements)
+            .filter(|&leaf| mesh.is_held(leaf))
+        {
             let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
             for (side, vertex) in element.vertices.into_iter().enumerate() {
                 let vertex = vertex as usize;

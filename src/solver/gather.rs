@@ -16,11 +16,53 @@ use crate::{
 /// Nodes that one task gathers for.
 const TASK_NODES: usize = 256;
 
+/// Clusters with links that one task gathers for.
+const TASK_HOLDERS: usize = 32;
+
+/// The clusters that have links of their own, for all sweeps over these links: most have none, and what is pushed passes
+/// them by.
+pub(super) struct Holders {
+    /// The clusters, parents before children.
+    clusters: Vec<u32>,
+    /// For each, the place in this list of the nearest one above it, or [`Self::NONE`].
+    above: Vec<u32>,
+    /// By patch, the place of the nearest one that it belongs to, or [`Self::NONE`].
+    of_patch: Vec<u32>,
+}
+
+impl Holders {
+    const NONE: u32 = u32::MAX;
+
+    /// Those of some links.
+    pub(super) fn new(hierarchy: &Hierarchy, links: &LinkStore) -> Self {
+        let mut holders = Self {
+            clusters: Vec::new(),
+            above: Vec::new(),
+            of_patch: vec![Self::NONE; hierarchy.patches.len()],
+        };
+        let mut nearest = vec![Self::NONE; hierarchy.clusters.len()];
+        for (index, cluster) in hierarchy.clusters.iter().enumerate() {
+            let above = nearest.get(cluster.parent as usize).copied();
+            nearest[index] = above.unwrap_or(Self::NONE);
+            if !links.of(NodeId(index as u32)).is_empty() {
+                holders.above.push(nearest[index]);
+                nearest[index] = holders.clusters.len() as u32;
+                holders.clusters.push(index as u32);
+            }
+            if cluster.is_leaf() {
+                holders.of_patch[cluster.patches()].fill(nearest[index]);
+            }
+        }
+        holders
+    }
+}
+
 /// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples. `None` when
 /// cancelled.
 pub(super) fn gather(
     kernel: Kernel<'_>,
     links: &LinkStore,
+    holders: &Holders,
     push: Push,
     cancel: &Cancel,
 ) -> Option<Vec<Vec4>> {
@@ -28,7 +70,7 @@ pub(super) fn gather(
     let mut irradiance = own_irradiance(kernel, links, cancel);
     cancel.proceed()?;
     let from_clusters = match push {
-        Push::Combined => push_moments(kernel, links, cancel)?,
+        Push::Combined => push_moments(kernel, links, holders, cancel)?,
         Push::AtOnce => push_at_once(kernel, links, cancel),
     };
     cancel.proceed()?;
@@ -78,37 +120,42 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
 
 /// What patches receive from the links of clusters, through the moments of all clusters above them. `None` when
 /// cancelled.
-fn push_moments(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Option<Vec<Vec4>> {
+fn push_moments(
+    kernel: Kernel<'_>,
+    links: &LinkStore,
+    holders: &Holders,
+    cancel: &Cancel,
+) -> Option<Vec<Vec4>> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
-    let mut incident: Vec<Moments<Vec4>> = (0..hierarchy.clusters.len())
-        .into_par_iter()
-        .with_min_len(TASK_NODES)
-        .map(|index| {
+    let mut incident: Vec<Moments<Vec4>> = holders
+        .clusters
+        .par_iter()
+        .with_min_len(TASK_HOLDERS)
+        .map(|&index| {
             if cancel.is_cancelled() {
                 return Moments::default();
             }
-            cluster_incident(kernel, links, index)
+            cluster_incident(kernel, links, index as usize)
         })
         .collect();
     cancel.proceed()?;
-    merge_down(hierarchy, &mut incident);
-    let mut leaf_of = vec![0u32; hierarchy.patches.len()];
-    for (index, cluster) in hierarchy
-        .clusters
-        .iter()
-        .enumerate()
-        .filter(|(_, cluster)| cluster.is_leaf())
-    {
-        leaf_of[cluster.patches()].fill(index as u32);
+    // Those above come first, with all that is above them.
+    for (place, &above) in holders.above.iter().enumerate() {
+        if above != Holders::NONE {
+            let above = incident[above as usize];
+            incident[place].merge(&above);
+        }
     }
-    cancel.proceed()?;
     let held = hierarchy.held();
     let project = |patch: usize| {
-        if !held.contains(&patch) {
-            return Vec4::ZERO;
+        let holder = incident.get(holders.of_patch[patch] as usize);
+        match holder {
+            Some(holder) if held.contains(&patch) => {
+                holder.project(hierarchy.patches[patch].normal, reading)
+            }
+            _ => Vec4::ZERO,
         }
-        incident[leaf_of[patch] as usize].project(hierarchy.patches[patch].normal, reading)
     };
     let pushed = (0..hierarchy.patches.len())
         .into_par_iter()
@@ -116,35 +163,6 @@ fn push_moments(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Optio
         .map(project)
         .collect();
     Some(pushed)
-}
-
-/// Add to each cluster what those above it have. Parents come before their children.
-fn merge_down(hierarchy: &Hierarchy, incident: &mut [Moments<Vec4>]) {
-    let cover = &hierarchy.subtrees;
-    let parent = |index: usize| hierarchy.clusters[index].parent as usize;
-    for &index in cover.top.iter().skip(1) {
-        let above = incident[parent(index)];
-        incident[index].merge(&above);
-    }
-    let roots: Vec<Moments<Vec4>> = cover
-        .runs
-        .iter()
-        .map(|run| incident[parent(run.start)])
-        .collect();
-    let parts = cover.parts(incident);
-    parts
-        .into_par_iter()
-        .zip(&cover.runs)
-        .zip(&roots)
-        .for_each(|((part, run), root)| {
-            for index in run.clone() {
-                let above = match parent(index).checked_sub(run.start) {
-                    Some(local) => part[local],
-                    None => *root,
-                };
-                part[index - run.start].merge(&above);
-            }
-        });
 }
 
 /// The vector irradiances of all links of one cluster.

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use super::{
     Cancel, Solver, StepReport,
     anderson::{Anderson, ordered_sum},
-    gather,
+    gather::{self, Holders},
 };
 
 /// Iterates that acceleration remembers: 24 bytes each for every element. See above; below 3 white rooms take many
@@ -115,13 +115,14 @@ impl Solver {
         cancel: &Cancel,
     ) -> Option<Ending> {
         let weights = self.leaf_shares();
+        let holders = Holders::new(&self.hierarchy, &self.links);
         let direct = self.direct_of_leaves();
         let ceiling = CEILING_SLACK * self.most_power();
         let mut acceleration = Anderson::new(DEPTH);
         let mut growing = 0;
         for _ in 0..MOST_SWEEPS {
             cancel.proceed()?;
-            let sweep = self.sweep(&direct, bounds_rows, cancel)?;
+            let sweep = self.sweep(&holders, &direct, bounds_rows, cancel)?;
             report.sweeps += 1;
             cancel.proceed()?;
             let next = acceleration.next(&weights, &self.linked, &sweep.image);
@@ -156,8 +157,15 @@ impl Solver {
     }
 
     /// Gather once, and measure what came of it beside the direct light; `None` when cancelled.
-    fn sweep(&self, direct: &[Vec4], bounds_rows: bool, cancel: &Cancel) -> Option<Sweep> {
-        let mut image = gather::gather(self.kernel(), &self.links, self.settings.push, cancel)?;
+    fn sweep(
+        &self,
+        holders: &Holders,
+        direct: &[Vec4],
+        bounds_rows: bool,
+        cancel: &Cancel,
+    ) -> Option<Sweep> {
+        let push = self.settings.push;
+        let mut image = gather::gather(self.kernel(), &self.links, holders, push, cancel)?;
         let returned = |image: &[Vec4]| {
             self.leaf_sum(|leaf| {
                 self.hierarchy.patch_of(leaf).reflectance.extend(0.0) * (image[leaf] + direct[leaf])

@@ -214,7 +214,8 @@ fn shoot_known(
         vertices: vec![None; field.vertices.len()],
         centres: vec![None; field.centres.len()],
     };
-    let corners = field.receivers(hierarchy, |_, light| light.is_some());
+    let elements = 0..hierarchy.mesh.elements.len();
+    let corners = field.receivers(hierarchy, elements, |_, light| light.is_some());
     let corners = corners
         .into_iter()
         .map(|(vertex, receiver)| (vertex as usize, receiver))

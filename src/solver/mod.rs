@@ -216,9 +216,9 @@ impl Solver {
         Some(())
     }
 
-    /// Probe closures, on the first mesh.
-    fn probe_closures(&mut self, cancel: &Cancel) -> Option<()> {
-        if !self.closures.is_empty() {
+    /// Probe closures, of the first mesh.
+    fn probe_closures(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
+        if self.closures.serve(fineness) {
             return Some(());
         }
         if let Some(closures) = self.closures_in_clear() {
@@ -230,8 +230,8 @@ impl Solver {
             true => Arc::new(RayTree::new(&self.scene)),
             false => self.rays.clone(),
         };
-        let seed = self.settings.seed;
-        let (closures, shot) = closure::closures(&self.hierarchy, &rays, seed, cancel)?;
+        let (known, seed) = ((&self.closures, fineness), self.settings.seed);
+        let (closures, shot) = closure::closures(&self.hierarchy, &rays, known, seed, cancel)?;
         self.closures = closures;
         self.ray_count += shot;
         Some(())
@@ -249,7 +249,7 @@ impl Solver {
         report.epsilon = self.settings.epsilon * fineness;
         self.is_full = false;
         self.relighting.begin_step();
-        self.probe_closures(cancel)?;
+        self.probe_closures(fineness, cancel)?;
         self.adapt_to_linked(fineness);
         self.adapt_to_direct(fineness, cancel)?;
         cancel.proceed()?;
