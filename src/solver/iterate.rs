@@ -77,12 +77,17 @@ enum Ending {
 }
 
 impl Solver {
-    /// Gather, push and pull until the light settles. Where it grows instead, rows are bounded, and light gets through as
+    /// Gather, push and pull until the light settles to a tolerance, as that of the settings is. Where it grows instead, rows are bounded, and light gets through as
     /// area does; where even that does not help, the light from before stays.
-    pub(super) fn iterate(&mut self, report: &mut StepReport, cancel: &Cancel) -> Option<()> {
+    pub(super) fn iterate(
+        &mut self,
+        report: &mut StepReport,
+        tolerance: f32,
+        cancel: &Cancel,
+    ) -> Option<()> {
         let before = self.linked.clone();
         for bounds_rows in [false, true] {
-            match self.settle(report, bounds_rows, cancel)? {
+            match self.settle(report, tolerance, bounds_rows, cancel)? {
                 Ending::Settled => return Some(()),
                 Ending::Unsettled => {
                     report.notes.push(format!(
@@ -111,6 +116,7 @@ impl Solver {
     fn settle(
         &mut self,
         report: &mut StepReport,
+        tolerance: f32,
         bounds_rows: bool,
         cancel: &Cancel,
     ) -> Option<Ending> {
@@ -144,8 +150,7 @@ impl Solver {
             if (growing >= GROWING_SWEEPS && !bounds_rows) || !is_bounded {
                 return Some(Ending::Growing);
             }
-            let tolerance = f64::from(self.settings.tolerance);
-            let is_settled = residual <= ROUNDING || residual.max(error) <= tolerance;
+            let is_settled = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
             self.linked = if is_settled { sweep.image } else { next };
             self.pull();
             if is_settled {

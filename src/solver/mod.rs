@@ -258,7 +258,9 @@ impl Solver {
         self.estimate_mean();
         report.epsilon = self.refine(report.epsilon, cancel)?;
         self.probe_contacts(cancel)?;
-        self.iterate(&mut report, cancel)?;
+        // Links that are coarse err by more than light that has not quite settled.
+        let tolerance = self.settings.tolerance * fineness.sqrt();
+        self.iterate(&mut report, tolerance, cancel)?;
         self.leaves =
             reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
         cancel.proceed()?;

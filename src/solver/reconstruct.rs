@@ -27,7 +27,7 @@ const TASK_PATCHES: u32 = 256;
 
 /// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
 /// seams show between groups; larger, and the same is worked out again and again.
-const SIGHT_DISTANCE: f32 = 16.0;
+const SIGHT_DISTANCE: f32 = 8.0;
 
 /// What an element that lies within a solid in part counts at a vertex beside others: links see it as a whole.
 const CONTACT_TRUST: f32 = 1e-3;

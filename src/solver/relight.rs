@@ -263,7 +263,7 @@ impl Solver {
         if self.links.is_empty() {
             return Some(());
         }
-        self.iterate(report, cancel)?;
+        self.iterate(report, self.settings.tolerance, cancel)?;
         match &self.relighting.solved {
             Some(solved) => self.leaves = solved.leaves_under(&self.linked),
             None => self.gather_for_leaves(cancel)?,
