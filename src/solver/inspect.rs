@@ -30,11 +30,14 @@ impl Solver {
         let mut links = self.links_along(&path, node);
         let row_sum = links.iter().map(|link| link.form_factor).sum();
         let (direct, scale) = match hierarchy.kind(node) {
-            Kind::Element(leaf) => (
-                self.direct_of(leaf).truncate(),
-                self.closure_factor(leaf, row_sum),
-            ),
-            Kind::Cluster(_) => (Vec3::ZERO, 1.0),
+            Kind::Element(leaf) => {
+                let light: Vec3 = links.iter().map(|link| link.irradiance).sum();
+                (
+                    self.direct_of(leaf).truncate(),
+                    self.closure_scale(leaf, light.extend(row_sum)),
+                )
+            }
+            Kind::Cluster(_) => (Vec3::ZERO, Vec3::ONE),
         };
         for link in &mut links {
             link.irradiance *= scale;
@@ -139,10 +142,10 @@ impl Solver {
         found
     }
 
-    /// By what the light of a leaf is scaled so that its form factors add to the closure.
-    fn closure_factor(&self, leaf: usize, row_sum: f32) -> f32 {
+    /// By what the light of a leaf, with its form factors in `w`, is scaled in all so that they add to the closure.
+    fn closure_scale(&self, leaf: usize, light: Vec4) -> Vec3 {
         if self.leaves.is_empty() {
-            return 1.0;
+            return Vec3::ONE;
         }
         let elements = &self.hierarchy.mesh.elements;
         let cell_of = |element| self.closures.cell(&self.hierarchy, element);
@@ -155,7 +158,11 @@ impl Solver {
                 let area = elements[other.element as usize].area_vector.length();
                 (areas + area, rows + area * other.centre.w)
             });
-        self.closures.of(cell).factor_for(row_sum, sums)
+        let patch = elements[leaf].patch as usize;
+        let nearby = self.closures.nearby(&self.power, patch);
+        let scaled = self.closures.of(cell).scaled(light, sums, nearby);
+        let ratio = (scaled / light).truncate();
+        Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }
 
     fn place(&self, node: NodeId) -> Place {

@@ -21,6 +21,7 @@ mod iterate;
 mod light_parts;
 mod panel;
 mod plan;
+mod prober;
 mod reconstruct;
 mod relight;
 mod report;
@@ -218,7 +219,7 @@ impl Solver {
 
     /// Probe closures, of the first mesh.
     fn probe_closures(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
-        if self.closures.serve(fineness) {
+        if prober::serve(&self.closures, fineness) {
             return Some(());
         }
         if let Some(closures) = self.closures_in_clear() {
@@ -231,7 +232,7 @@ impl Solver {
             false => self.rays.clone(),
         };
         let (known, seed) = ((&self.closures, fineness), self.settings.seed);
-        let (closures, shot) = closure::closures(&self.hierarchy, &rays, known, seed, cancel)?;
+        let (closures, shot) = prober::closures(&self.hierarchy, &rays, known, seed, cancel)?;
         self.closures = closures;
         self.ray_count += shot;
         Some(())

@@ -75,8 +75,14 @@ pub(super) fn gather_leaves(
     Some(found.into_iter().flatten().collect())
 }
 
-/// Scale the light of the leaves of one cell so that their form factors add to the closure.
-fn scale_to_closure(hierarchy: &Hierarchy, closure: Closure, leaves: &mut [LeafLight]) {
+/// Scale the light of the leaves of one cell so that their form factors add to the closure; `nearby` is the mean radiosity
+/// of the neighbourhood.
+fn scale_to_closure(
+    hierarchy: &Hierarchy,
+    closure: Closure,
+    nearby: Vec3,
+    leaves: &mut [LeafLight],
+) {
     let sums = leaves.iter().fold((0.0, 0.0), |(areas, rows), leaf| {
         let area = hierarchy.mesh.elements[leaf.element as usize]
             .area_vector
@@ -85,7 +91,7 @@ fn scale_to_closure(hierarchy: &Hierarchy, closure: Closure, leaves: &mut [LeafL
     });
     for leaf in leaves {
         for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
-            *value = (value.truncate() * closure.factor_for(value.w, sums)).extend(value.w);
+            *value = closure.scaled(*value, sums, nearby);
         }
     }
 }
@@ -233,8 +239,10 @@ impl<'a> Walk<'a> {
         self.leave(above);
         // Leaves come depth first, so those of a cell follow each other.
         let cell = |leaf: &LeafLight| self.closures.cell(hierarchy, leaf.element as usize);
+        let nearby = self.closures.nearby(self.kernel.tables, patch);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-            scale_to_closure(hierarchy, self.closures.of(cell(&leaves[0])), leaves);
+            let closure = self.closures.of(cell(&leaves[0]));
+            scale_to_closure(hierarchy, closure, nearby, leaves);
         }
     }
 
