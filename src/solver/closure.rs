@@ -230,3 +230,54 @@ impl Solver {
             });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Random;
+
+    fn color(random: &mut Random) -> Vec3 {
+        Vec3::from_array([(); 3].map(|()| random.uniform()))
+    }
+
+    #[test]
+    fn in_even_light_the_scale_is_all_that_counts() {
+        let mut random = Random::new(3, 0);
+        for _ in 0..200 {
+            let (radiosity, row, share) =
+                (color(&mut random), 1.5 * random.uniform(), random.uniform());
+            let closure = Closure::estimated(share, 0.0);
+            let light = (radiosity * row).extend(row);
+            let scaled = closure.scaled(light, (1.0, row), radiosity);
+            let expected = radiosity * row * closure.factor(row);
+            assert!((scaled.truncate() - expected).abs().max_element() < 1e-5);
+            assert_eq!(scaled.w, row);
+        }
+    }
+
+    #[test]
+    fn what_is_lacking_is_never_brighter_than_the_neighbourhood_or_than_what_is_seen() {
+        let mut random = Random::new(4, 0);
+        for _ in 0..200 {
+            let (seen, nearby) = (color(&mut random), color(&mut random));
+            let row = 0.3 + 0.7 * random.uniform();
+            let light = (seen * row).extend(row);
+            let whole = Closure::CLOSED.scaled(light, (1.0, row), nearby);
+            let luminance = |color: Vec3| luminance(color.extend(0.0));
+            let lacking = luminance(whole.truncate() - seen * row) / (1.0 - row).max(1e-6);
+            let least = luminance(seen).min(luminance(nearby));
+            assert!(
+                (lacking - least).abs() < 1e-3 || row > 0.999,
+                "{lacking} {least}"
+            );
+            assert!(whole.min_element() >= 0.0);
+        }
+    }
+
+    #[test]
+    fn rows_that_are_far_too_large_are_scaled_as_they_are() {
+        let light = Vec4::new(2.0, 1.0, 0.5, 2.0);
+        let scaled = Closure::CLOSED.scaled(light, (1.0, 2.0), Vec3::splat(9.0));
+        assert_eq!(scaled, Vec4::new(1.0, 0.5, 0.25, 2.0));
+    }
+}

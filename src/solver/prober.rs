@@ -308,3 +308,40 @@ fn cells(hierarchy: &Hierarchy, cluster: usize, count: usize) -> Vec<usize> {
     }
     cells
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        scene::{SceneOptions, builtin::find_builtin},
+        solver::{SolveSettings, Solver},
+    };
+
+    #[test]
+    fn coarse_steps_shoot_a_share_of_the_rays_and_fine_ones_look_at_the_same_cells_again() {
+        let scene = find_builtin("room-1022").unwrap().builder();
+        let scene = Arc::new(scene.finish(&SceneOptions::default()).unwrap());
+        let cancel = Cancel::default();
+        let mut solver = Solver::new(scene, SolveSettings::normal(), None, &cancel).unwrap();
+        let cells = solver.hierarchy().mesh.elements.len();
+        let mut probed = Vec::new();
+        for fineness in [16.0, 8.0, 4.0, 2.0, 1.0] {
+            let before = solver.ray_count;
+            solver.probe_closures(fineness, &cancel).unwrap();
+            assert!(serve(&solver.closures, fineness));
+            assert_eq!(solver.closures.count(), cells);
+            probed.push(solver.ray_count - before);
+            // Elements that are divided since are no cells.
+            let leaf = solver.hierarchy.mesh.leaves().next().unwrap();
+            solver.hierarchy.mesh.divide(&[leaf as u32]);
+        }
+        let [rough, _, _, all, _] = probed[..] else {
+            panic!("five steps");
+        };
+        assert!(rough > 0 && 3 * rough < all, "{probed:?}");
+        assert_eq!(probed[1..3], [0, 0]);
+        assert_eq!(probed[4], 0);
+    }
+}
