@@ -186,6 +186,15 @@ fn each_of_four_normals_has_its_own_horizon() {
             let error = (f64::from(found) - expected).abs();
             let allowed = allowed(Vec3::ZERO, &case);
             assert!(error <= allowed, "{index} {normal}: {found} {expected}");
+            // With a hole of no width through the horizon, so that there are more edges than lanes.
+            let [a, b, c] = corners;
+            let edges = [[c, a], [a, b], [b, a], [a, b], [b, c]];
+            let outlined = f64::from(outline_irradiance(Vec3::ZERO, normal, &edges));
+            let error = (outlined - expected).abs();
+            assert!(
+                error <= 2.0 * allowed,
+                "{index} {normal}: {outlined} {expected}"
+            );
         }
     }
 }

@@ -7,7 +7,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use glam::{Vec3, Vec4};
+use glam::{BVec4A, Vec3, Vec4};
 
 use super::Vectors4;
 
@@ -137,20 +137,59 @@ pub fn point_irradiances(points: &Vectors4, normals: &Vectors4, [a, b, c]: [Vec3
 }
 
 /// Irradiance at `point` with unit `normal` of a flat surface of radiosity 1, given by the edges of its outline in any
-/// order, each wound as seen from its front; 0…1. It may have holes and several parts. The point must lie before its
-/// front, and all of it above the horizon.
+/// order, each wound as seen from its front, and clipped at the horizon; 0…1. It may have holes and several parts. The
+/// point must lie before its front.
 pub fn outline_irradiance(point: Vec3, normal: Vec3, edges: &[[Vec3; 2]]) -> f32 {
-    let normal = Vectors4::splat(normal);
+    let normals = Vectors4::splat(normal);
     let mut sum = Vec4::ZERO;
+    let mut horizon = Horizon::new(normal);
     for four in edges.chunks(4) {
         let ends = |end: usize| {
             let corner = |lane: usize| four.get(lane).map_or(Vec3::ZERO, |ends| ends[end] - point);
             Vectors4::new([corner(0), corner(1), corner(2), corner(3)])
         };
         let (from, to) = (ends(0), ends(1));
-        sum += edge_term(&from, &to, &(to - from), &normal);
+        let edges = ClippedEdges::new(&from, &to, from.dot(&normals), to.dot(&normals));
+        sum += edges.terms(&normals);
+        if (edges.leave | edges.enter).any() {
+            let crossings = edges.crossings.to_array();
+            let (leave, enter) = (edges.leave.bitmask(), edges.enter.bitmask());
+            for (lane, &crossing) in crossings.iter().enumerate() {
+                let has = |mask: u32| f32::from((mask >> lane & 1) as u8);
+                horizon.cross(crossing, has(leave) - has(enter));
+            }
+        }
     }
-    (sum.element_sum() / TAU).clamp(0.0, 1.0)
+    ((sum.element_sum() + horizon.sum) / TAU).clamp(0.0, 1.0)
+}
+
+/// What outlines that are cut off at the horizon have there: between the places where they go down and those where they
+/// come up again. These lie on one line, so the angle of each from the first is all that counts, and not which of them
+/// belong together.
+struct Horizon {
+    normal: Vec3,
+    first: Option<Vec3>,
+    /// `Σ θ Γ · n` of the closing edges.
+    sum: f32,
+}
+
+impl Horizon {
+    fn new(normal: Vec3) -> Self {
+        Self {
+            normal,
+            first: None,
+            sum: 0.0,
+        }
+    }
+
+    /// An edge goes through the horizon here: with 1 down, with −1 up, with 0 not.
+    fn cross(&mut self, place: Vec3, down: f32) {
+        if down != 0.0 {
+            let first = *self.first.get_or_insert(place);
+            let sine = first.cross(place).dot(self.normal);
+            self.sum += down * sine.atan2(first.dot(place));
+        }
+    }
 }
 
 /// The part of a triangle above the horizon, by the heights of its corners; a corner twice where it has but three.
@@ -230,6 +269,44 @@ fn arc_over_sine(rest: Vec4) -> Vec4 {
     low + high * fourth + c8 * (fourth * fourth)
 }
 
+/// Four edges, cut off where they go below a horizon.
+struct ClippedEdges {
+    from: Vectors4,
+    to: Vectors4,
+    /// Which have a part above.
+    are_seen: BVec4A,
+    /// Which go down through the horizon, and which come up.
+    leave: BVec4A,
+    enter: BVec4A,
+    /// Where these go through it.
+    crossings: Vectors4,
+}
+
+impl ClippedEdges {
+    /// Edges between corners of these heights, given relative to the point of each.
+    #[inline]
+    fn new(from: &Vectors4, to: &Vectors4, of_from: Vec4, of_to: Vec4) -> Self {
+        let [starts_above, ends_above] = [of_from, of_to].map(|height| height.cmpge(Vec4::ZERO));
+        let crossings = from.lerp(to, of_from / (of_from - of_to));
+        let (leave, enter) = (starts_above & !ends_above, !starts_above & ends_above);
+        Self {
+            from: Vectors4::select(enter, &crossings, from),
+            to: Vectors4::select(leave, &crossings, to),
+            are_seen: starts_above | ends_above,
+            leave,
+            enter,
+            crossings,
+        }
+    }
+
+    /// `θ Γ · n` of what lies above.
+    #[inline]
+    fn terms(&self, normals: &Vectors4) -> Vec4 {
+        let term = edge_term(&self.from, &self.to, &(self.to - self.from), normals);
+        Vec4::select(self.are_seen, term, Vec4::ZERO)
+    }
+}
+
 /// `Σ_k θ_k Γ_k · n` of a triangle as four points see it, clipped at the horizon of each.
 fn clipped_sum(corners: &[Vectors4; 3], heights: [Vec4; 3], normals: &Vectors4) -> Vec4 {
     let mut sum = Vec4::ZERO;
@@ -237,17 +314,10 @@ fn clipped_sum(corners: &[Vectors4; 3], heights: [Vec4; 3], normals: &Vectors4) 
     let (mut exit, mut entry) = (Vectors4::splat(Vec3::ZERO), Vectors4::splat(Vec3::ZERO));
     for k in 0..3 {
         let next = (k + 1) % 3;
-        let [starts_above, ends_above] =
-            [heights[k], heights[next]].map(|height| height.cmpge(Vec4::ZERO));
-        let share = heights[k] / (heights[k] - heights[next]);
-        let crossing = corners[k].lerp(&corners[next], share);
-        let (leaves, enters) = (starts_above & !ends_above, !starts_above & ends_above);
-        exit = Vectors4::select(leaves, &crossing, &exit);
-        entry = Vectors4::select(enters, &crossing, &entry);
-        let from = Vectors4::select(enters, &crossing, &corners[k]);
-        let to = Vectors4::select(leaves, &crossing, &corners[next]);
-        let term = edge_term(&from, &to, &(to - from), normals);
-        sum += Vec4::select(starts_above | ends_above, term, Vec4::ZERO);
+        let edges = ClippedEdges::new(&corners[k], &corners[next], heights[k], heights[next]);
+        exit = Vectors4::select(edges.leave, &edges.crossings, &exit);
+        entry = Vectors4::select(edges.enter, &edges.crossings, &entry);
+        sum += edges.terms(normals);
     }
     sum + edge_term(&exit, &entry, &(entry - exit), normals)
 }

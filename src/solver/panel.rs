@@ -1,7 +1,7 @@
 //! Emitters that together make one flat lamp.
 //!
 //! The irradiance of a polygon is a sum over its edges, and where two triangles of one radiosity meet in a plane, the
-//! terms of their common edge cancel. So of a lamp of many triangles only the outline counts, as long as all of it lies
+//! terms of their common edge cancel. So of a lamp of many triangles only the outline counts, as long as most of it lies
 //! above the receiver's horizon.
 
 use std::{collections::HashMap, f32::consts::PI, ops::Range};
@@ -87,7 +87,8 @@ impl Panel {
                 |[start, _]: &[Vec3; 2]| (*start - receiver.point).dot(receiver.normal) >= 0.0;
             match self.outline.iter().filter(|edge| is_above(edge)).count() {
                 0 => return Some(0.0),
-                count if count < self.outline.len() => return None,
+                // Of shadow rays that are spread by area, most would go below the horizon.
+                count if count < self.outline.len() && elevation < 0.0 => return None,
                 _ => {}
             }
         }
