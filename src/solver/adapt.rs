@@ -55,6 +55,8 @@ pub(super) struct DirectField {
     pub(super) centres: Vec<Option<DirectLight>>,
     /// Elements whose corners are all sampled: those that come after are new.
     pub(super) covered: usize,
+    /// Shadow rays that these corners have where it takes all.
+    pub(super) samples: u32,
     /// Irradiance to show by vertex; shorter than the vertices where some are new.
     shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
@@ -134,14 +136,10 @@ impl DirectField {
             vertices: Vec::new(),
             centres: Vec::new(),
             covered: 0,
+            samples: 0,
             shown: Vec::new(),
             is_full: false,
         }
-    }
-
-    /// Nothing is known any more: what was, came of too few rays.
-    pub(super) fn forget(&mut self) {
-        (self.vertices, self.centres, self.covered) = (Vec::new(), Vec::new(), 0);
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a

@@ -164,9 +164,9 @@ impl Closures {
         self.of.len()
     }
 
-    /// Whether only a share of the rays was shot for them.
-    pub(super) fn are_rough(&self) -> bool {
-        self.are_rough
+    /// Whether they are good enough for coarse links, or for others.
+    pub(super) fn serve(&self, is_coarse: bool) -> bool {
+        !self.of.is_empty() && (is_coarse || !self.are_rough)
     }
 
     /// Mean radiosity of the neighbourhood of a patch.

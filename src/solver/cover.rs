@@ -32,7 +32,7 @@ impl Limits {
 }
 
 impl DirectField {
-    /// Sample the corners of leaves that were not sampled yet. Returns the rays shot.
+    /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.
     ///
     /// A share of the rays comes first. Where they agree with those of all vertices of the same elements there is no
     /// shadow border, and they are enough. (To trust a vertex's own rays alone would be biased: where a twentieth of
@@ -45,15 +45,22 @@ impl DirectField {
         seed: u64,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let elements = self.covered..hierarchy.mesh.elements.len();
+        // A vertex without light is new, and so are all elements about it.
+        let first = if samples > self.samples {
+            0
+        } else {
+            self.covered
+        };
+        let elements = first..hierarchy.mesh.elements.len();
         if elements.is_empty() {
             return Some(0);
         }
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
-        // A vertex without light is new, and so are all elements about it.
-        let receivers = self.receivers(hierarchy, elements.clone(), |_, light| light.is_none());
+        let is_due = |_, light: Option<DirectLight>| light.is_none_or(|had| had.tried < samples);
+        let receivers = self.receivers(hierarchy, elements.clone(), is_due);
+        let before = self.shot(&receivers);
         for &(vertex, _) in &receivers {
-            self.vertices[vertex as usize] = Some(DirectLight::default());
+            self.vertices[vertex as usize].get_or_insert_default();
         }
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, |_| probing, seed, cancel);
@@ -68,10 +75,12 @@ impl DirectField {
             for &(vertex, _) in &receivers {
                 self.vertices[vertex as usize] = None;
             }
+            self.covered = 0;
             return None;
         }
         self.covered = elements.end;
-        Some(self.shot(&receivers))
+        self.samples = self.samples.max(samples);
+        Some(self.shot(&receivers) - before)
     }
 
     /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
@@ -207,8 +216,19 @@ impl DirectField {
         is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,
     ) -> Vec<(u32, Receiver)> {
         let mesh = &hierarchy.mesh;
+        let known = self.vertices.iter().enumerate();
+        let is_wanted: Vec<bool> = known
+            .map(|(vertex, light)| is_wanted(vertex, *light))
+            .collect();
+        let about_wanted: Vec<usize> = mesh
+            .leaves_among(elements)
+            .filter(|&leaf| {
+                let corners = mesh.elements[leaf].vertices;
+                corners.iter().any(|&vertex| is_wanted[vertex as usize])
+            })
+            .collect();
         let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
-        for leaf in mesh.leaves_among(elements.clone()) {
+        for &leaf in &about_wanted {
             for &vertex in &mesh.elements[leaf].vertices {
                 normals[vertex as usize] += mesh.elements[leaf].area_vector;
             }
@@ -216,16 +236,13 @@ impl DirectField {
         /// How fit a leaf is, and which one it is.
         type Choice = ((bool, f32), u32);
         let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
-        for leaf in mesh
-            .leaves_among(elements)
-            .filter(|&leaf| mesh.is_held(leaf))
-        {
+        for leaf in about_wanted.into_iter().filter(|&leaf| mesh.is_held(leaf)) {
             let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
             for (side, vertex) in element.vertices.into_iter().enumerate() {
                 let vertex = vertex as usize;
                 let fitness = (!element.is_covered(side), normals[vertex].dot(normal));
                 let is_best = chosen[vertex].is_none_or(|(best, _)| fitness > best);
-                if is_best && is_wanted(vertex, self.vertices[vertex]) {
+                if is_best && is_wanted[vertex] {
                     chosen[vertex] = Some((fitness, leaf as u32));
                 }
             }

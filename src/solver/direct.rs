@@ -211,6 +211,9 @@ impl Lights {
         sums: &mut Vec<Arriving>,
         light: &mut DirectLight,
     ) {
+        if samples.is_empty() {
+            return;
+        }
         light.exact = self.unoccluded(receiver, sums);
         light.tried = samples.end.max(light.tried);
         if rays.is_clear() {

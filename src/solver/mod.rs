@@ -80,12 +80,19 @@ impl Cancel {
 }
 
 /// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
-/// comes soon; the first step shoots them all.
+/// comes soon; the first step shoots the others.
 const FIRST_RAYS: usize = 1 << 20;
+
+/// Shadow rays of a vertex in coarse steps: half of all, but so many at least. Fewer, and shadows are missed.
+const LEAST_COARSE_SAMPLES: u32 = 8;
 
 /// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
 /// again costs more than the new ones.
 const THRESHOLD_FACTOR: f32 = 2.0;
+
+/// Steps whose thresholds are at least this many times the last one's are coarse: their links err by more than a few rays
+/// do. Smaller, and the first pictures come later; larger, and they are rougher than their links.
+const COARSE_FINENESS: f32 = 4.0;
 
 /// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
 /// `MOST_RAISES`: then the root's exchange with itself is left.
@@ -209,8 +216,10 @@ impl Solver {
         let limits = self.direct_limits(1.0);
         self.divide_coarse(limits);
         self.divide_contacts(cancel)?;
+        let most = (FIRST_RAYS / self.hierarchy.mesh.vertices.len().max(1)).max(1);
+        let first = self.direct_limits(self.fineness_of(1));
+        let (count, seed) = (first.shadow_samples.min(most as u32), limits.seed);
         if let Some(field) = &mut self.direct {
-            let (count, seed) = (first_samples(&self.hierarchy, limits), limits.seed);
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
         self.extend_to_new_elements();
@@ -219,7 +228,7 @@ impl Solver {
 
     /// Probe closures, of the first mesh.
     fn probe_closures(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
-        if prober::serve(&self.closures, fineness) {
+        if self.closures.serve(is_coarse(fineness)) {
             return Some(());
         }
         if let Some(closures) = self.closures_in_clear() {
@@ -231,7 +240,7 @@ impl Solver {
             true => Arc::new(RayTree::new(&self.scene)),
             false => self.rays.clone(),
         };
-        let (known, seed) = ((&self.closures, fineness), self.settings.seed);
+        let (known, seed) = ((&self.closures, is_coarse(fineness)), self.settings.seed);
         let (closures, shot) = prober::closures(&self.hierarchy, &rays, known, seed, cancel)?;
         self.closures = closures;
         self.ray_count += shot;
@@ -245,8 +254,7 @@ impl Solver {
             step: self.step + 1,
             ..StepReport::default()
         };
-        let fineness =
-            THRESHOLD_FACTOR.powi((self.settings.max_steps.saturating_sub(report.step)) as i32);
+        let fineness = self.fineness_of(report.step);
         report.epsilon = self.settings.epsilon * fineness;
         self.is_full = false;
         self.relighting.begin_step();
@@ -262,8 +270,7 @@ impl Solver {
         // Links that are coarse err by more than light that has not quite settled.
         let tolerance = self.settings.tolerance * fineness.sqrt();
         self.iterate(&mut report, tolerance, cancel)?;
-        self.leaves =
-            reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
+        self.gather_for_leaves(is_coarse(fineness), cancel)?;
         cancel.proceed()?;
         self.fill(&mut report);
         self.step = report.step;
@@ -274,6 +281,18 @@ impl Solver {
         report.is_final = report.is_full || self.step >= self.settings.max_steps;
         self.relighting.end_step(&report);
         Some(report)
+    }
+
+    /// By what the threshold of a step is above the last one's.
+    fn fineness_of(&self, step: u32) -> f32 {
+        THRESHOLD_FACTOR.powi(self.settings.max_steps.saturating_sub(step) as i32)
+    }
+
+    /// Let each leaf gather once more, for the vertices.
+    fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
+        let (kernel, closures) = (self.kernel(), &self.closures);
+        self.leaves = reconstruct::gather_leaves(kernel, &self.links, closures, is_coarse, cancel)?;
+        Some(())
     }
 
     /// The state as it stands. Cheap: parts are shared.
@@ -366,12 +385,8 @@ impl Solver {
     /// Make direct light known at all vertices, and divide elements where it bends.
     fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
         let limits = self.direct_limits(fineness);
-        let is_rough = first_samples(&self.hierarchy, limits) < limits.shadow_samples;
         self.is_full |= !self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
-            if self.step == 0 && is_rough {
-                field.forget();
-            }
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
             self.is_full |= field.is_full;
         }
@@ -403,10 +418,14 @@ impl Solver {
     }
 
     fn direct_limits(&self, fineness: f32) -> adapt::Limits {
+        let samples = self.settings.shadow_samples;
         adapt::Limits {
             tolerance: self.settings.mesh_tolerance * fineness,
             min_area: self.min_area(),
-            shadow_samples: self.settings.shadow_samples,
+            shadow_samples: match is_coarse(fineness) {
+                true => samples.min((samples / 2).max(LEAST_COARSE_SAMPLES)),
+                false => samples,
+            },
             seed: self.settings.seed,
             most_elements: self.most_elements(),
         }
@@ -520,7 +539,7 @@ impl Solver {
             }
             self.extend_to_new_elements();
             if let Some(field) = &mut self.direct {
-                let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
+                let (count, seed) = (field.samples, self.settings.seed);
                 self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
             }
             self.pull();
@@ -529,10 +548,9 @@ impl Solver {
     }
 }
 
-/// Shadow rays of a vertex for the first picture.
-fn first_samples(hierarchy: &Hierarchy, limits: adapt::Limits) -> u32 {
-    let each = FIRST_RAYS / hierarchy.mesh.vertices.len().max(1);
-    limits.shadow_samples.min(each.max(1) as u32)
+/// Whether a step of this fineness is coarse.
+fn is_coarse(fineness: f32) -> bool {
+    fineness >= COARSE_FINENESS
 }
 
 /// A colour that is safe to show: finite and not negative.

@@ -13,12 +13,9 @@ use crate::{
     hierarchy::{Element, Hierarchy},
 };
 
-/// Share of all rays that is shot for the first steps, whose links are coarse. Larger, and the first picture comes later;
-/// smaller, and open places take light that is not theirs until the other rays are shot.
+/// Share of all rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and open places
+/// take light that is not theirs until the other rays are shot.
 const ROUGH_SHARE: f32 = 0.125;
-
-/// Steps with a fineness of this or more make do with [`ROUGH_SHARE`]. Smaller, and all rays are shot earlier.
-const ROUGH_FINENESS: f32 = 4.0;
 
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
 const GROUP_PATCHES: u32 = 64;
@@ -117,28 +114,23 @@ fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure
     }
 }
 
-/// Whether closures are good enough for links of a fineness.
-pub(super) fn serve(closures: &Closures, fineness: f32) -> bool {
-    closures.count() > 0 && (!closures.are_rough() || fineness >= ROUGH_FINENESS)
-}
-
-/// Closures of all cells for links of a fineness, and the rays shot; `None` when cancelled. The cells are those of what
+/// Closures of all cells for coarse links or for others, and the rays shot; `None` when cancelled. The cells are those of what
 /// is `known`, or, where nothing is, the leaves of the mesh as it is now.
 pub(super) fn closures(
     hierarchy: &Hierarchy,
     rays: &RayTree,
-    (known, fineness): (&Closures, f32),
+    (known, is_coarse): (&Closures, bool),
     seed: u64,
     cancel: &Cancel,
 ) -> Option<(Closures, u64)> {
-    let are_rough = fineness >= ROUGH_FINENESS;
     let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
     let prober = Prober {
         hierarchy,
         rays,
         seed,
         cancel,
-        share: if are_rough { ROUGH_SHARE } else { 1.0 } / cost,
+        is_rough: is_coarse,
+        share: if is_coarse { ROUGH_SHARE } else { 1.0 } / cost,
     };
     let count = match known.count() {
         0 => hierarchy.mesh.elements.len(),
@@ -162,7 +154,7 @@ pub(super) fn closures(
     for (&cell, closure) in open.into_iter().flatten().zip(found.into_iter().flatten()) {
         of[cell] = closure;
     }
-    let closures = Closures::new(hierarchy, of, are_rough);
+    let closures = Closures::new(hierarchy, of, is_coarse);
     Some((closures, (looked + probed) as u64))
 }
 
@@ -172,6 +164,8 @@ struct Prober<'a> {
     rays: &'a RayTree,
     seed: u64,
     cancel: &'a Cancel,
+    /// Whether a first look is enough.
+    is_rough: bool,
     /// Rays that are shot, of all that would be if each cost what usual ones do.
     share: f32,
 }
@@ -204,7 +198,7 @@ impl Prober<'_> {
             .map(|group| look(group, 0, first_look(group)))
             .collect();
         let mut shot: usize = groups.iter().map(|group| first_look(group)).sum();
-        if closed.iter().any(|is_closed| !is_closed) {
+        if !self.is_rough && closed.iter().any(|is_closed| !is_closed) {
             let count = (self.budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
             closed
                 .par_iter_mut()
@@ -316,7 +310,7 @@ mod tests {
     use super::*;
     use crate::{
         scene::{SceneOptions, builtin::find_builtin},
-        solver::{SolveSettings, Solver},
+        solver::{SolveSettings, Solver, is_coarse},
     };
 
     #[test]
@@ -330,7 +324,7 @@ mod tests {
         for fineness in [16.0, 8.0, 4.0, 2.0, 1.0] {
             let before = solver.ray_count;
             solver.probe_closures(fineness, &cancel).unwrap();
-            assert!(serve(&solver.closures, fineness));
+            assert!(solver.closures.serve(is_coarse(fineness)));
             assert_eq!(solver.closures.count(), cells);
             probed.push(solver.ray_count - before);
             // Elements that are divided since are no cells.

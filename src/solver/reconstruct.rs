@@ -29,6 +29,9 @@ const TASK_PATCHES: u32 = 256;
 /// seams show between groups; larger, and the same is worked out again and again.
 const SIGHT_DISTANCE: f32 = 8.0;
 
+/// The same in coarse steps, whose links err by more.
+const COARSE_SIGHT_DISTANCE: f32 = 4.0;
+
 /// What an element that lies within a solid in part counts at a vertex beside others: links see it as a whole.
 const CONTACT_TRUST: f32 = 1e-3;
 
@@ -50,9 +53,14 @@ pub(super) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
     closures: &Closures,
+    is_coarse: bool,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
     let hierarchy = kernel.hierarchy;
+    let sight_distance = match is_coarse {
+        true => COARSE_SIGHT_DISTANCE,
+        false => SIGHT_DISTANCE,
+    };
     let found: Vec<Vec<LeafLight>> = hierarchy
         .groups(hierarchy.task_patches(TASK_PATCHES))
         .into_par_iter()
@@ -61,6 +69,7 @@ pub(super) fn gather_leaves(
                 kernel,
                 links,
                 closures,
+                sight_distance,
                 path: Vec::new(),
                 spare: Vec::new(),
                 found: Vec::new(),
@@ -123,9 +132,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Take a link over. It is worked out if its source looks alike from everywhere in a ball.
-    fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, radius: f32) {
-        let far = SIGHT_DISTANCE * radius;
+    /// Take a link over. It is worked out if its source is further than `far` from a centre.
+    fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, far: f32) {
         match kernel.hierarchy.kind(link.source) {
             Kind::Cluster(index)
                 if centre.distance_squared(kernel.tables.centres[index]) > far * far =>
@@ -148,6 +156,8 @@ struct Walk<'a> {
     kernel: Kernel<'a>,
     links: &'a LinkStore,
     closures: &'a Closures,
+    /// See [`SIGHT_DISTANCE`].
+    sight_distance: f32,
     /// Of the nodes above the current one.
     path: Vec<Chain<'a>>,
     /// Those that are no longer needed, for their memory.
@@ -192,9 +202,10 @@ impl<'a> Walk<'a> {
 
     /// Add a node to the path, with the links that are not worked out above it.
     fn push(&mut self, centre: Vec3, radius: f32, mut chain: Chain<'a>) {
+        let far = self.sight_distance * radius;
         if let Some(above) = self.path.last() {
             for link in &above.rest {
-                chain.add(self.kernel, link, centre, radius);
+                chain.add(self.kernel, link, centre, far);
             }
         }
         self.path.push(chain);
@@ -202,13 +213,14 @@ impl<'a> Walk<'a> {
 
     fn push_cluster(&mut self, index: usize) {
         let cluster = &self.kernel.hierarchy.clusters[index];
+        let far = self.sight_distance * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
         for link in self.links.of(NodeId(index as u32)) {
             chain.error += link.error;
             if link.source.index() == index {
                 chain.even += own_irradiance(self.kernel, index, link);
             } else {
-                chain.add(self.kernel, link, cluster.centroid, cluster.radius);
+                chain.add(self.kernel, link, cluster.centroid, far);
             }
         }
         self.push(cluster.centroid, cluster.radius, chain);

@@ -18,7 +18,7 @@ use super::{
     Cancel, Solver, StepReport,
     iterate::CEILING_SLACK,
     light_parts::{LightParts, Shooting, common_ratio},
-    reconstruct::{self, LeafLight},
+    reconstruct::LeafLight,
 };
 use crate::{
     hierarchy::luminance,
@@ -137,7 +137,7 @@ impl Solver {
 
     /// Let each leaf gather the light that [`Self::relight`] has solved. Returns `None` when cancelled on the way.
     pub fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        self.gather_for_leaves(cancel)?;
+        self.gather_relit(cancel)?;
         let mut report = self.unrefined_report();
         self.fill(&mut report);
         self.show(cancel)?;
@@ -180,7 +180,7 @@ impl Solver {
         let mut shot = 0;
         if !self.relighting.is_whole {
             // A step that was cancelled may have left vertices without samples.
-            let (count, seed) = (self.settings.shadow_samples, self.settings.seed);
+            let (count, seed) = (field.samples, self.settings.seed);
             shot += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
         let now = &self.relighting.appearances;
@@ -266,14 +266,13 @@ impl Solver {
         self.iterate(report, self.settings.tolerance, cancel)?;
         match &self.relighting.solved {
             Some(solved) => self.leaves = solved.leaves_under(&self.linked),
-            None => self.gather_for_leaves(cancel)?,
+            None => self.gather_relit(cancel)?,
         }
         Some(())
     }
 
-    fn gather_for_leaves(&mut self, cancel: &Cancel) -> Option<()> {
-        self.leaves =
-            reconstruct::gather_leaves(self.kernel(), &self.links, &self.closures, cancel)?;
+    fn gather_relit(&mut self, cancel: &Cancel) -> Option<()> {
+        self.gather_for_leaves(false, cancel)?;
         self.relighting.solved = None;
         self.relighting.is_solved = true;
         Some(())
