@@ -6,6 +6,7 @@
 //! before its face.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::{Cluster, Patch};
 use crate::{
@@ -19,6 +20,9 @@ const LEAF_PATCHES: usize = 4;
 
 /// Depth from which cuts are at the median. It bounds the depth of the tree by this plus 32.
 const MEDIAN_DEPTH: u32 = 48;
+
+/// Items that one task divides. Fewer, and subtrees are copied more often; more, and there is nothing to share out.
+const TASK_ITEMS: usize = 4096;
 
 /// Where a cluster is cut along its longest axis. A little below the middle, where the centroids of symmetrical scenes
 /// lie: rounding, such as that of a scene far from the origin, must not decide on which side they come.
@@ -69,7 +73,7 @@ pub struct PatchTree {
 
 impl PatchTree {
     /// The tree over all lit sides of a scene; `None` when cancelled.
-    pub fn build(scene: &Scene, cancelled: &dyn Fn() -> bool) -> Option<Self> {
+    pub fn build(scene: &Scene, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         grow(scene, lit_sides(scene), &[], cancelled)
     }
 
@@ -79,7 +83,7 @@ impl PatchTree {
         &self,
         scene: &Scene,
         left_out: &[bool],
-        cancelled: &dyn Fn() -> bool,
+        cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
         let of = |is_out: bool| {
             let flagged = self.patches.iter().zip(left_out);
@@ -103,34 +107,89 @@ fn grow(
     scene: &Scene,
     mut items: Vec<Item>,
     others: &[Item],
-    cancelled: &dyn Fn() -> bool,
+    cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Option<PatchTree> {
-    let mut clusters = vec![cluster(0, items.len(), u32::MAX)];
-    let mut pending = vec![(0usize, 0u32)];
+    let mut clusters = subtree(&mut items, 0, 0, cancelled)?;
+    let patches: Vec<Patch> = items
+        .par_iter()
+        .chain(others)
+        .map(|item| patch(scene, item))
+        .collect();
+    fit_boxes(scene, &patches, &mut clusters);
+    Some(PatchTree { clusters, patches })
+}
+
+/// The clusters over some items, of which the first is item `start` of all: their root, and depth first, in pairs, all
+/// below it. `None` when cancelled.
+fn subtree(
+    items: &mut [Item],
+    start: usize,
+    depth: u32,
+    cancelled: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<Cluster>> {
+    let mut clusters = vec![cluster(start, start + items.len(), u32::MAX)];
+    if items.len() > TASK_ITEMS {
+        let count = split(items, depth >= MEDIAN_DEPTH);
+        let (before, after) = items.split_at_mut(count);
+        let (first, second) = rayon::join(
+            || subtree(before, start, depth + 1, cancelled),
+            || subtree(after, start + count, depth + 1, cancelled),
+        );
+        clusters[0].first_child = 1;
+        graft(&mut clusters, [first?, second?]);
+        return Some(clusters);
+    }
+    let mut pending = vec![(0usize, depth)];
     while let Some((index, depth)) = pending.pop() {
-        let Cluster { start, end, .. } = clusters[index];
-        let range = start as usize..end as usize;
+        let Cluster {
+            start: from, end, ..
+        } = clusters[index];
+        let range = from as usize - start..end as usize - start;
         if range.len() <= LEAF_PATCHES {
             continue;
         }
         if cancelled() {
             return None;
         }
-        let middle = range.start + split(&mut items[range.clone()], depth >= MEDIAN_DEPTH);
+        let middle = from as usize + split(&mut items[range], depth >= MEDIAN_DEPTH);
         let first = clusters.len();
         clusters[index].first_child = first as u32;
-        clusters.push(cluster(range.start, middle, index as u32));
-        clusters.push(cluster(middle, range.end, index as u32));
+        clusters.push(cluster(from as usize, middle, index as u32));
+        clusters.push(cluster(middle, end as usize, index as u32));
         pending.push((first + 1, depth + 1));
         pending.push((first, depth + 1));
     }
-    let patches: Vec<Patch> = items
-        .iter()
-        .chain(others)
-        .map(|item| patch(scene, item))
-        .collect();
-    fit_boxes(scene, &patches, &mut clusters);
-    Some(PatchTree { clusters, patches })
+    Some(clusters)
+}
+
+/// Put two subtrees below a root: the pair of their roots, then what is below the first, then what is below the second.
+fn graft(clusters: &mut Vec<Cluster>, subtrees: [Vec<Cluster>; 2]) {
+    for tree in &subtrees {
+        clusters.push(Cluster {
+            parent: 0,
+            ..tree[0]
+        });
+    }
+    for (tree, root) in subtrees.iter().zip(1..) {
+        // Where what was at 1 comes to lie.
+        let shift = clusters.len() as u32 - 1;
+        let moved = |index: u32| match index {
+            0 => root,
+            _ => index + shift,
+        };
+        if !tree[0].is_leaf() {
+            clusters[root as usize].first_child = moved(tree[0].first_child);
+        }
+        clusters.extend(tree[1..].iter().map(|cluster| Cluster {
+            parent: moved(cluster.parent),
+            first_child: if cluster.is_leaf() {
+                Cluster::LEAF
+            } else {
+                moved(cluster.first_child)
+            },
+            ..*cluster
+        }));
+    }
 }
 
 /// Fronts of all triangles and backs of the two-sided ones.

@@ -134,7 +134,7 @@ impl Mesh {
         patches: &[Patch],
         held: usize,
         crease_degrees: f32,
-        cancelled: &dyn Fn() -> bool,
+        cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
         let corners: Vec<[u32; 3]> = patches
             .iter()
@@ -463,7 +463,7 @@ fn share_vertices(
     patches: &[Patch],
     corners: &[[u32; 3]],
     crease_degrees: f32,
-    cancelled: &dyn Fn() -> bool,
+    cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Option<(Vec<Vertex>, Vec<[u32; 3]>)> {
     let mut corner_group = DisjointSets::new(corners.len() * 3);
     let half_edges = half_edges(corners.iter().copied());

@@ -154,7 +154,11 @@ impl Hierarchy {
     }
 
     /// As [`Self::new`], or `None` once `cancelled` says so.
-    pub fn build(scene: &Scene, crease_degrees: f32, cancelled: &dyn Fn() -> bool) -> Option<Self> {
+    pub fn build(
+        scene: &Scene,
+        crease_degrees: f32,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
         let tree = PatchTree::build(scene, cancelled)?;
         Self::of_tree(scene, tree, crease_degrees, cancelled)
     }
@@ -165,7 +169,7 @@ impl Hierarchy {
         scene: &Scene,
         tree: PatchTree,
         crease_degrees: f32,
-        cancelled: &dyn Fn() -> bool,
+        cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
         let held = tree.held().end;
         let PatchTree { clusters, patches } = tree;

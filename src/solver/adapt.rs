@@ -218,6 +218,8 @@ impl DirectField {
     ) -> Option<u64> {
         let mut ray_count = 0;
         self.is_full = false;
+        // Elements from here on were not looked at yet in this step.
+        let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
             ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
             let mean = self.mean(hierarchy);
@@ -225,8 +227,11 @@ impl DirectField {
             if round == MOST_ROUNDS {
                 break;
             }
-            ray_count += self.probe_centres(rays, hierarchy, limits, mean, cancel)?;
-            let wanted = self.bent(hierarchy, limits, mean);
+            let elements = fresh..hierarchy.mesh.elements.len();
+            fresh = elements.end;
+            let leaves: Vec<usize> = hierarchy.mesh.leaves_among(elements).collect();
+            ray_count += self.probe_centres(rays, hierarchy, &leaves, limits, mean, cancel)?;
+            let wanted = self.bent(hierarchy, &leaves, limits, mean);
             self.is_full = !hierarchy.mesh.fits(&wanted, limits.most_elements);
             if self.is_full || !hierarchy.mesh.divide(&wanted) {
                 break;
@@ -269,21 +274,24 @@ impl DirectField {
         most * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
-    /// Sample the centroids of leaves whose corners differ, or may all be dark by chance. Returns the rays shot.
+    /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance. Returns the rays
+    /// shot.
     fn probe_centres(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
+        leaves: &[usize],
         limits: Limits,
         mean: f32,
         cancel: &Cancel,
     ) -> Option<u64> {
         self.centres.resize(hierarchy.mesh.elements.len(), None);
-        let leaves: Vec<usize> = hierarchy.mesh.held_leaves().collect();
         let unknown: Vec<usize> = leaves
-            .into_par_iter()
+            .par_iter()
+            .copied()
             .filter(|&leaf| {
-                hierarchy.mesh.elements[leaf].is_open()
+                hierarchy.mesh.is_held(leaf)
+                    && hierarchy.mesh.elements[leaf].is_open()
                     && self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
                         || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
@@ -316,10 +324,11 @@ impl DirectField {
         Some(ray_count)
     }
 
-    /// Leaves whose corners do not tell what lies between.
-    fn bent(&self, hierarchy: &Hierarchy, limits: Limits, mean: f32) -> Vec<u32> {
+    /// Those of some leaves whose corners do not tell what lies between.
+    fn bent(&self, hierarchy: &Hierarchy, leaves: &[usize], limits: Limits, mean: f32) -> Vec<u32> {
         let mesh = &hierarchy.mesh;
-        mesh.leaves()
+        let leaves = leaves.iter().copied();
+        leaves
             .filter(|&leaf| {
                 let element = &mesh.elements[leaf];
                 let area = element.area_vector.length();

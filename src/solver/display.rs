@@ -24,20 +24,36 @@ impl Solver {
         let has_changed = held.indices.is_empty()
             || held.own_vertex_count() != self.hierarchy.mesh.vertices.len();
         cancel.proceed()?;
-        let mesh = if has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown()
-        {
-            Arc::new(self.display_mesh(cancel)?)
-        } else {
-            self.snapshot.mesh.clone()
-        };
+        let has_changed =
+            has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown();
+        let triangles = has_changed.then(|| self.hierarchy.mesh.closed_triangles());
         cancel.proceed()?;
-        if let Some(field) = &mut self.direct {
-            field.smooth(&self.hierarchy);
-        }
+        // None of these needs the others.
+        let mut direct = self.direct.take();
+        let ((mesh, means), ()) = rayon::join(
+            || {
+                rayon::join(
+                    || match triangles {
+                        Some(triangles) => self.display_mesh(triangles, cancel).map(Arc::new),
+                        None => Some(self.snapshot.mesh.clone()),
+                    },
+                    || VertexMeans::new(&self.hierarchy, &self.leaves),
+                )
+            },
+            || {
+                if let Some(field) = &mut direct {
+                    field.smooth(&self.hierarchy);
+                }
+            },
+        );
+        self.direct = direct;
+        let mesh = mesh?;
         cancel.proceed()?;
-        let light = self.vertex_light(&mesh);
-        cancel.proceed()?;
-        let clusters = self.cluster_boxes(cancel)?;
+        let (light, clusters) = rayon::join(
+            || self.vertex_light(means, &mesh),
+            || self.cluster_boxes(cancel),
+        );
+        let clusters = clusters?;
         self.snapshot = Snapshot {
             step: self.step,
             mesh,
@@ -57,9 +73,12 @@ impl Solver {
             .count()
     }
 
-    fn display_mesh(&mut self, cancel: &Cancel) -> Option<DisplayMesh> {
-        let triangles = self.hierarchy.mesh.closed_triangles();
-        cancel.proceed()?;
+    /// The mesh that is shown, from elements with the triangles that close their edges.
+    fn display_mesh(
+        &self,
+        triangles: Vec<(u32, [u32; 3])>,
+        cancel: &Cancel,
+    ) -> Option<DisplayMesh> {
         let mesh = &self.hierarchy.mesh;
         let count = mesh.vertices.len();
         let mut seams = (!self.scene.texcoords.is_empty()).then(Seams::default);
@@ -143,8 +162,7 @@ impl Solver {
         if place.is_finite() { place } else { uv[0] }
     }
 
-    fn vertex_light(&self, mesh: &DisplayMesh) -> VertexLight {
-        let means = VertexMeans::new(&self.hierarchy, &self.leaves);
+    fn vertex_light(&self, means: VertexMeans, mesh: &DisplayMesh) -> VertexLight {
         let count = means.irradiance.len();
         let mut light = VertexLight {
             irradiance: Vec::with_capacity(count),

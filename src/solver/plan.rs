@@ -163,7 +163,7 @@ impl Plan {
         scene: &Scene,
         settings: &SolveSettings,
         awakened: Awakened,
-        cancelled: &dyn Fn() -> bool,
+        cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Self, PatchTree)> {
         let may_omit = |omission| !settings.keep.has(omission);
         let mut plan = Self {
@@ -193,7 +193,7 @@ impl Plan {
         &mut self,
         scene: &Scene,
         tree: PatchTree,
-        cancelled: &dyn Fn() -> bool,
+        cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<PatchTree> {
         let lit = tree.lit(scene, &self.awakened);
         // Without any light there is nothing to spare.
