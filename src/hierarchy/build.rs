@@ -194,14 +194,16 @@ fn graft(clusters: &mut Vec<Cluster>, subtrees: [Vec<Cluster>; 2]) {
 
 /// Fronts of all triangles and backs of the two-sided ones.
 fn lit_sides(scene: &Scene) -> Vec<Item> {
-    let mut items = Vec::with_capacity(scene.triangles.len());
-    for triangle in scene.triangle_ids() {
-        items.push(Item::of(scene, triangle, false));
-        if scene.triangles[triangle.index()].two_sided {
-            items.push(Item::of(scene, triangle, true));
-        }
-    }
-    items
+    let sides = |triangle: TriangleId| {
+        let is_lit_behind = scene.triangles[triangle.index()].two_sided;
+        let backs = is_lit_behind.then(|| Item::of(scene, triangle, true));
+        std::iter::once(Item::of(scene, triangle, false)).chain(backs)
+    };
+    (0..scene.triangles.len() as u32)
+        .into_par_iter()
+        .with_min_len(TASK_ITEMS)
+        .flat_map_iter(|index| sides(TriangleId(index)))
+        .collect()
 }
 
 fn cluster(start: usize, end: usize, parent: u32) -> Cluster {

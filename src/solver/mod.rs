@@ -268,7 +268,7 @@ impl Solver {
         report.epsilon = self.refine(report.epsilon, cancel)?;
         self.probe_contacts(cancel)?;
         // Links that are coarse err by more than light that has not quite settled.
-        let tolerance = self.settings.tolerance * fineness.sqrt();
+        let tolerance = self.settings.tolerance * fineness;
         self.iterate(&mut report, tolerance, cancel)?;
         self.gather_for_leaves(is_coarse(fineness), cancel)?;
         cancel.proceed()?;

@@ -17,6 +17,9 @@ use crate::{
 /// take light that is not theirs until the other rays are shot.
 const ROUGH_SHARE: f32 = 0.125;
 
+/// Of the rays that each group and cell has at least, coarse steps shoot one in this many.
+const ROUGH_DIVISOR: usize = 2;
+
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
 const GROUP_PATCHES: u32 = 64;
 
@@ -176,6 +179,15 @@ impl Prober<'_> {
         (rays as f32 * self.share) as usize
     }
 
+    /// What is shot at least of so many rays.
+    fn least(&self, rays: usize) -> usize {
+        if self.is_rough {
+            rays / ROUGH_DIVISOR
+        } else {
+            rays
+        }
+    }
+
     /// What one ray from a cell meets.
     fn look(&self, cell: usize, number: usize) -> Met {
         self.probe(cell, 1, number as u32)
@@ -192,7 +204,10 @@ impl Prober<'_> {
                         > 0.0
             })
         };
-        let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
+        let first_look = |group: &[usize]| {
+            self.least(GROUP_RAYS)
+                .max(self.budget(group.len() / CELLS_PER_RAY))
+        };
         let mut closed: Vec<bool> = groups
             .par_iter()
             .map(|group| look(group, 0, first_look(group)))
@@ -230,7 +245,7 @@ impl Prober<'_> {
         let count = |part: &[usize]| {
             let share = part.iter().map(area).sum::<f32>() / whole;
             let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
-            (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
+            (count as usize).clamp(self.least(LEAST_CELL_RAYS), MOST_CELL_RAYS)
         };
         let look = |part: &[usize]| match part {
             [cell] => self.probe(*cell, count(part) as u32, 0),
