@@ -274,8 +274,8 @@ impl DirectField {
         most * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
-    /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance. Returns the rays
-    /// shot.
+    /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance, where they have not
+    /// had so many rays yet. Returns the rays shot.
     fn probe_centres(
         &mut self,
         rays: &RayTree,
@@ -292,7 +292,7 @@ impl DirectField {
             .filter(|&leaf| {
                 hierarchy.mesh.is_held(leaf)
                     && hierarchy.mesh.elements[leaf].is_open()
-                    && self.centres[leaf].is_none()
+                    && self.centres[leaf].is_none_or(|light| light.tried < limits.shadow_samples)
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
                         || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
             })
@@ -301,7 +301,10 @@ impl DirectField {
             .iter()
             .map(|&leaf| centre_of(hierarchy, leaf))
             .collect();
-        let mut lights = vec![DirectLight::default(); receivers.len()];
+        let known = unknown.iter().map(|&leaf| self.centres[leaf]);
+        let mut lights: Vec<DirectLight> = known.map(Option::unwrap_or_default).collect();
+        let shot = |lights: &[DirectLight]| lights.iter().map(|light| u64::from(light.shot)).sum();
+        let before: u64 = shot(&lights);
         let samples = limits.shadow_samples;
         self.lights.shoot(
             rays,
@@ -316,12 +319,11 @@ impl DirectField {
             limits.is_noisy(light, share_root(hierarchy, unknown[index]), mean)
         };
         self.double(rays, &receivers, noisy, limits.seed, &mut lights, cancel)?;
-        let mut ray_count = 0;
+        let after: u64 = shot(&lights);
         for (leaf, light) in unknown.into_iter().zip(lights) {
-            ray_count += u64::from(light.shot);
             self.centres[leaf] = Some(light);
         }
-        Some(ray_count)
+        Some(after - before)
     }
 
     /// Those of some leaves whose corners do not tell what lies between.
