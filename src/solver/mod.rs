@@ -83,9 +83,6 @@ impl Cancel {
 /// comes soon; the first step shoots the others.
 const FIRST_RAYS: usize = 1 << 20;
 
-/// Shadow rays of a vertex in coarse steps: half of all, but so many at least. Fewer, and shadows are missed.
-const LEAST_COARSE_SAMPLES: u32 = 8;
-
 /// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
 /// again costs more than the new ones.
 const THRESHOLD_FACTOR: f32 = 2.0;
@@ -217,8 +214,7 @@ impl Solver {
         self.divide_coarse(limits);
         self.divide_contacts(cancel)?;
         let most = (FIRST_RAYS / self.hierarchy.mesh.vertices.len().max(1)).max(1);
-        let first = self.direct_limits(self.fineness_of(1));
-        let (count, seed) = (first.shadow_samples.min(most as u32), limits.seed);
+        let (count, seed) = (limits.shadow_samples.min(most as u32), limits.seed);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
@@ -418,14 +414,10 @@ impl Solver {
     }
 
     fn direct_limits(&self, fineness: f32) -> adapt::Limits {
-        let samples = self.settings.shadow_samples;
         adapt::Limits {
             tolerance: self.settings.mesh_tolerance * fineness,
             min_area: self.min_area(),
-            shadow_samples: match is_coarse(fineness) {
-                true => samples.min((samples / 2).max(LEAST_COARSE_SAMPLES)),
-                false => samples,
-            },
+            shadow_samples: self.settings.shadow_samples,
             seed: self.settings.seed,
             most_elements: self.most_elements(),
         }
