@@ -17,9 +17,6 @@ use crate::{
 /// take light that is not theirs until the other rays are shot.
 const ROUGH_SHARE: f32 = 0.125;
 
-/// Of the rays that each group and cell has at least, coarse steps shoot one in this many.
-const ROUGH_DIVISOR: usize = 2;
-
 /// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
 const GROUP_PATCHES: u32 = 64;
 
@@ -132,7 +129,6 @@ pub(super) fn closures(
         rays,
         seed,
         cancel,
-        is_rough: is_coarse,
         share: if is_coarse { ROUGH_SHARE } else { 1.0 } / cost,
     };
     let count = match known.count() {
@@ -167,8 +163,6 @@ struct Prober<'a> {
     rays: &'a RayTree,
     seed: u64,
     cancel: &'a Cancel,
-    /// Whether a first look is enough.
-    is_rough: bool,
     /// Rays that are shot, of all that would be if each cost what usual ones do.
     share: f32,
 }
@@ -177,15 +171,6 @@ impl Prober<'_> {
     /// What is shot of so many rays.
     fn budget(&self, rays: usize) -> usize {
         (rays as f32 * self.share) as usize
-    }
-
-    /// What is shot at least of so many rays.
-    fn least(&self, rays: usize) -> usize {
-        if self.is_rough {
-            rays / ROUGH_DIVISOR
-        } else {
-            rays
-        }
     }
 
     /// What one ray from a cell meets.
@@ -204,16 +189,13 @@ impl Prober<'_> {
                         > 0.0
             })
         };
-        let first_look = |group: &[usize]| {
-            self.least(GROUP_RAYS)
-                .max(self.budget(group.len() / CELLS_PER_RAY))
-        };
+        let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
         let mut closed: Vec<bool> = groups
             .par_iter()
             .map(|group| look(group, 0, first_look(group)))
             .collect();
         let mut shot: usize = groups.iter().map(|group| first_look(group)).sum();
-        if !self.is_rough && closed.iter().any(|is_closed| !is_closed) {
+        if closed.iter().any(|is_closed| !is_closed) {
             let count = (self.budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
             closed
                 .par_iter_mut()
@@ -245,7 +227,7 @@ impl Prober<'_> {
         let count = |part: &[usize]| {
             let share = part.iter().map(area).sum::<f32>() / whole;
             let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
-            (count as usize).clamp(self.least(LEAST_CELL_RAYS), MOST_CELL_RAYS)
+            (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
         };
         let look = |part: &[usize]| match part {
             [cell] => self.probe(*cell, count(part) as u32, 0),
