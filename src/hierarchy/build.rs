@@ -136,7 +136,7 @@ fn subtree(
             || subtree(after, start + count, depth + 1, cancelled),
         );
         clusters[0].first_child = 1;
-        graft(&mut clusters, [first?, second?]);
+        graft(&mut clusters, &[first?, second?]);
         return Some(clusters);
     }
     let mut pending = vec![(0usize, depth)];
@@ -163,8 +163,8 @@ fn subtree(
 }
 
 /// Put two subtrees below a root: the pair of their roots, then what is below the first, then what is below the second.
-fn graft(clusters: &mut Vec<Cluster>, subtrees: [Vec<Cluster>; 2]) {
-    for tree in &subtrees {
+fn graft(clusters: &mut Vec<Cluster>, subtrees: &[Vec<Cluster>; 2]) {
+    for tree in subtrees {
         clusters.push(Cluster {
             parent: 0,
             ..tree[0]

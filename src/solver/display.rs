@@ -50,7 +50,7 @@ impl Solver {
         let mesh = mesh?;
         cancel.proceed()?;
         let (light, clusters) = rayon::join(
-            || self.vertex_light(means, &mesh),
+            || self.vertex_light(&means, &mesh),
             || self.cluster_boxes(cancel),
         );
         let clusters = clusters?;
@@ -162,7 +162,7 @@ impl Solver {
         if place.is_finite() { place } else { uv[0] }
     }
 
-    fn vertex_light(&self, means: VertexMeans, mesh: &DisplayMesh) -> VertexLight {
+    fn vertex_light(&self, means: &VertexMeans, mesh: &DisplayMesh) -> VertexLight {
         let count = means.irradiance.len();
         let mut light = VertexLight {
             irradiance: Vec::with_capacity(count),
