@@ -274,8 +274,8 @@ impl DirectField {
         most * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
-    /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance, where they have not
-    /// had so many rays yet. Returns the rays shot.
+    /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance. Returns the rays
+    /// shot.
     fn probe_centres(
         &mut self,
         rays: &RayTree,
@@ -292,7 +292,7 @@ impl DirectField {
             .filter(|&leaf| {
                 hierarchy.mesh.is_held(leaf)
                     && hierarchy.mesh.elements[leaf].is_open()
-                    && self.centres[leaf].is_none_or(|light| light.tried < limits.shadow_samples)
+                    && self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
                         || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
             })
@@ -301,10 +301,7 @@ impl DirectField {
             .iter()
             .map(|&leaf| centre_of(hierarchy, leaf))
             .collect();
-        let known = unknown.iter().map(|&leaf| self.centres[leaf]);
-        let mut lights: Vec<DirectLight> = known.map(Option::unwrap_or_default).collect();
-        let shot = |lights: &[DirectLight]| lights.iter().map(|light| u64::from(light.shot)).sum();
-        let before: u64 = shot(&lights);
+        let mut lights = vec![DirectLight::default(); receivers.len()];
         let samples = limits.shadow_samples;
         self.lights.shoot(
             rays,
@@ -319,18 +316,20 @@ impl DirectField {
             limits.is_noisy(light, share_root(hierarchy, unknown[index]), mean)
         };
         self.double(rays, &receivers, noisy, limits.seed, &mut lights, cancel)?;
-        let after: u64 = shot(&lights);
+        let mut ray_count = 0;
         for (leaf, light) in unknown.into_iter().zip(lights) {
+            ray_count += u64::from(light.shot);
             self.centres[leaf] = Some(light);
         }
-        Some(after - before)
+        Some(ray_count)
     }
 
     /// Those of some leaves whose corners do not tell what lies between.
     fn bent(&self, hierarchy: &Hierarchy, leaves: &[usize], limits: Limits, mean: f32) -> Vec<u32> {
         let mesh = &hierarchy.mesh;
-        let leaves = leaves.iter().copied();
         leaves
+            .iter()
+            .copied()
             .filter(|&leaf| {
                 let element = &mesh.elements[leaf];
                 let area = element.area_vector.length();

@@ -207,8 +207,8 @@ impl DirectField {
         disputed
     }
 
-    /// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal is nearest to the mean
-    /// normal about the vertex, of those that are not within a solid there.
+    /// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal
+    /// is nearest to the mean normal about the vertex, of those that are not within a solid there.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,

@@ -22,10 +22,9 @@ impl Solver {
     pub(super) fn show(&mut self, cancel: &Cancel) -> Option<()> {
         let held = &self.snapshot.mesh;
         let has_changed = held.indices.is_empty()
-            || held.own_vertex_count() != self.hierarchy.mesh.vertices.len();
+            || held.own_vertex_count() != self.hierarchy.mesh.vertices.len()
+            || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown();
         cancel.proceed()?;
-        let has_changed =
-            has_changed || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown();
         let triangles = has_changed.then(|| self.hierarchy.mesh.closed_triangles());
         cancel.proceed()?;
         // None of these needs the others.

@@ -236,8 +236,14 @@ impl Solver {
             true => Arc::new(RayTree::new(&self.scene)),
             false => self.rays.clone(),
         };
-        let (known, seed) = ((&self.closures, is_coarse(fineness)), self.settings.seed);
-        let (closures, shot) = prober::closures(&self.hierarchy, &rays, known, seed, cancel)?;
+        let (closures, shot) = prober::closures(
+            &self.hierarchy,
+            &rays,
+            &self.closures,
+            is_coarse(fineness),
+            self.settings.seed,
+            cancel,
+        )?;
         self.closures = closures;
         self.ray_count += shot;
         Some(())

@@ -114,12 +114,13 @@ fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure
     }
 }
 
-/// Closures of all cells for coarse links or for others, and the rays shot; `None` when cancelled. The cells are those of what
-/// is `known`, or, where nothing is, the leaves of the mesh as it is now.
+/// Closures of all cells for coarse links or for others, and the rays shot; `None` when cancelled. The cells are those of
+/// what is `known`, or, where nothing is, the leaves of the mesh as it is now.
 pub(super) fn closures(
     hierarchy: &Hierarchy,
     rays: &RayTree,
-    (known, is_coarse): (&Closures, bool),
+    known: &Closures,
+    is_coarse: bool,
     seed: u64,
     cancel: &Cancel,
 ) -> Option<(Closures, u64)> {
