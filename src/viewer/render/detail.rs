@@ -45,6 +45,8 @@ impl DetailSet {
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            // Floors are seen at a slant.
+            anisotropy_clamp: 16,
             ..Default::default()
         });
         let white = Texture {
