@@ -15,7 +15,10 @@ use super::{
     Patch,
     edge_leaves::{Edge, EdgeLeaves, EdgeMap},
 };
-use crate::scene::{DisjointSets, HalfEdge, Scene, half_edges};
+use crate::{
+    geometry::barycentric_in_plane,
+    scene::{DisjointSets, HalfEdge, Scene, half_edges},
+};
 
 /// Halvings at most, but for what balance asks: beyond, single precision cannot tell neighbours apart.
 const DEEPEST_LEVEL: u8 = 28;
@@ -204,6 +207,21 @@ impl Mesh {
     pub fn corners(&self, element: usize) -> [Vec3; 3] {
         let [a, b, c] = self.elements[element].vertices;
         [self.position(a), self.position(b), self.position(c)]
+    }
+
+    /// The leaf below an element that holds a point of it.
+    pub fn leaf_at(&self, mut element: usize, point: Vec3) -> Option<usize> {
+        let depth_inside =
+            |child: usize| barycentric_in_plane(point, self.corners(child)).min_element();
+        loop {
+            let at = self.elements.get(element)?;
+            if at.is_leaf() {
+                return Some(element);
+            }
+            element = at
+                .children()
+                .max_by(|&a, &b| depth_inside(a).total_cmp(&depth_inside(b)))?;
+        }
     }
 
     /// The leaves in order.

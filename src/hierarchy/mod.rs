@@ -197,12 +197,18 @@ impl Hierarchy {
         self.clusters[0].patches()
     }
 
-    /// The patch that a ray of the given direction meets on a triangle, if that side is lit.
+    /// The patch that a ray of the given direction meets on a triangle, if a cluster holds it: if light is computed for it.
     pub fn patch_met(&self, triangle: TriangleId, direction: Vec3) -> Option<usize> {
+        let patch = self.side_met(triangle, direction)?;
+        self.held().contains(&patch).then_some(patch)
+    }
+
+    /// The patch that a ray of the given direction meets on a triangle, unless it is the back of a one-sided surface.
+    pub fn side_met(&self, triangle: TriangleId, direction: Vec3) -> Option<usize> {
         let [front, back] = self.sides[triangle.index()];
         let meets_front = self.patches[front as usize].normal.dot(direction) < 0.0;
         let patch = if meets_front { front } else { back };
-        Some(patch as usize).filter(|patch| self.held().contains(patch))
+        (patch != u32::MAX).then_some(patch as usize)
     }
 
     /// The clusters that hold a patch, the root first; none where it is left out.

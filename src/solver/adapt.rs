@@ -36,6 +36,8 @@ const MOST_ROUNDS: u32 = 8;
 pub(super) struct Limits {
     /// Error of interpolation, times the root of the element's share of the area, relative to the mean.
     pub tolerance: f32,
+    /// Contrast of an error, times the fourth root of the element's share of the area; infinite where it does not count.
+    pub contrast: f32,
     /// Children are not smaller, frame units.
     pub min_area: f32,
     /// Shadow rays per point.
@@ -294,6 +296,7 @@ impl DirectField {
                     && hierarchy.mesh.elements[leaf].is_open()
                     && self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
+                        || self.may_show(hierarchy, leaf, limits, mean)
                         || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
             })
             .collect();
@@ -344,6 +347,7 @@ impl DirectField {
                 let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
                 let weight = share_root(hierarchy, leaf) / mean.max(f32::MIN_POSITIVE);
                 bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
+                    || self.shows(hierarchy, leaf, &centre, limits, mean)
             })
             .map(|leaf| leaf as u32)
             .collect()

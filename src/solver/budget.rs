@@ -27,6 +27,7 @@ impl Solver {
             + self.closures.memory_bytes()
             + size_of_val(self.linked.as_slice())
             + size_of_val(self.leaves.as_slice())
+            + size_of_val(self.gathered.as_slice())
             + self.direct.as_ref().map_or(0, DirectField::memory_bytes)
             + self.relighting.memory_bytes()
             + self.snapshot.memory_bytes();

@@ -24,10 +24,16 @@ const NOISE_SHARE: f32 = 0.25;
 const MOST_SAMPLES: u32 = 16;
 
 impl Limits {
+    /// Shadow rays of a point at most.
+    pub(super) fn most_samples(&self) -> u32 {
+        MOST_SAMPLES * self.shadow_samples
+    }
+
     /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root.
     pub(super) fn is_noisy(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
-        light.tried < MOST_SAMPLES * self.shadow_samples
-            && light.error() * weight > NOISE_SHARE * self.tolerance * mean
+        light.tried < self.most_samples()
+            && (light.error() * weight > NOISE_SHARE * self.tolerance * mean
+                || self.is_grainy(light, weight, mean))
     }
 }
 
@@ -94,8 +100,13 @@ impl DirectField {
     ) -> Option<u64> {
         let areas = hierarchy.mesh.areas_about_vertices();
         let weight = |vertex: usize| (areas[vertex] / (3.0 * hierarchy.area as f32)).sqrt();
+        let disputed = self.disputed(hierarchy, 0..hierarchy.mesh.elements.len());
+        let may_be_noisy = |vertex: usize, light: &DirectLight| {
+            limits.is_noisy(light, weight(vertex), mean)
+                || disputed[vertex] && limits.is_doubtful(light, weight(vertex), mean)
+        };
         let is_noisy = |vertex: usize, light: Option<DirectLight>| {
-            light.is_some_and(|light| limits.is_noisy(&light, weight(vertex), mean))
+            light.is_some_and(|light| may_be_noisy(vertex, &light))
         };
         let mut known = self.vertices.iter().enumerate();
         if !known.any(|(vertex, light)| is_noisy(vertex, *light)) {
@@ -104,14 +115,10 @@ impl DirectField {
         let elements = 0..hierarchy.mesh.elements.len();
         let receivers = self.receivers(hierarchy, elements, is_noisy);
         let before = self.shot(&receivers);
-        let weights: Vec<f32> = receivers
-            .iter()
-            .map(|&(vertex, _)| weight(vertex as usize))
-            .collect();
         let mut known = self.known(&receivers);
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
         let noisy =
-            |index: usize, light: &DirectLight| limits.is_noisy(light, weights[index], mean);
+            |index: usize, light: &DirectLight| may_be_noisy(receivers[index].0 as usize, light);
         self.double(rays, &places, noisy, limits.seed, &mut known, cancel)?;
         self.learn(&receivers, known);
         Some(self.shot(&receivers) - before)
@@ -207,65 +214,74 @@ impl DirectField {
         disputed
     }
 
-    /// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal
-    /// is nearest to the mean normal about the vertex, of those that are not within a solid there.
+    /// As [`vertex_places`] has it, by what is known of each vertex.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
         elements: Range<usize>,
         is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,
     ) -> Vec<(u32, Receiver)> {
-        let mesh = &hierarchy.mesh;
         let known = self.vertices.iter().enumerate();
         let is_wanted: Vec<bool> = known
             .map(|(vertex, light)| is_wanted(vertex, *light))
             .collect();
-        let about_wanted: Vec<usize> = mesh
-            .leaves_among(elements)
-            .filter(|&leaf| {
-                let corners = mesh.elements[leaf].vertices;
-                corners.iter().any(|&vertex| is_wanted[vertex as usize])
-            })
-            .collect();
-        let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
-        for &leaf in &about_wanted {
-            for &vertex in &mesh.elements[leaf].vertices {
-                normals[vertex as usize] += mesh.elements[leaf].area_vector;
-            }
-        }
-        /// How fit a leaf is, and which one it is.
-        type Choice = ((bool, f32), u32);
-        let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
-        for leaf in about_wanted.into_iter().filter(|&leaf| mesh.is_held(leaf)) {
-            let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
-            for (side, vertex) in element.vertices.into_iter().enumerate() {
-                let vertex = vertex as usize;
-                let fitness = (!element.is_covered(side), normals[vertex].dot(normal));
-                let is_best = chosen[vertex].is_none_or(|(best, _)| fitness > best);
-                if is_best && is_wanted[vertex] {
-                    chosen[vertex] = Some((fitness, leaf as u32));
-                }
-            }
-        }
-        let receiver = |(vertex, choice): (usize, Option<Choice>)| {
-            let (_, leaf) = choice?;
-            let patch = hierarchy.patch_of(leaf as usize);
-            let centroid = mesh.elements[leaf as usize].centroid;
-            let point = mesh.position(vertex as u32).lerp(centroid, INSET);
-            let normal = normals[vertex].try_normalize().unwrap_or(patch.normal);
-            Some((
-                vertex as u32,
-                Receiver {
-                    point,
-                    normal,
-                    triangle: patch.triangle,
-                },
-            ))
-        };
-        chosen
-            .into_iter()
-            .enumerate()
-            .filter_map(receiver)
-            .collect()
+        vertex_places(hierarchy, elements, &is_wanted)
     }
+}
+
+/// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal
+/// is nearest to the mean normal about the vertex, of those that are not within a solid there.
+pub(super) fn vertex_places(
+    hierarchy: &Hierarchy,
+    elements: Range<usize>,
+    is_wanted: &[bool],
+) -> Vec<(u32, Receiver)> {
+    let mesh = &hierarchy.mesh;
+    let about_wanted: Vec<usize> = mesh
+        .leaves_among(elements)
+        .filter(|&leaf| {
+            let corners = mesh.elements[leaf].vertices;
+            corners.iter().any(|&vertex| is_wanted[vertex as usize])
+        })
+        .collect();
+    let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
+    for &leaf in &about_wanted {
+        for &vertex in &mesh.elements[leaf].vertices {
+            normals[vertex as usize] += mesh.elements[leaf].area_vector;
+        }
+    }
+    /// How fit a leaf is, and which one it is.
+    type Choice = ((bool, f32), u32);
+    let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
+    for leaf in about_wanted.into_iter().filter(|&leaf| mesh.is_held(leaf)) {
+        let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
+        for (side, vertex) in element.vertices.into_iter().enumerate() {
+            let vertex = vertex as usize;
+            let fitness = (!element.is_covered(side), normals[vertex].dot(normal));
+            let is_best = chosen[vertex].is_none_or(|(best, _)| fitness > best);
+            if is_best && is_wanted[vertex] {
+                chosen[vertex] = Some((fitness, leaf as u32));
+            }
+        }
+    }
+    let receiver = |(vertex, choice): (usize, Option<Choice>)| {
+        let (_, leaf) = choice?;
+        let patch = hierarchy.patch_of(leaf as usize);
+        let centroid = mesh.elements[leaf as usize].centroid;
+        let point = mesh.position(vertex as u32).lerp(centroid, INSET);
+        let normal = normals[vertex].try_normalize().unwrap_or(patch.normal);
+        Some((
+            vertex as u32,
+            Receiver {
+                point,
+                normal,
+                triangle: patch.triangle,
+            },
+        ))
+    };
+    chosen
+        .into_iter()
+        .enumerate()
+        .filter_map(receiver)
+        .collect()
 }

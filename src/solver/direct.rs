@@ -479,6 +479,14 @@ impl DirectLight {
         fraction * (1.0 - fraction) / shot
     }
 
+    /// Standard error of the luminance as far as so few rays can tell, with half a hit and half a miss more: so that it is
+    /// above 0 where all agree.
+    pub(super) fn doubt(&self) -> f32 {
+        let shot = self.shot as f32 + 1.0;
+        let fraction = (self.visible as f32 + 0.5) / shot;
+        luminance(self.exact) * (fraction * (1.0 - fraction) / shot).sqrt()
+    }
+
     /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.
     pub(super) fn error(&self) -> f32 {
         luminance(self.exact) * self.fraction_variance().sqrt()

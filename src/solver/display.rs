@@ -36,7 +36,7 @@ impl Solver {
                         Some(triangles) => self.display_mesh(triangles, cancel).map(Arc::new),
                         None => Some(self.snapshot.mesh.clone()),
                     },
-                    || VertexMeans::new(&self.hierarchy, &self.leaves),
+                    || VertexMeans::new(&self.hierarchy, &self.leaves, &self.gathered),
                 )
             },
             || {

@@ -13,7 +13,6 @@ use super::{
     reconstruct::{link_irradiance, own_irradiance},
 };
 use crate::{
-    geometry::barycentric_in_plane,
     hierarchy::{Hierarchy, Kind, NodeId, Reading},
     transport::{Kernel, Link, luminance},
 };
@@ -60,20 +59,10 @@ impl Solver {
 
     /// The leaf below an element that holds a point of it.
     fn leaf_at(&self, node: NodeId, point: Vec3) -> Option<NodeId> {
-        let mesh = &self.hierarchy.mesh;
         let base = self.hierarchy.clusters.len();
-        let mut index = node.index().checked_sub(base)?;
-        let depth_inside =
-            |child: usize| barycentric_in_plane(point, mesh.corners(child)).min_element();
-        loop {
-            let element = mesh.elements.get(index)?;
-            if element.is_leaf() {
-                return Some(NodeId((base + index) as u32));
-            }
-            index = element
-                .children()
-                .max_by(|&a, &b| depth_inside(a).total_cmp(&depth_inside(b)))?;
-        }
+        let element = node.index().checked_sub(base)?;
+        let leaf = self.hierarchy.mesh.leaf_at(element, point)?;
+        Some(NodeId((base + leaf) as u32))
     }
 
     /// From the root to a node.

@@ -6,6 +6,7 @@
 
 mod adapt;
 mod anderson;
+mod border;
 mod budget;
 mod clear;
 mod closure;
@@ -13,8 +14,9 @@ mod contact;
 mod cover;
 mod direct;
 mod display;
-
+mod final_gather;
 mod gather;
+mod gathered;
 mod inspect;
 mod inspection;
 mod iterate;
@@ -126,6 +128,8 @@ pub struct Solver {
     /// Part of the view of each piece of surface that lit surfaces fill.
     closures: Closures,
     leaves: Vec<LeafLight>,
+    /// By what linked light at each vertex is multiplied; empty for 1.
+    gathered: Vec<Vec4>,
     mean_irradiance: f32,
     /// Whether the memory limit kept the last step from being finer.
     is_full: bool,
@@ -186,6 +190,7 @@ impl Solver {
             direct: (!lights.is_empty()).then(|| DirectField::new(lights)),
             linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
+            gathered: Vec::new(),
             mean_irradiance: 0.0,
             is_full: false,
             step: 0,
@@ -274,6 +279,10 @@ impl Solver {
         self.iterate(&mut report, tolerance, cancel)?;
         self.gather_for_leaves(is_coarse(fineness), cancel)?;
         cancel.proceed()?;
+        self.gathered.clear();
+        if self.is_full || report.step >= self.settings.max_steps {
+            self.final_gather(cancel)?;
+        }
         self.fill(&mut report);
         self.step = report.step;
         if self.show(cancel).is_none() {
@@ -420,8 +429,14 @@ impl Solver {
     }
 
     fn direct_limits(&self, fineness: f32) -> adapt::Limits {
+        let tolerance = self.settings.mesh_tolerance * fineness;
         adapt::Limits {
-            tolerance: self.settings.mesh_tolerance * fineness,
+            tolerance,
+            // Coarse steps are seen for a moment.
+            contrast: match is_coarse(fineness) {
+                true => f32::INFINITY,
+                false => border::CONTRAST_TOLERANCE * tolerance,
+            },
             min_area: self.min_area(),
             shadow_samples: self.settings.shadow_samples,
             seed: self.settings.seed,

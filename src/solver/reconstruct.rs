@@ -321,9 +321,9 @@ pub(super) struct VertexMeans {
 }
 
 impl VertexMeans {
-    /// Average what leaves found over the vertices that they share. Vertices that only close an edge take the mean of
-    /// its ends.
-    pub(super) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight]) -> Self {
+    /// Average what leaves found over the vertices that they share. Irradiance is multiplied by `factors`, or by
+    /// 1 where there are none. Vertices that only close an edge take the mean of its ends.
+    pub(super) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight], factors: &[Vec4]) -> Self {
         let count = hierarchy.mesh.vertices.len();
         let (mut irradiance, mut error) = (vec![Vec4::ZERO; count], vec![0.0f32; count]);
         let mut weight = vec![0.0f32; count];
@@ -361,6 +361,9 @@ impl VertexMeans {
             .map(|leaf| (leaf.element as usize, leaf.centre))
             .filter(|&(element, _)| hierarchy.mesh.elements[element].is_open());
         project(hierarchy, &mut irradiance, centres);
+        for (value, factor) in irradiance.iter_mut().zip(factors) {
+            *value *= *factor;
+        }
         for index in (0..count).filter(|&index| weight[index] <= 0.0) {
             if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {
                 // Ends were made before the vertices between them.

@@ -10,8 +10,8 @@ use glam::Vec4;
 use super::direct::DirectLight;
 use crate::hierarchy::Hierarchy;
 
-/// Rounds of averaging. One leaves visible grain, many widen narrow penumbrae.
-const ROUNDS: u32 = 2;
+/// Rounds of averaging. None leaves visible grain, many widen narrow penumbrae and draw their borders as saw teeth.
+const ROUNDS: u32 = 1;
 
 /// Standard errors by which neighbours may differ before they count by half. Smaller leaves grain, larger blurs borders.
 const HALF_DEVIATIONS: f32 = 3.0;

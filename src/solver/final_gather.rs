@@ -1,0 +1,220 @@
+//! Indirect light at vertices, gathered once more by rays where links are found to be wrong.
+//!
+//! A link knows of what stands between its ends only which part gets through, and it takes that part for the same all
+//! over its receiver. In the corner between a floor and what stands on it that shows: light from beyond the object
+//! leaks into the corner, however small the elements there are. So a few cosine-weighted rays from each vertex look at
+//! the radiosity of what they meet. Where vertices and their neighbours together find something else than the links,
+//! many rays do. What is kept is a factor by vertex, so that it holds for other lights on the same links, too.
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::{
+    Cancel, Solver,
+    adapt::Limits,
+    contact::carry_over,
+    cover::vertex_places,
+    direct::Receiver,
+    gathered::{Gathered, factors},
+    reconstruct::VertexMeans,
+};
+use crate::{
+    geometry::{Random, cosine_direction, low_discrepancy_2d},
+    hierarchy::{Element, Hierarchy},
+    transport::luminance,
+};
+
+/// Rays from each vertex. Fewer miss shallow corners, more cost time everywhere.
+const LOOKING: u32 = 16;
+
+/// Of these, so many may meet backs. From a vertex that lies within something what rays find is dark, and would show
+/// around it.
+const MOST_BACKS: u32 = LOOKING / 4;
+
+/// Rays from a vertex in a corner at most. Fewer leave grain, more cost time there.
+const GATHERING: u32 = 256;
+
+/// Standard errors by which what a vertex and its neighbours find must differ from what links tell to be a corner.
+/// Smaller gathers by chance, larger misses corners.
+const DEVIATIONS: f32 = 1.5;
+
+/// Part of the light at a vertex that must be indirect for rays to look at it.
+const LEAST_INDIRECT: f32 = 0.1;
+
+/// A vertex that rays look at.
+struct Look {
+    vertex: usize,
+    place: Receiver,
+    /// Linked irradiance.
+    linked: Vec4,
+    /// Luminance of all irradiance.
+    all: f32,
+    /// Root of the vertex's share of the area.
+    weight: f32,
+    found: Gathered,
+}
+
+impl Look {
+    /// Whether noise of what was found would show.
+    fn is_noisy(&self, limits: Limits) -> bool {
+        let (_, variance) = self.found.gap(self.linked);
+        limits.is_noise_seen(variance.sqrt(), self.all, self.weight)
+    }
+}
+
+impl Solver {
+    /// Find out by what linked light at vertices is to be multiplied.
+    pub(super) fn final_gather(&mut self, cancel: &Cancel) -> Option<()> {
+        if self.rays.is_clear() {
+            return Some(());
+        }
+        let mut looks = self.looks();
+        let limits = self.direct_limits(1.0);
+        self.gather_at(&mut looks, |_| LOOKING, cancel)?;
+        looks.retain(|look| look.found.backs <= MOST_BACKS);
+        let is_corner = in_corners(&self.hierarchy, &looks, limits);
+        let mut most = LOOKING;
+        while most < GATHERING {
+            most *= 2;
+            let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(limits) {
+                true => most,
+                false => look.found.rays,
+            };
+            self.gather_at(&mut looks, more, cancel)?;
+        }
+        let mesh = &self.hierarchy.mesh;
+        let mut ratios = vec![None; mesh.vertices.len()];
+        for look in &looks {
+            ratios[look.vertex] = Some(look.found.over(look.linked));
+        }
+        let mut factors = factors(ratios, &edges(&self.hierarchy));
+        let tells = |element: &Element, side| !element.is_covered(side);
+        carry_over(mesh, tells, &mut factors);
+        self.gathered = factors;
+        Some(())
+    }
+
+    /// The vertices at which enough light is indirect.
+    fn looks(&self) -> Vec<Look> {
+        let means = VertexMeans::new(&self.hierarchy, &self.leaves, &[]);
+        let mesh = &self.hierarchy.mesh;
+        let areas = mesh.areas_about_vertices();
+        let weight = |vertex: usize| (areas[vertex] / (3.0 * self.hierarchy.area as f32)).sqrt();
+        let look = |(vertex, place): (u32, Receiver)| {
+            let linked = means.irradiance[vertex as usize];
+            let direct = match &self.direct {
+                Some(field) => field.corner(vertex),
+                None => Vec4::ZERO,
+            };
+            let all = luminance(linked + direct);
+            (luminance(linked) > LEAST_INDIRECT * all).then(|| Look {
+                vertex: vertex as usize,
+                place,
+                linked,
+                all,
+                weight: weight(vertex as usize),
+                found: Gathered::default(),
+            })
+        };
+        let all = vec![true; mesh.vertices.len()];
+        let places = vertex_places(&self.hierarchy, 0..mesh.elements.len(), &all);
+        places.into_iter().filter_map(look).collect()
+    }
+
+    /// Shoot rays until each vertex has had as many as are wanted.
+    fn gather_at(
+        &mut self,
+        looks: &mut [Look],
+        wanted: impl Fn(&Look) -> u32 + Sync,
+        cancel: &Cancel,
+    ) -> Option<()> {
+        let this = &*self;
+        let shot: Vec<u32> = looks
+            .par_iter_mut()
+            .with_min_len(16)
+            .map(|look| {
+                if cancel.is_cancelled() {
+                    return 0;
+                }
+                let mut random = Random::new(this.settings.seed, look.vertex as u64);
+                let shift = random.uniform_2d();
+                let (before, rays) = (look.found.rays, wanted(look));
+                for index in before..rays {
+                    let square = low_discrepancy_2d(index, shift);
+                    let direction = cosine_direction(look.place.normal, square);
+                    look.found.count(this.radiosity_met(&look.place, direction));
+                }
+                rays - before
+            })
+            .collect();
+        cancel.proceed()?;
+        self.ray_count += shot.into_iter().map(u64::from).sum::<u64>();
+        Some(())
+    }
+
+    /// Radiosity of what a ray meets first; `None` where that is the back of a one-sided surface.
+    fn radiosity_met(&self, from: &Receiver, direction: Vec3) -> Option<Vec4> {
+        let hit = self
+            .rays
+            .closest(from.point, direction, Some(from.triangle));
+        let Some(hit) = hit else {
+            return Some(Vec4::ZERO);
+        };
+        let hierarchy = &self.hierarchy;
+        let patch = hierarchy.side_met(hit.triangle, direction)?;
+        if !hierarchy.held().contains(&patch) {
+            return Some(Vec4::ZERO);
+        }
+        let point = from.point + direction * hit.distance;
+        let leaf = hierarchy.mesh.leaf_at(patch, point)?;
+        Some(self.power.elements[leaf].truncate().extend(0.0))
+    }
+}
+
+/// Vertices at the ends of the edges of leaves; inner edges come twice.
+fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
+    let mesh = &hierarchy.mesh;
+    let of = |leaf: usize| {
+        let [a, b, c] = mesh.elements[leaf].vertices.map(|vertex| vertex as usize);
+        [[a, b], [b, c], [c, a]]
+    };
+    mesh.held_leaves().flat_map(of).collect()
+}
+
+/// Vertices that find something else than links tell, together with their neighbours, and these neighbours.
+fn in_corners(hierarchy: &Hierarchy, looks: &[Look], limits: Limits) -> Vec<bool> {
+    let mesh = &hierarchy.mesh;
+    let count = mesh.vertices.len();
+    // Gap, its variance, and how many.
+    let mut own = vec![(0.0f32, 0.0f32, 0.0f32); count];
+    for look in looks {
+        let (gap, variance) = look.found.gap(look.linked);
+        own[look.vertex] = (gap, variance, 1.0);
+    }
+    let mut pooled = own.clone();
+    for leaf in mesh.held_leaves() {
+        let vertices = mesh.elements[leaf].vertices.map(|vertex| vertex as usize);
+        for (side, &vertex) in vertices.iter().enumerate() {
+            // The next corner is the last one of the neighbour: so each is taken once, but at borders.
+            let next = own[vertices[(side + 1) % 3]];
+            let sum = &mut pooled[vertex];
+            *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
+        }
+    }
+    let mut differs = vec![false; count];
+    for look in looks {
+        let (gap, variance, number) = pooled[look.vertex];
+        let is_seen = limits.is_seen(gap.abs() / number.max(1.0), look.all, look.weight);
+        differs[look.vertex] = is_seen && gap * gap > DEVIATIONS * DEVIATIONS * variance;
+    }
+    let mut wanted = differs.clone();
+    for leaf in mesh.held_leaves() {
+        let vertices = mesh.elements[leaf].vertices.map(|vertex| vertex as usize);
+        if vertices.iter().any(|&vertex| differs[vertex]) {
+            for vertex in vertices {
+                wanted[vertex] = true;
+            }
+        }
+    }
+    wanted
+}
