@@ -27,9 +27,16 @@ use crate::{
 /// Rays from each vertex. Fewer miss shallow corners, more cost time everywhere.
 const LOOKING: u32 = 16;
 
-/// Of these, so many may meet backs. From a vertex that lies within something what rays find is dark, and would show
+/// Rays from all vertices, about: of large meshes fewer are shot from each. Fewer tell less than links do, more take longer
+/// than all steps before.
+const MOST_LOOKING: usize = 1 << 21;
+
+/// Rays from each vertex at least.
+const LEAST_LOOKING: u32 = 2;
+
+/// One of so many rays may meet a back. From a vertex that lies within something what rays find is dark, and would show
 /// around it.
-const MOST_BACKS: u32 = LOOKING / 4;
+const RAYS_OF_BACK: u32 = 4;
 
 /// Rays from a vertex in a corner at most. Fewer leave grain, more cost time there.
 const GATHERING: u32 = 256;
@@ -70,10 +77,12 @@ impl Solver {
         }
         let mut looks = self.looks();
         let limits = self.direct_limits(1.0);
-        self.gather_at(&mut looks, |_| LOOKING, cancel)?;
-        looks.retain(|look| look.found.backs <= MOST_BACKS);
+        let looking = MOST_LOOKING / looks.len().max(1);
+        let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
+        self.gather_at(&mut looks, |_| looking, cancel)?;
+        looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
         let is_corner = in_corners(&self.hierarchy, &looks, limits);
-        let mut most = LOOKING;
+        let mut most = looking;
         while most < GATHERING {
             most *= 2;
             let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(limits) {
