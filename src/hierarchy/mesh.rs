@@ -87,6 +87,12 @@ impl Element {
         self.first_child == Self::LEAF
     }
 
+    /// Vertices at the ends of its edges, in order.
+    pub fn edges(&self) -> [[usize; 2]; 3] {
+        let [a, b, c] = self.vertices.map(|vertex| vertex as usize);
+        [[a, b], [b, c], [c, a]]
+    }
+
     /// Its children among the elements; none of a leaf.
     pub fn children(&self) -> Range<usize> {
         if self.is_leaf() {

@@ -120,6 +120,14 @@ pub(super) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     (area / hierarchy.area as f32).sqrt()
 }
 
+/// The same for each vertex: a third of the leaves about it is its own.
+pub(super) fn vertex_share_roots(hierarchy: &Hierarchy) -> Vec<f32> {
+    let areas = hierarchy.mesh.areas_about_vertices().into_iter();
+    areas
+        .map(|area| (area / (3.0 * hierarchy.area as f32)).sqrt())
+        .collect()
+}
+
 /// The centroid of an element, as a place to be lit.
 pub(super) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
     let patch = hierarchy.patch_of(element);

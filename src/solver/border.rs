@@ -54,7 +54,9 @@ impl DirectField {
         limits: Limits,
         mean: f32,
     ) -> bool {
-        let Corners { most, least, noise } = self.corners(hierarchy, element);
+        let Corners {
+            most, least, noise, ..
+        } = self.corners(hierarchy, element);
         let spread = most - least - NOISE_DEVIATIONS * noise;
         limits.is_seen(spread, mean.max(most), share_root(hierarchy, element))
     }
@@ -68,13 +70,12 @@ impl DirectField {
         limits: Limits,
         mean: f32,
     ) -> bool {
-        let vertices = hierarchy.mesh.elements[element].vertices;
-        let Corners { most, least, noise } = self.corners(hierarchy, element);
-        let between = vertices
-            .map(|vertex| luminance(self.corner(vertex)))
-            .iter()
-            .sum::<f32>()
-            / 3.0;
+        let Corners {
+            most,
+            least,
+            mean: between,
+            noise,
+        } = self.corners(hierarchy, element);
         let at_centre = luminance(centre.irradiance());
         let bend = (at_centre - between).abs() + SPREAD_SHARE * (most - least);
         let noise = centre.error().hypot(noise);
@@ -97,6 +98,7 @@ impl DirectField {
         Corners {
             most,
             least,
+            mean: values.iter().sum::<f32>() / 3.0,
             noise: noise / (lights.len() as f32).sqrt(),
         }
     }
@@ -106,6 +108,7 @@ impl DirectField {
 struct Corners {
     most: f32,
     least: f32,
+    mean: f32,
     /// Standard error of one of them, in the root mean square.
     noise: f32,
 }

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{
     Cancel,
-    adapt::{DirectField, Limits},
+    adapt::{DirectField, Limits, vertex_share_roots},
     direct::{DirectLight, Receiver},
     reconstruct::INSET,
 };
@@ -98,12 +98,17 @@ impl DirectField {
         mean: f32,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let areas = hierarchy.mesh.areas_about_vertices();
-        let weight = |vertex: usize| (areas[vertex] / (3.0 * hierarchy.area as f32)).sqrt();
-        let disputed = self.disputed(hierarchy, 0..hierarchy.mesh.elements.len());
+        let weights = vertex_share_roots(hierarchy);
+        let all = 0..hierarchy.mesh.elements.len();
+        // Where no contrast counts, nothing is doubtful.
+        let disputed = limits
+            .contrast
+            .is_finite()
+            .then(|| self.disputed(hierarchy, all.clone()));
         let may_be_noisy = |vertex: usize, light: &DirectLight| {
-            limits.is_noisy(light, weight(vertex), mean)
-                || disputed[vertex] && limits.is_doubtful(light, weight(vertex), mean)
+            let is_disputed = || disputed.as_ref().is_some_and(|disputed| disputed[vertex]);
+            limits.is_noisy(light, weights[vertex], mean)
+                || is_disputed() && limits.is_doubtful(light, weights[vertex], mean)
         };
         let is_noisy = |vertex: usize, light: Option<DirectLight>| {
             light.is_some_and(|light| may_be_noisy(vertex, &light))
@@ -112,8 +117,7 @@ impl DirectField {
         if !known.any(|(vertex, light)| is_noisy(vertex, *light)) {
             return Some(0);
         }
-        let elements = 0..hierarchy.mesh.elements.len();
-        let receivers = self.receivers(hierarchy, elements, is_noisy);
+        let receivers = self.receivers(hierarchy, all, is_noisy);
         let before = self.shot(&receivers);
         let mut known = self.known(&receivers);
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();

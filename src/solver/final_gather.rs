@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     Cancel, Solver,
-    adapt::Limits,
+    adapt::{Limits, vertex_share_roots},
     contact::carry_over,
     cover::vertex_places,
     direct::Receiver,
@@ -81,7 +81,8 @@ impl Solver {
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
         self.gather_at(&mut looks, |_| looking, cancel)?;
         looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
-        let is_corner = in_corners(&self.hierarchy, &looks, limits);
+        let edges = edges(&self.hierarchy);
+        let is_corner = in_corners(&edges, self.hierarchy.mesh.vertices.len(), &looks, limits);
         let mut most = looking;
         while most < GATHERING {
             most *= 2;
@@ -96,7 +97,7 @@ impl Solver {
         for look in &looks {
             ratios[look.vertex] = Some(look.found.over(look.linked));
         }
-        let mut factors = factors(ratios, &edges(&self.hierarchy));
+        let mut factors = factors(ratios, &edges);
         let tells = |element: &Element, side| !element.is_covered(side);
         carry_over(mesh, tells, &mut factors);
         self.gathered = factors;
@@ -107,8 +108,7 @@ impl Solver {
     fn looks(&self) -> Vec<Look> {
         let means = VertexMeans::new(&self.hierarchy, &self.leaves, &[]);
         let mesh = &self.hierarchy.mesh;
-        let areas = mesh.areas_about_vertices();
-        let weight = |vertex: usize| (areas[vertex] / (3.0 * self.hierarchy.area as f32)).sqrt();
+        let weights = vertex_share_roots(&self.hierarchy);
         let look = |(vertex, place): (u32, Receiver)| {
             let linked = means.irradiance[vertex as usize];
             let direct = match &self.direct {
@@ -121,7 +121,7 @@ impl Solver {
                 place,
                 linked,
                 all,
-                weight: weight(vertex as usize),
+                weight: weights[vertex as usize],
                 found: Gathered::default(),
             })
         };
@@ -183,47 +183,39 @@ impl Solver {
 /// Vertices at the ends of the edges of leaves; inner edges come twice.
 fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
     let mesh = &hierarchy.mesh;
-    let of = |leaf: usize| {
-        let [a, b, c] = mesh.elements[leaf].vertices.map(|vertex| vertex as usize);
-        [[a, b], [b, c], [c, a]]
-    };
+    let of = |leaf: usize| mesh.elements[leaf].edges();
     mesh.held_leaves().flat_map(of).collect()
 }
 
 /// Vertices that find something else than links tell, together with their neighbours, and these neighbours.
-fn in_corners(hierarchy: &Hierarchy, looks: &[Look], limits: Limits) -> Vec<bool> {
-    let mesh = &hierarchy.mesh;
-    let count = mesh.vertices.len();
+fn in_corners(
+    edges: &[[usize; 2]],
+    vertex_count: usize,
+    looks: &[Look],
+    limits: Limits,
+) -> Vec<bool> {
     // Gap, its variance, and how many.
-    let mut own = vec![(0.0f32, 0.0f32, 0.0f32); count];
+    let mut own = vec![(0.0f32, 0.0f32, 0.0f32); vertex_count];
     for look in looks {
         let (gap, variance) = look.found.gap(look.linked);
         own[look.vertex] = (gap, variance, 1.0);
     }
     let mut pooled = own.clone();
-    for leaf in mesh.held_leaves() {
-        let vertices = mesh.elements[leaf].vertices.map(|vertex| vertex as usize);
-        for (side, &vertex) in vertices.iter().enumerate() {
-            // The next corner is the last one of the neighbour: so each is taken once, but at borders.
-            let next = own[vertices[(side + 1) % 3]];
-            let sum = &mut pooled[vertex];
-            *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
-        }
+    for &[vertex, next] in edges {
+        // An inner edge comes once from each end, so each neighbour is taken once, but at borders.
+        let (sum, next) = (&mut pooled[vertex], own[next]);
+        *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
     }
-    let mut differs = vec![false; count];
+    let mut differs = vec![false; vertex_count];
     for look in looks {
         let (gap, variance, number) = pooled[look.vertex];
         let is_seen = limits.is_seen(gap.abs() / number.max(1.0), look.all, look.weight);
         differs[look.vertex] = is_seen && gap * gap > DEVIATIONS * DEVIATIONS * variance;
     }
     let mut wanted = differs.clone();
-    for leaf in mesh.held_leaves() {
-        let vertices = mesh.elements[leaf].vertices.map(|vertex| vertex as usize);
-        if vertices.iter().any(|&vertex| differs[vertex]) {
-            for vertex in vertices {
-                wanted[vertex] = true;
-            }
-        }
+    for &[a, b] in edges {
+        wanted[a] |= differs[b];
+        wanted[b] |= differs[a];
     }
     wanted
 }

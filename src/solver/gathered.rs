@@ -6,6 +6,7 @@
 
 use glam::Vec4;
 
+use super::smooth::agreement;
 use crate::transport::luminance;
 
 /// Standard errors of their difference by which neighbours may differ to be pooled by half. Smaller leaves grain, larger
@@ -140,12 +141,11 @@ fn pool(ratios: &mut [Option<Ratio>], edges: &[[usize; 2]]) {
             continue;
         };
         let gap = one.mean() - other.mean();
-        let noise = HALF_DEVIATIONS * HALF_DEVIATIONS * (one.variance() + other.variance());
+        let alike = agreement(gap, one.variance() + other.variance(), HALF_DEVIATIONS);
         // Inner edges come twice, so that each counts by half. Weights go by the numbers of rays alone: rays that all met
         // the dark differ least, so weights by variance would show everything too dark.
-        let weight = 0.5 * noise / (noise + gap * gap).max(f32::MIN_POSITIVE);
-        add(a, &other, weight * other.rays, 2.0);
-        add(b, &one, weight * one.rays, 2.0);
+        add(a, &other, 0.5 * alike * other.rays, 2.0);
+        add(b, &one, 0.5 * alike * one.rays, 2.0);
     }
     for (ratio, sum) in ratios.iter_mut().zip(sums) {
         if let Some(ratio) = ratio {

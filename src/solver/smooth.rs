@@ -47,10 +47,7 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
     let edges: Vec<[usize; 2]> = hierarchy
         .mesh
         .leaves()
-        .flat_map(|leaf| {
-            let [a, b, c] = hierarchy.mesh.elements[leaf].vertices;
-            [[a, b], [b, c], [c, a]].map(|edge| edge.map(|vertex| vertex as usize))
-        })
+        .flat_map(|leaf| hierarchy.mesh.elements[leaf].edges())
         .filter(|edge| {
             edge.iter()
                 .all(|&vertex| samples.get(vertex).is_some_and(Option::is_some))
@@ -66,6 +63,13 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
         .collect()
 }
 
+/// How much a neighbour counts whose value is off by a gap, 0…1: by half where that is so many standard errors, of which the
+/// square is `variance`.
+pub(super) fn agreement(gap: f32, variance: f32, half_deviations: f32) -> f32 {
+    let noise = variance * half_deviations * half_deviations;
+    noise / (noise + gap * gap).max(f32::MIN_POSITIVE)
+}
+
 /// One round of averaging. The variance stays that of the rays: it says how far neighbours may differ.
 fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
     let mut sums: Vec<(Vec4, f32)> = fractions
@@ -74,9 +78,8 @@ fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
         .collect();
     for &[a, b] in edges {
         let (one, other) = (fractions[a], fractions[b]);
-        let noise = (one.variance + other.variance) * HALF_DEVIATIONS * HALF_DEVIATIONS;
         let gap = one.mean - other.mean;
-        let weight = noise / (noise + gap * gap);
+        let weight = agreement(gap, one.variance + other.variance, HALF_DEVIATIONS);
         for (vertex, neighbour) in [(a, other), (b, one)] {
             if fractions[vertex].variance > 0.0 {
                 sums[vertex].0 += neighbour.color * weight;
