@@ -231,9 +231,8 @@ impl DirectField {
         // Elements from here on were not looked at yet in this step.
         let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
-            ray_count += self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
-            let mean = self.mean(hierarchy);
-            ray_count += self.settle(rays, hierarchy, limits, mean, cancel)?;
+            let (shot, mean) = self.sample(rays, hierarchy, limits, cancel)?;
+            ray_count += shot;
             if round == MOST_ROUNDS {
                 break;
             }
@@ -248,6 +247,20 @@ impl DirectField {
             }
         }
         Some(ray_count)
+    }
+
+    /// Sample all vertices, until their noise is small enough. Returns the rays shot and the mean luminance.
+    pub(super) fn sample(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        limits: Limits,
+        cancel: &Cancel,
+    ) -> Option<(u64, f32)> {
+        let covering = self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
+        let mean = self.mean(hierarchy);
+        let settling = self.settle(rays, hierarchy, limits, mean, cancel)?;
+        Some((covering + settling, mean))
     }
 
     fn mean(&self, hierarchy: &Hierarchy) -> f32 {

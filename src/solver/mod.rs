@@ -272,7 +272,7 @@ impl Solver {
         self.pull();
         cancel.proceed()?;
         self.estimate_mean();
-        report.epsilon = self.refine(report.epsilon, cancel)?;
+        report.epsilon = self.refine(fineness, cancel)?;
         self.probe_contacts(cancel)?;
         // Links that are coarse err by more than light that has not quite settled.
         let tolerance = self.settings.tolerance * fineness;
@@ -472,9 +472,11 @@ impl Solver {
         self.mean_irradiance = mean;
     }
 
-    /// Bring the links to a smaller threshold; source tables are up to date before and after. Returns the threshold that
+    /// Bring the links to the threshold of a fineness; source tables are up to date before and after. Returns the threshold that
     /// they have: where links do not fit into memory, those from before stay, and the first ones are made coarser.
-    fn refine(&mut self, mut epsilon: f32, cancel: &Cancel) -> Option<f32> {
+    fn refine(&mut self, fineness: f32, cancel: &Cancel) -> Option<f32> {
+        let limits = self.direct_limits(fineness);
+        let mut epsilon = self.settings.epsilon * fineness;
         let (mut passes, mut raises) = (0, 0);
         let mut judged = None;
         while passes < MOST_PASSES {
@@ -552,8 +554,8 @@ impl Solver {
             }
             self.extend_to_new_elements();
             if let Some(field) = &mut self.direct {
-                let (count, seed) = (field.samples, self.settings.seed);
-                self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
+                let (shot, _) = field.sample(&self.rays, &self.hierarchy, limits, cancel)?;
+                self.ray_count += shot;
             }
             self.pull();
         }
@@ -608,13 +610,13 @@ mod tests {
             // The links of another step, and what judging all of them anew by the same threshold makes of them.
             solver.estimate_mean();
             let elements = solver.hierarchy.mesh.elements.len();
-            solver.refine(SolveSettings::draft().epsilon, &cancel);
+            solver.refine(1.0, &cancel);
             assert!(
                 solver.hierarchy.mesh.elements.len() > elements,
                 "there was a second pass"
             );
             let found = pairs(&solver);
-            solver.refine(SolveSettings::draft().epsilon, &cancel);
+            solver.refine(1.0, &cancel);
             let anew = pairs(&solver);
             let is_other = |pair: &&(u32, u32)| found.binary_search(pair).is_err();
             let changed = anew.iter().filter(is_other).count();
