@@ -219,7 +219,7 @@ impl Solver {
         self.divide_coarse(limits);
         self.divide_contacts(cancel)?;
         let most = (FIRST_RAYS / self.hierarchy.mesh.vertices.len().max(1)).max(1);
-        let (count, seed) = (limits.shadow_samples.min(most as u32), limits.seed);
+        let (count, seed) = (self.shadow_samples(true).min(most as u32), limits.seed);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
@@ -428,6 +428,14 @@ impl Solver {
         }
     }
 
+    /// Shadow rays per vertex.
+    fn shadow_samples(&self, is_coarse: bool) -> u32 {
+        match is_coarse {
+            true => self.settings.shadow_samples.div_ceil(2),
+            false => self.settings.shadow_samples,
+        }
+    }
+
     fn direct_limits(&self, fineness: f32) -> adapt::Limits {
         let tolerance = self.settings.mesh_tolerance * fineness;
         adapt::Limits {
@@ -438,7 +446,7 @@ impl Solver {
                 false => border::CONTRAST_TOLERANCE * tolerance,
             },
             min_area: self.min_area(),
-            shadow_samples: self.settings.shadow_samples,
+            shadow_samples: self.shadow_samples(is_coarse(fineness)),
             seed: self.settings.seed,
             most_elements: self.most_elements(),
         }

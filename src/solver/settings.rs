@@ -74,8 +74,9 @@ pub struct SolveSettings {
     pub epsilon: f32,
     /// Sample pairs p of a link in the `samples` oracle; 1…4096. Cost per link grows with p.
     pub samples: u32,
-    /// Shadow rays per vertex towards the lights; 1…1024. Where their noise counts for more than a part of
-    /// `mesh_tolerance`, up to 16 times as many are shot. Noise in penumbrae falls as one over the root or better.
+    /// Shadow rays per vertex towards the lights, 1…1024; half of them in coarse steps. Where their noise counts for more
+    /// than a part of `mesh_tolerance`, up to 16 times as many are shot. Noise in penumbrae falls as one over the root
+    /// or better.
     pub shadow_samples: u32,
     /// Elements are not divided below this area, as a fraction of the scene's area; at least 0.
     pub min_area: f32,
@@ -100,7 +101,7 @@ impl SolveSettings {
     pub const fn draft() -> Self {
         Self {
             epsilon: 0.03,
-            shadow_samples: 8,
+            shadow_samples: 16,
             mesh_tolerance: 0.006,
             min_area: 1e-5,
             max_steps: 3,
@@ -117,7 +118,7 @@ impl SolveSettings {
             push: Push::Combined,
             epsilon: 0.005,
             samples: 4,
-            shadow_samples: 16,
+            shadow_samples: 32,
             min_area: 1e-6,
             mesh_tolerance: 0.001,
             crease_degrees: 30.0,
