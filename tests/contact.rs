@@ -78,17 +78,23 @@ fn solved(builder: SceneBuilder, settings: SolveSettings) -> Snapshot {
 
 /// How far what shows on the floor within 0.1 of the box is off: on average, and at worst.
 fn errors_beside(low: DVec3, high: DVec3) -> (f32, f32) {
-    let snapshot = furnished(low, high);
+    let outside = |corners: [Vec3; 3]| {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let outside = (low.as_vec3() - middle).max(middle - high.as_vec3());
+        let is_floor = corners.iter().all(|corner| corner.y.abs() < 1e-3);
+        is_floor.then_some(outside.x.max(outside.z))
+    };
+    errors_within(&furnished(low, high), outside)
+}
+
+/// How far what shows is off at triangles of which the distance is less than 0.1: on average, and at worst.
+fn errors_within(snapshot: &Snapshot, distance: impl Fn([Vec3; 3]) -> Option<f32>) -> (f32, f32) {
     let (mesh, light) = (&snapshot.mesh, &snapshot.light);
     let expected = PI * EMITTED / (1.0 - REFLECTANCE);
-    let (low, high) = (low.as_vec3(), high.as_vec3());
     let (mut beside, mut worst, mut sum) = (0, 0.0f32, 0.0);
     for vertices in &mesh.indices {
         let corners = vertices.map(|vertex| mesh.positions[vertex as usize]);
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let outside = (low - middle).max(middle - high);
-        let is_floor = corners.iter().all(|corner| corner.y.abs() < 1e-3);
-        if !is_floor || !(0.0..0.1).contains(&outside.x.max(outside.z)) {
+        if !distance(corners).is_some_and(|distance| (0.0..0.1).contains(&distance)) {
             continue;
         }
         let shown = vertices.map(|vertex| light.irradiance[vertex as usize].x);
@@ -96,7 +102,7 @@ fn errors_beside(low: DVec3, high: DVec3) -> (f32, f32) {
         let error = (shown / expected - 1.0).abs();
         (beside, worst, sum) = (beside + 1, worst.max(error), sum + error);
     }
-    assert!(beside > 50, "{beside} triangles beside the box");
+    assert!(beside > 20, "{beside} triangles there");
     (sum / beside as f32, worst)
 }
 
@@ -112,6 +118,19 @@ fn no_smudge_shows_beside_an_object() {
 fn no_smudge_shows_beside_an_object_in_a_corner() {
     let (mean, worst) = errors_beside(DVec3::new(-1.05, -0.05, -0.37), DVec3::new(-0.3, 0.8, 0.37));
     assert!(mean < 0.06 && worst < 0.3, "mean {mean}, worst {worst}");
+}
+
+/// A shelf let into a wall by less than is seen where large elements are looked at.
+#[test]
+fn no_smudge_shows_on_what_reaches_into_a_wall() {
+    let (low, high) = (DVec3::new(-1.0004, 0.5, -0.6), DVec3::new(-0.4, 0.6, 0.6));
+    let before_wall = |corners: [Vec3; 3]| {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let is_top = corners.iter().all(|corner| (corner.y - 0.6).abs() < 1e-3);
+        is_top.then_some(middle.x + 1.0)
+    };
+    let (mean, worst) = errors_within(&furnished(low, high), before_wall);
+    assert!(mean < 0.02 && worst < 0.1, "mean {mean}, worst {worst}");
 }
 
 /// A black box before walls that glow, lit over links alone: at its foot, half of the view is black. What glows beyond

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
+    beyond::Beyond,
     contact::carry_over,
     direct::{DirectLight, Lights, Receiver},
     reconstruct::{LeafLight, project},
@@ -59,6 +60,8 @@ pub(super) struct DirectField {
     pub(super) covered: usize,
     /// Shadow rays that these corners have where it takes all.
     pub(super) samples: u32,
+    /// Vertices beyond walls.
+    pub(super) beyond: Beyond,
     /// Irradiance to show by vertex; shorter than the vertices where some are new.
     shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
@@ -147,6 +150,7 @@ impl DirectField {
             centres: Vec::new(),
             covered: 0,
             samples: 0,
+            beyond: Beyond::default(),
             shown: Vec::new(),
             is_full: false,
         }
@@ -258,9 +262,10 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<(u64, f32)> {
         let covering = self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
+        let moving = self.move_before_walls(rays, hierarchy, limits, cancel)?;
         let mean = self.mean(hierarchy);
         let settling = self.settle(rays, hierarchy, limits, mean, cancel)?;
-        Some((covering + settling, mean))
+        Some((covering + moving + settling, mean))
     }
 
     fn mean(&self, hierarchy: &Hierarchy) -> f32 {
@@ -379,5 +384,6 @@ impl DirectField {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
             + size_of_val(self.shown.as_slice())
+            + self.beyond.memory_bytes()
     }
 }

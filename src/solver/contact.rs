@@ -41,8 +41,11 @@ const SOLID_PROBES: [[f32; 2]; 3] = [[0.173, 0.291], [-0.419, 0.137], [0.083, -0
 /// See [`PROBES`].
 const FIRST_PROBES: usize = 4;
 
-/// Backs that the probes must meet.
+/// Backs that the probes must meet, and as many again for each that meets what may be lit.
 const LEAST_BACKS: usize = 2;
+
+/// Probes that may meet what may be lit.
+const MOST_LIT: usize = 1;
 
 /// Elements over which light is carried at most: vertices under an object and those beside them.
 const CARRIED: u32 = 2;
@@ -198,10 +201,16 @@ fn is_in_solid(
     }
 }
 
-/// Whether a point of an element lies beyond a wall: backs are met from there and nothing that is lit. And the rays shot.
-fn is_beyond(rays: &RayTree, hierarchy: &Hierarchy, element: usize, point: Vec3) -> (bool, u64) {
+/// Whether a point of an element lies beyond a wall: backs are met from there and nothing that is lit, or one among many:
+/// another that reaches into the wall. And the rays shot.
+pub(super) fn is_beyond(
+    rays: &RayTree,
+    hierarchy: &Hierarchy,
+    element: usize,
+    point: Vec3,
+) -> (bool, u64) {
     let patch = hierarchy.patch_of(element);
-    let (mut backs, mut shot) = (0, 0);
+    let (mut backs, mut lit, mut shot) = (0, 0, 0);
     for tangents in PROBES {
         if shot == FIRST_PROBES && backs == 0 {
             break;
@@ -210,12 +219,15 @@ fn is_beyond(rays: &RayTree, hierarchy: &Hierarchy, element: usize, point: Vec3)
         shot += 1;
         match rays.closest(point, direction, Some(patch.triangle)) {
             Some(hit) if hierarchy.patch_met(hit.triangle, direction).is_some() => {
-                return (false, shot as u64);
+                lit += 1;
+                if lit > MOST_LIT {
+                    return (false, shot as u64);
+                }
             }
             hit => backs += usize::from(hit.is_some()),
         }
     }
-    (backs >= LEAST_BACKS, shot as u64)
+    (backs >= LEAST_BACKS * (1 + lit), shot as u64)
 }
 
 /// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,

@@ -78,10 +78,7 @@ impl DirectField {
             .collect();
         self.shoot(rays, &rest, |_| samples, seed, cancel);
         if cancel.is_cancelled() {
-            for &(vertex, _) in &receivers {
-                self.vertices[vertex as usize] = None;
-            }
-            self.covered = 0;
+            self.forget(&receivers);
             return None;
         }
         self.covered = elements.end;
@@ -178,15 +175,23 @@ impl DirectField {
         }
     }
 
+    /// Have some vertices sampled anew.
+    pub(super) fn forget(&mut self, receivers: &[(u32, Receiver)]) {
+        for &(vertex, _) in receivers {
+            self.vertices[vertex as usize] = None;
+        }
+        self.covered = 0;
+    }
+
     /// Rays shot from some vertices.
-    fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
+    pub(super) fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
         let shot = |&(vertex, _): &(u32, Receiver)| {
             self.vertices[vertex as usize].map_or(0, |light| u64::from(light.shot))
         };
         receivers.iter().map(shot).sum()
     }
 
-    fn shoot(
+    pub(super) fn shoot(
         &mut self,
         rays: &RayTree,
         receivers: &[(u32, Receiver)],
@@ -218,7 +223,7 @@ impl DirectField {
         disputed
     }
 
-    /// As [`vertex_places`] has it, by what is known of each vertex.
+    /// As [`super::beyond::Beyond::vertex_places`] has it, by what is known of each vertex.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
@@ -229,7 +234,7 @@ impl DirectField {
         let is_wanted: Vec<bool> = known
             .map(|(vertex, light)| is_wanted(vertex, *light))
             .collect();
-        vertex_places(hierarchy, elements, &is_wanted)
+        self.beyond.vertex_places(hierarchy, elements, &is_wanted)
     }
 }
 

@@ -12,14 +12,14 @@ use rayon::prelude::*;
 use super::{
     Cancel, Solver,
     adapt::{Limits, vertex_share_roots},
+    beyond::Beyond,
     contact::carry_over,
-    cover::vertex_places,
     direct::Receiver,
     gathered::{Gathered, factors},
     reconstruct::VertexMeans,
 };
 use crate::{
-    geometry::{Random, cosine_direction, low_discrepancy_2d},
+    geometry::{Random, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Element, Hierarchy},
     transport::luminance,
 };
@@ -75,11 +75,20 @@ impl Solver {
         if self.rays.is_clear() {
             return Some(());
         }
-        let mut looks = self.looks();
+        if let Some(field) = &mut self.direct {
+            field.smooth(&self.hierarchy);
+        }
+        let linked = VertexMeans::new(&self.hierarchy, &self.leaves, &[]).irradiance;
+        let received: Vec<Vec4> = linked
+            .par_iter()
+            .enumerate()
+            .map(|(vertex, &linked)| linked + self.direct_shown(vertex as u32))
+            .collect();
+        let mut looks = self.looks(&linked);
         let limits = self.direct_limits(1.0);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
-        self.gather_at(&mut looks, |_| looking, cancel)?;
+        self.gather_at(&mut looks, &received, |_| looking, cancel)?;
         looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
         let edges = edges(&self.hierarchy);
         let is_corner = in_corners(&edges, self.hierarchy.mesh.vertices.len(), &looks, limits);
@@ -90,7 +99,7 @@ impl Solver {
                 true => most,
                 false => look.found.rays,
             };
-            self.gather_at(&mut looks, more, cancel)?;
+            self.gather_at(&mut looks, &received, more, cancel)?;
         }
         let mesh = &self.hierarchy.mesh;
         let mut ratios = vec![None; mesh.vertices.len()];
@@ -104,13 +113,18 @@ impl Solver {
         Some(())
     }
 
-    /// The vertices at which enough light is indirect.
-    fn looks(&self) -> Vec<Look> {
-        let means = VertexMeans::new(&self.hierarchy, &self.leaves, &[]);
+    /// Direct irradiance that is shown at a vertex.
+    fn direct_shown(&self, vertex: u32) -> Vec4 {
+        let field = self.direct.as_ref();
+        field.map_or(Vec4::ZERO, |field| field.vertex(&self.hierarchy, vertex).0)
+    }
+
+    /// The vertices at which enough light is indirect, by linked irradiance.
+    fn looks(&self, linked: &[Vec4]) -> Vec<Look> {
         let mesh = &self.hierarchy.mesh;
         let weights = vertex_share_roots(&self.hierarchy);
         let look = |(vertex, place): (u32, Receiver)| {
-            let linked = means.irradiance[vertex as usize];
+            let linked = linked[vertex as usize];
             let direct = match &self.direct {
                 Some(field) => field.corner(vertex),
                 None => Vec4::ZERO,
@@ -126,7 +140,10 @@ impl Solver {
             })
         };
         let all = vec![true; mesh.vertices.len()];
-        let places = vertex_places(&self.hierarchy, 0..mesh.elements.len(), &all);
+        let elements = 0..mesh.elements.len();
+        let none = Beyond::default();
+        let beyond = self.direct.as_ref().map_or(&none, |field| &field.beyond);
+        let places = beyond.vertex_places(&self.hierarchy, elements, &all);
         places.into_iter().filter_map(look).collect()
     }
 
@@ -134,6 +151,7 @@ impl Solver {
     fn gather_at(
         &mut self,
         looks: &mut [Look],
+        received: &[Vec4],
         wanted: impl Fn(&Look) -> u32 + Sync,
         cancel: &Cancel,
     ) -> Option<()> {
@@ -151,7 +169,8 @@ impl Solver {
                 for index in before..rays {
                     let square = low_discrepancy_2d(index, shift);
                     let direction = cosine_direction(look.place.normal, square);
-                    look.found.count(this.radiosity_met(&look.place, direction));
+                    look.found
+                        .count(this.radiosity_met(&look.place, direction, received));
                 }
                 rays - before
             })
@@ -161,8 +180,9 @@ impl Solver {
         Some(())
     }
 
-    /// Radiosity of what a ray meets first; `None` where that is the back of a one-sided surface.
-    fn radiosity_met(&self, from: &Receiver, direction: Vec3) -> Option<Vec4> {
+    /// Radiosity of what a ray meets first, of irradiance `received` at vertices and linear between them; `None` where that
+    /// is the back of a one-sided surface.
+    fn radiosity_met(&self, from: &Receiver, direction: Vec3, received: &[Vec4]) -> Option<Vec4> {
         let hit = self
             .rays
             .closest(from.point, direction, Some(from.triangle));
@@ -176,7 +196,14 @@ impl Solver {
         }
         let point = from.point + direction * hit.distance;
         let leaf = hierarchy.mesh.leaf_at(patch, point)?;
-        Some(self.power.elements[leaf].truncate().extend(0.0))
+        let shares = barycentric(point, hierarchy.mesh.corners(leaf)).to_array();
+        let vertices = hierarchy.mesh.elements[leaf].vertices;
+        let irradiance: Vec4 = vertices
+            .into_iter()
+            .zip(shares)
+            .map(|(vertex, share)| received[vertex as usize] * share)
+            .sum();
+        Some(self.radiosity_under(leaf, irradiance).with_w(0.0))
     }
 }
 

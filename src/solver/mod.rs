@@ -6,6 +6,7 @@
 
 mod adapt;
 mod anderson;
+mod beyond;
 mod border;
 mod budget;
 mod clear;
@@ -54,6 +55,7 @@ use crate::{
     },
 };
 use adapt::DirectField;
+use beyond::Beyond;
 use closure::Closures;
 use direct::Lights;
 use plan::Plan;
@@ -302,7 +304,11 @@ impl Solver {
     /// Let each leaf gather once more, for the vertices.
     fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
         let (kernel, closures) = (self.kernel(), &self.closures);
-        self.leaves = reconstruct::gather_leaves(kernel, &self.links, closures, is_coarse, cancel)?;
+        let none = Beyond::default();
+        let beyond = self.direct.as_ref().map_or(&none, |field| &field.beyond);
+        let links = &self.links;
+        self.leaves =
+            reconstruct::gather_leaves(kernel, links, closures, beyond, is_coarse, cancel)?;
         Some(())
     }
 
@@ -364,12 +370,16 @@ impl Solver {
 
     /// Radiosity that a leaf sends over links, and in `w` 1: nothing where it lies within a solid.
     fn radiosity(&self, element: usize) -> Vec4 {
+        self.radiosity_under(element, self.linked[element] + self.direct_of(element))
+    }
+
+    /// As [`Self::radiosity`] for this irradiance.
+    fn radiosity_under(&self, element: usize, irradiance: Vec4) -> Vec4 {
         if self.hierarchy.mesh.elements[element].is_buried() {
             return Vec4::ZERO;
         }
         let patch = self.hierarchy.patch_of(element);
-        let reflected =
-            patch.reflectance * (self.linked[element] + self.direct_of(element)).truncate();
+        let reflected = patch.reflectance * irradiance.truncate();
         let emitted = if self.is_sampled(element) {
             Vec3::ZERO
         } else {

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
+    beyond::Beyond,
     closure::{Closure, Closures},
     contact::carry_over,
 };
@@ -53,6 +54,7 @@ pub(super) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
     closures: &Closures,
+    beyond: &Beyond,
     is_coarse: bool,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
@@ -69,6 +71,7 @@ pub(super) fn gather_leaves(
                 kernel,
                 links,
                 closures,
+                beyond,
                 sight_distance,
                 path: Vec::new(),
                 spare: Vec::new(),
@@ -156,6 +159,7 @@ struct Walk<'a> {
     kernel: Kernel<'a>,
     links: &'a LinkStore,
     closures: &'a Closures,
+    beyond: &'a Beyond,
     /// See [`SIGHT_DISTANCE`].
     sight_distance: f32,
     /// Of the nodes above the current one.
@@ -274,10 +278,8 @@ impl<'a> Walk<'a> {
             light.centre += link_irradiance(kernel, link, centroid, normal);
         }
         light.corners = [light.centre; 3];
-        let [a, b, c] = hierarchy
-            .mesh
-            .corners(index)
-            .map(|corner| corner.lerp(centroid, INSET));
+        let corners = hierarchy.mesh.corners(index);
+        let [a, b, c] = self.beyond.places(&hierarchy.mesh.elements[index], corners);
         let points = Vectors4::new([centroid, a, b, c]);
         let elements = self.path.iter().flat_map(|chain| chain.own);
         for link in elements.chain(own) {

@@ -1,0 +1,188 @@
+//! Vertices that lie a little beyond a wall.
+//!
+//! Boards and boxes are let into walls by a little, so that no gap shows. Their vertices there get nothing, and that would
+//! show as a smudge all over the elements beside them. So where rays from such a vertex meet backs alone, its light is
+//! that of a place further within the element: just before the wall.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{
+    Cancel,
+    adapt::{DirectField, Limits},
+    contact::is_beyond,
+    cover::vertex_places,
+    direct::{DirectLight, Receiver},
+    reconstruct::INSET,
+};
+use crate::{
+    geometry::RayTree,
+    hierarchy::{Element, Hierarchy},
+    transport::luminance,
+};
+
+/// Shares of the way from a vertex to the centroid of an element at which a place before the wall is looked for. Further
+/// within, light may be another; of an element that lies beyond the wall by more, the dark is not small.
+const INSETS: [f32; 3] = [0.2, 0.35, 0.5];
+
+/// Light of a vertex that is looked at, as a share of that at another of an element. Smaller misses vertices where a ray
+/// slips through an edge; larger looks at penumbrae.
+const DARK_SHARE: f32 = 0.1;
+
+/// Where light is evaluated for vertices that lie beyond a wall.
+#[derive(Default)]
+pub(super) struct Beyond {
+    moved: HashMap<u32, Moved>,
+    /// The element at which a vertex was looked at last, or `u32::MAX`.
+    looked_at: Vec<u32>,
+}
+
+/// Where light is evaluated for one of them.
+#[derive(Clone, Copy)]
+struct Moved {
+    place: Vec3,
+    /// Share of the way to the centroid.
+    inset: f32,
+}
+
+impl Beyond {
+    /// Where light of the corners of a leaf is evaluated; `corners` are where they are.
+    pub(super) fn places(&self, element: &Element, corners: [Vec3; 3]) -> [Vec3; 3] {
+        [0, 1, 2].map(|side| {
+            let moved = match self.moved.is_empty() {
+                true => None,
+                false => self.moved.get(&element.vertices[side]),
+            };
+            let inset = moved.map_or(INSET, |moved| moved.inset);
+            corners[side].lerp(element.centroid, inset)
+        })
+    }
+
+    /// As [`vertex_places`], but for vertices beyond walls before these.
+    pub(super) fn vertex_places(
+        &self,
+        hierarchy: &Hierarchy,
+        elements: std::ops::Range<usize>,
+        is_wanted: &[bool],
+    ) -> Vec<(u32, Receiver)> {
+        let mut places = vertex_places(hierarchy, elements, is_wanted);
+        for (vertex, receiver) in &mut places {
+            if let Some(moved) = self.moved.get(vertex) {
+                receiver.point = moved.place;
+            }
+        }
+        places
+    }
+
+    /// Bytes held, about.
+    pub(super) fn memory_bytes(&self) -> usize {
+        size_of_val(self.looked_at.as_slice()) + self.moved.len() * size_of::<(u32, Moved)>()
+    }
+}
+
+impl DirectField {
+    /// Find places before the wall for vertices that lie beyond one, and sample there. A vertex is looked at once at each
+    /// element, where it is dark and the element is not. Returns the rays shot.
+    pub(super) fn move_before_walls(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        limits: Limits,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let count = hierarchy.mesh.vertices.len();
+        self.beyond.looked_at.resize(count, u32::MAX);
+        let found: Vec<(u32, u32, (Option<Moved>, u64))> = self
+            .dark_beside_light(hierarchy)
+            .into_par_iter()
+            .map(|(vertex, leaf)| match cancel.is_cancelled() {
+                true => (vertex, leaf, (None, 0)),
+                false => {
+                    let found = before_wall(rays, hierarchy, vertex, leaf as usize);
+                    (vertex, leaf, found)
+                }
+            })
+            .collect();
+        cancel.proceed()?;
+        let mut shot = 0;
+        let mut is_new = vec![false; count];
+        let mut is_any = false;
+        for (vertex, leaf, (moved, rays)) in found {
+            shot += rays;
+            self.beyond.looked_at[vertex as usize] = leaf;
+            if let Some(moved) = moved {
+                self.beyond.moved.insert(vertex, moved);
+                self.vertices[vertex as usize] = Some(DirectLight::default());
+                is_new[vertex as usize] = true;
+                is_any = true;
+            }
+        }
+        if !is_any {
+            return Some(shot);
+        }
+        let all = 0..hierarchy.mesh.elements.len();
+        let receivers = self.receivers(hierarchy, all, |vertex, _| is_new[vertex]);
+        let (samples, seed) = (limits.shadow_samples, limits.seed);
+        self.shoot(rays, &receivers, |_| samples, seed, cancel);
+        if cancel.is_cancelled() {
+            self.forget(&receivers);
+            return None;
+        }
+        Some(shot + self.shot(&receivers))
+    }
+
+    /// Vertices that are dark, each with the lightest element about it, if it was not looked at there.
+    fn dark_beside_light(&self, hierarchy: &Hierarchy) -> Vec<(u32, u32)> {
+        let mesh = &hierarchy.mesh;
+        let mut lightest: Vec<Option<(f32, u32)>> = vec![None; self.vertices.len()];
+        for leaf in mesh.held_leaves() {
+            let element = &mesh.elements[leaf];
+            let corners = element.vertices.map(|vertex| vertex as usize);
+            let lights = corners.map(|vertex| self.vertices[vertex].unwrap_or_default());
+            let seen = lights.map(|light| luminance(light.irradiance()));
+            let most = seen.into_iter().fold(0.0, f32::max);
+            if most <= 0.0 || !element.is_open() {
+                continue;
+            }
+            let is_dark = |&side: &usize| lights[side].shot > 0 && seen[side] <= DARK_SHARE * most;
+            for side in (0..3).filter(is_dark) {
+                let lightest = &mut lightest[corners[side]];
+                if lightest.is_none_or(|(best, _)| most > best) {
+                    *lightest = Some((most, leaf as u32));
+                }
+            }
+        }
+        let found = lightest.into_iter().enumerate();
+        found
+            .filter_map(|(vertex, found)| Some((vertex as u32, found?.1)))
+            .filter(|&(vertex, leaf)| self.beyond.looked_at[vertex as usize] != leaf)
+            .collect()
+    }
+}
+
+/// Where light of a vertex is to be evaluated within an element, if it lies beyond a wall and a part of the element does
+/// not; and the rays shot.
+fn before_wall(
+    rays: &RayTree,
+    hierarchy: &Hierarchy,
+    vertex: u32,
+    leaf: usize,
+) -> (Option<Moved>, u64) {
+    let (at, mesh) = (hierarchy.mesh.position(vertex), &hierarchy.mesh);
+    let place = |inset: f32| at.lerp(mesh.elements[leaf].centroid, inset);
+    let (is_dark, mut ray_count) = is_beyond(rays, hierarchy, leaf, place(INSET));
+    if !is_dark {
+        return (None, ray_count);
+    }
+    for inset in INSETS {
+        let place = place(inset);
+        let (is_beyond, shot) = is_beyond(rays, hierarchy, leaf, place);
+        ray_count += shot;
+        if !is_beyond {
+            return (Some(Moved { place, inset }), ray_count);
+        }
+    }
+    (None, ray_count)
+}
