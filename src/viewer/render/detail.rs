@@ -38,17 +38,18 @@ impl DetailSet {
     /// Only the plain group.
     pub(super) fn new(gpu: &Gpu) -> Self {
         let layout = layout(&gpu.device);
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("detail"),
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            // Floors are seen at a slant.
-            anisotropy_clamp: 16,
-            ..Default::default()
-        });
+        let sampler = |anisotropy_clamp: u16| {
+            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("detail"),
+                address_mode_u: wgpu::AddressMode::Repeat,
+                address_mode_v: wgpu::AddressMode::Repeat,
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                anisotropy_clamp,
+                ..Default::default()
+            })
+        };
         let white = Texture {
             name: String::new(),
             width: 1,
@@ -56,10 +57,12 @@ impl DetailSet {
             pixels: vec![Vec3::ONE],
         };
         let view = upload(gpu, &white);
-        let plain = bind_group(gpu, &layout, &sampler, &view, [1.0, 1.0, 1.0, 0.0]);
+        // Software may filter though nothing is sampled, and what has no texture has no place in it.
+        let plain = bind_group(gpu, &layout, &sampler(1), &view, [1.0, 1.0, 1.0, 0.0]);
         Self {
             layout,
-            sampler,
+            // Floors are seen at a slant.
+            sampler: sampler(16),
             plain,
             scene: None,
             views: Vec::new(),
