@@ -7,12 +7,12 @@ mod pictures;
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
     export::{ColorOptions, ToneMap as ExportToneMap},
-    scene::{Material, Scene, SceneBuilder, SceneOptions},
+    scene::{Material, Scene, SceneBuilder, SceneOptions, builtin::find_builtin},
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
@@ -246,6 +246,39 @@ fn linear_picture_holds_radiance_at_any_exposure() {
         let near = (seen - expected).abs().cmple(expected * 2e-3).all();
         assert!(near, "{seen} instead of {expected} at {exposure} EV");
     }
+}
+
+/// A renderer in software may filter without end along what is not finite.
+#[test]
+fn textures_of_slivers_with_wild_coordinates_are_drawn() {
+    let builder = find_builtin("tiled-room").expect("it is there").builder();
+    let scene = builder.finish(&SceneOptions::default());
+    let scene = Arc::new(scene.expect("it is sound"));
+    let mut snapshot = snapshot(&scene, Vec3::ONE);
+    let mesh = Arc::make_mut(&mut snapshot.mesh);
+    let wild = [
+        0.0,
+        0.3,
+        1e-30,
+        1e30,
+        -7e8,
+        f32::MAX,
+        f32::INFINITY,
+        f32::NAN,
+    ];
+    let pick = |index: usize| wild[index * 7 / 3 % wild.len()];
+    mesh.texcoords = (0..mesh.positions.len())
+        .map(|index| Vec2::new(pick(index), pick(index + 5)))
+        .collect();
+    let slivers = 1..mesh.positions.len() / 2;
+    for index in slivers.step_by(3) {
+        mesh.positions[index] = mesh.positions[index - 1] + Vec3::X * 1e-5;
+    }
+    let Some(picture) = draw(&snapshot, &scene, &plain(ViewMode::Radiance)) else {
+        return;
+    };
+    let first = picture.display.get_pixel(0, 0);
+    assert!(picture.display.pixels().any(|pixel| pixel != first));
 }
 
 #[test]
