@@ -11,6 +11,9 @@ use crate::{
     solver::DisplayMesh,
 };
 
+/// Times that a texture may repeat over an edge however short, and over each unit of the frame.
+const MOST_REPEATS: [f32; 2] = [2.0, 16.0];
+
 /// Textures larger than this are shown smaller: light, not texture, is what is looked at.
 const MAX_SIDE: u32 = 2048;
 
@@ -21,7 +24,9 @@ pub(super) type DetailRange = (Range<u32>, usize);
 #[derive(Clone)]
 pub(super) struct DetailSet {
     layout: wgpu::BindGroupLayout,
-    sampler: wgpu::Sampler,
+    /// One that looks along the slant, and one that does not.
+    slanted: wgpu::Sampler,
+    upright: wgpu::Sampler,
     plain: wgpu::BindGroup,
     scene: Option<Arc<Scene>>,
     /// Its textures, those that were needed.
@@ -32,6 +37,23 @@ pub(super) struct DetailSet {
     group_of: Vec<usize>,
     /// Groups from 1 on.
     textured: Vec<wgpu::BindGroup>,
+}
+
+/// Whether textures can be sampled by their slant: where they repeat without end over a sliver, software that does never
+/// ends.
+fn is_tame(scene: &Scene) -> bool {
+    let [most, most_by_unit] = MOST_REPEATS;
+    scene
+        .triangle_ids()
+        .zip(&scene.texcoords)
+        .all(|(id, places)| {
+            let corners = scene.corners(id);
+            (0..3).all(|side| {
+                let next = (side + 1) % 3;
+                let repeats = places[side].distance(places[next]);
+                repeats <= most.max(most_by_unit * corners[side].distance(corners[next]))
+            })
+        })
 }
 
 impl DetailSet {
@@ -57,12 +79,13 @@ impl DetailSet {
             pixels: vec![Vec3::ONE],
         };
         let view = upload(gpu, &white);
-        // Software may filter though nothing is sampled, and what has no texture has no place in it.
-        let plain = bind_group(gpu, &layout, &sampler(1), &view, [1.0, 1.0, 1.0, 0.0]);
+        let upright = sampler(1);
+        let plain = bind_group(gpu, &layout, &upright, &view, [1.0, 1.0, 1.0, 0.0]);
         Self {
             layout,
             // Floors are seen at a slant.
-            sampler: sampler(16),
+            slanted: sampler(16),
+            upright,
             plain,
             scene: None,
             views: Vec::new(),
@@ -97,6 +120,10 @@ impl DetailSet {
         self.factors = factors.to_vec();
         self.textured.clear();
         self.group_of = vec![0; scene.materials.len()];
+        let sampler = match is_tame(scene) {
+            true => &self.slanted,
+            false => &self.upright,
+        };
         for (index, material) in scene.materials.iter().enumerate() {
             let Some(texture) = material.reflectance_texture else {
                 continue;
@@ -106,13 +133,8 @@ impl DetailSet {
                 .get_or_insert_with(|| upload(gpu, &scene.textures[texture.index()]));
             let factor = factors.get(index).unwrap_or(&material.reflectance);
             let [r, g, b] = factor.to_array();
-            self.textured.push(bind_group(
-                gpu,
-                &self.layout,
-                &self.sampler,
-                view,
-                [r, g, b, 1.0],
-            ));
+            self.textured
+                .push(bind_group(gpu, &self.layout, sampler, view, [r, g, b, 1.0]));
             *group = self.textured.len();
         }
     }

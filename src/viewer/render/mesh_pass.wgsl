@@ -67,19 +67,6 @@ fn false_color(value: f32) -> vec3<f32> {
     return mix(view.ramp[below].rgb, view.ramp[below + 1u].rgb, at - f32(below));
 }
 
-// A slope that a texture can be sampled by. Where a texture repeats more than once over a pixel, its mean shows anyway. On
-// slivers slopes can be anything, and software that filters along them would never end.
-fn sampled_slope(slope: vec2<f32>) -> vec2<f32> {
-    return select(vec2<f32>(1.0), slope, abs(slope) <= vec2<f32>(1.0));
-}
-
-fn texel(place: vec2<f32>) -> vec3<f32> {
-    let across = sampled_slope(dpdx(place));
-    let down = sampled_slope(dpdy(place));
-    let at = select(vec2<f32>(0.0), fract(place), abs(place) <= vec2<f32>(1e6));
-    return textureSampleGrad(detail_texture, detail_sampler, at, across, down).rgb;
-}
-
 fn to_viewer(surface: Surface) -> vec3<f32> {
     if (view.eye.w > 0.5) {
         return view.backward.xyz;
@@ -93,9 +80,10 @@ fn exposed(radiance: vec3<f32>) -> vec4<f32> {
 
 @fragment
 fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
+    let texel = textureSample(detail_texture, detail_sampler, vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y));
     var reflectance = surface.reflectance;
     if (detail.factor.w * view.display.w > 0.5) {
-        reflectance = detail.factor.rgb * texel(vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y));
+        reflectance = detail.factor.rgb * texel.rgb;
     }
     let radiance = surface.emission + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
