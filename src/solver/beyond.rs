@@ -4,7 +4,7 @@
 //! show as a smudge all over the elements beside them. So where rays from such a vertex meet backs alone, its light is
 //! that of a place further within the element: just before the wall.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, ops::Range};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -51,10 +51,7 @@ impl Beyond {
     /// Where light of the corners of a leaf is evaluated; `corners` are where they are.
     pub(super) fn places(&self, element: &Element, corners: [Vec3; 3]) -> [Vec3; 3] {
         [0, 1, 2].map(|side| {
-            let moved = match self.moved.is_empty() {
-                true => None,
-                false => self.moved.get(&element.vertices[side]),
-            };
+            let moved = self.moved.get(&element.vertices[side]);
             let inset = moved.map_or(INSET, |moved| moved.inset);
             corners[side].lerp(element.centroid, inset)
         })
@@ -64,7 +61,7 @@ impl Beyond {
     pub(super) fn vertex_places(
         &self,
         hierarchy: &Hierarchy,
-        elements: std::ops::Range<usize>,
+        elements: Range<usize>,
         is_wanted: &[bool],
     ) -> Vec<(u32, Receiver)> {
         let mut places = vertex_places(hierarchy, elements, is_wanted);
@@ -108,7 +105,6 @@ impl DirectField {
         cancel.proceed()?;
         let mut shot = 0;
         let mut is_new = vec![false; count];
-        let mut is_any = false;
         for (vertex, leaf, (moved, rays)) in found {
             shot += rays;
             self.beyond.looked_at[vertex as usize] = leaf;
@@ -116,10 +112,9 @@ impl DirectField {
                 self.beyond.moved.insert(vertex, moved);
                 self.vertices[vertex as usize] = Some(DirectLight::default());
                 is_new[vertex as usize] = true;
-                is_any = true;
             }
         }
-        if !is_any {
+        if !is_new.contains(&true) {
             return Some(shot);
         }
         let all = 0..hierarchy.mesh.elements.len();

@@ -29,6 +29,8 @@ pub(super) struct DetailSet {
     upright: wgpu::Sampler,
     plain: wgpu::BindGroup,
     scene: Option<Arc<Scene>>,
+    /// Whether its textures are sampled along the slant.
+    is_tame: bool,
     /// Its textures, those that were needed.
     views: Vec<Option<wgpu::TextureView>>,
     /// What each material multiplies its texture by; empty where that is as the scene says.
@@ -88,6 +90,7 @@ impl DetailSet {
             upright,
             plain,
             scene: None,
+            is_tame: true,
             views: Vec::new(),
             factors: Vec::new(),
             group_of: Vec::new(),
@@ -113,6 +116,7 @@ impl DetailSet {
         let is_held = |held: &Arc<Scene>| Arc::ptr_eq(held, scene);
         if !self.scene.as_ref().is_some_and(is_held) {
             self.scene = Some(scene.clone());
+            self.is_tame = is_tame(scene);
             self.views = vec![None; scene.textures.len()];
         } else if self.factors == factors {
             return;
@@ -120,7 +124,7 @@ impl DetailSet {
         self.factors = factors.to_vec();
         self.textured.clear();
         self.group_of = vec![0; scene.materials.len()];
-        let sampler = match is_tame(scene) {
+        let sampler = match self.is_tame {
             true => &self.slanted,
             false => &self.upright,
         };
