@@ -14,12 +14,19 @@ use obvhs::{
     triangle::Triangle as RayTriangle,
 };
 
-use crate::scene::{Scene, TriangleId};
+use crate::scene::{Frame, Scene, TriangleId};
 
 /// Rays start and end this far from their ends, in frame units: a millionth of the scene's extent.
 /// Much smaller, and a ray meets the surface that it leaves; much larger, and thin gaps leak or close.
 /// At the rim of the frame (50 units) single precision resolves 4e-6.
 pub const RAY_OFFSET: f32 = 1e-4;
+
+/// Triangles with longer edges are stored in pieces, unless they are far from the origin: an intersection is known to about
+/// a millionth of the triangle's size. Smaller costs memory, larger lets a huge ground be met beside where it is.
+const LONGEST_EDGE: f32 = 4.0 * Frame::EXTENT as f32;
+
+/// Longest edge of a piece in multiples of its distance from the origin, about which all detail lies.
+const LONGEST_BY_DISTANCE: f32 = 1.0;
 
 /// How the tree is built. The search for the best partner of a box must begin with the leaves: where the first levels take
 /// neighbours along a curve through space instead, as the usual settings have it, large walls share nodes with fine
@@ -44,6 +51,8 @@ pub struct RayTree {
     tree: CwBvh,
     /// In the order of the tree's primitives.
     triangles: Vec<RtTriangle>,
+    /// Which triangle of the scene each of them is, or is a piece of.
+    ids: Vec<u32>,
     crossings: f32,
 }
 
@@ -53,6 +62,7 @@ impl RayTree {
         Self {
             tree: CwBvh::default(),
             triangles: Vec::new(),
+            ids: Vec::new(),
             crossings: 0.0,
         }
     }
@@ -64,24 +74,26 @@ impl RayTree {
 
     /// Build the tree over all triangles of a scene.
     pub fn new(scene: &Scene) -> Self {
-        let triangles: Vec<RayTriangle> = scene
-            .triangle_ids()
-            .map(|id| {
-                let [a, b, c] = scene.corners(id).map(Into::into);
-                RayTriangle {
+        let mut triangles: Vec<RayTriangle> = Vec::with_capacity(scene.triangles.len());
+        let mut ids = Vec::with_capacity(scene.triangles.len());
+        for id in scene.triangle_ids() {
+            for piece in pieces(scene.corners(id)) {
+                let [a, b, c] = piece.map(Into::into);
+                triangles.push(RayTriangle {
                     v0: a,
                     v1: b,
                     v2: c,
-                }
-            })
-            .collect();
+                });
+                ids.push(id.0);
+            }
+        }
         let tree = build_cwbvh_from_tris(&triangles, BUILD, &mut Duration::default());
+        let order = || tree.primitive_indices.iter().map(|&index| index as usize);
         Self {
-            triangles: tree
-                .primitive_indices
-                .iter()
-                .map(|&index| RtTriangle::from(&triangles[index as usize]))
+            triangles: order()
+                .map(|index| RtTriangle::from(&triangles[index]))
                 .collect(),
+            ids: order().map(|index| ids[index]).collect(),
             crossings: crossings(&triangles),
             tree,
         }
@@ -114,7 +126,7 @@ impl RayTree {
             if distance == f32::INFINITY {
                 return distance;
             }
-            let id = self.tree.primitive_indices[primitive];
+            let id = self.ids[primitive];
             if id == first || id == second {
                 f32::INFINITY
             } else {
@@ -135,7 +147,7 @@ impl RayTree {
         let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
             let triangle = &self.triangles[primitive];
             let distance = triangle.intersect(ray);
-            if distance == f32::INFINITY || self.tree.primitive_indices[primitive] == start {
+            if distance == f32::INFINITY || self.ids[primitive] == start {
                 return f32::INFINITY;
             }
             let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
@@ -146,7 +158,7 @@ impl RayTree {
             }
         });
         met.then(|| Hit {
-            triangle: TriangleId(self.tree.primitive_indices[hit.primitive_id as usize]),
+            triangle: TriangleId(self.ids[hit.primitive_id as usize]),
             distance: self.triangles[hit.primitive_id as usize].intersect(&ray),
         })
     }
@@ -165,7 +177,7 @@ impl RayTree {
         // Nothing counts as met, so that the ray goes through everything.
         self.tree
             .ray_traverse(ray, &mut RayHit::none(), |ray, primitive| {
-                let id = TriangleId(self.tree.primitive_indices[primitive]);
+                let id = TriangleId(self.ids[primitive]);
                 let triangle = &self.triangles[primitive];
                 if bounds(id) && from != Some(id) && triangle.intersect(ray) < f32::INFINITY {
                     let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
@@ -181,7 +193,31 @@ impl RayTree {
         size_of_val(self.tree.nodes.as_slice())
             + size_of_val(self.triangles.as_slice())
             + size_of_val(self.tree.primitive_indices.as_slice())
+            + size_of_val(self.ids.as_slice())
     }
+}
+
+/// A triangle, or, where it is huge, its pieces: halves across the longest edge, again and again.
+fn pieces(corners: [Vec3; 3]) -> Vec<[Vec3; 3]> {
+    let (mut pieces, mut pending) = (Vec::new(), vec![corners]);
+    while let Some([a, b, c]) = pending.pop() {
+        let edges = [(a - b).length(), (b - c).length(), (c - a).length()];
+        let longest = edges.into_iter().fold(0.0, f32::max);
+        let distance = ((a + b + c) / 3.0).length() - longest;
+        if longest <= LONGEST_EDGE.max(LONGEST_BY_DISTANCE * distance) {
+            pieces.push([a, b, c]);
+            continue;
+        }
+        // Turned so that the longest edge comes first.
+        let [a, b, c] = match edges.iter().position(|&edge| edge >= longest) {
+            Some(1) => [b, c, a],
+            Some(2) => [c, a, b],
+            _ => [a, b, c],
+        };
+        let middle = (a + b) * 0.5;
+        pending.extend([[a, middle, c], [middle, b, c]]);
+    }
+    pieces
 }
 
 /// See [`RayTree::crossings`]: areas of boxes relative to that of the box about all.

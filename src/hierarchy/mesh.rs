@@ -242,14 +242,19 @@ impl Mesh {
 
     /// Area of the leaves about each vertex.
     pub fn areas_about_vertices(&self) -> Vec<f32> {
-        let mut areas = vec![0.0; self.vertices.len()];
+        self.sums_about_vertices(|leaf| self.elements[leaf].area_vector.length())
+    }
+
+    /// Sums over the leaves about each vertex.
+    pub fn sums_about_vertices(&self, of: impl Fn(usize) -> f32) -> Vec<f32> {
+        let mut sums = vec![0.0; self.vertices.len()];
         for leaf in self.leaves() {
-            let element = &self.elements[leaf];
-            for vertex in element.vertices {
-                areas[vertex as usize] += element.area_vector.length();
+            let value = of(leaf);
+            for vertex in self.elements[leaf].vertices {
+                sums[vertex as usize] += value;
             }
         }
-        areas
+        sums
     }
 
     /// The leaves for which light is computed, in order.
@@ -505,9 +510,11 @@ fn share_vertices(
                     .normal
                     .dot(patches[other.triangle as usize].normal)
             };
-            let best = down
-                .iter()
-                .max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+            let best = match run.len() {
+                0..=2 => down.first(),
+                // What stands between two faces parts them, however smoothly they go on.
+                _ => next_around(scene, patches, one, run),
+            };
             let Some(other) = best else { continue };
             if likeness(&other) >= smooth
                 && same_material(scene, patches, one.triangle, other.triangle)
@@ -549,6 +556,47 @@ fn share_vertices(
         })
         .collect();
     Some((vertices, vertex_of))
+}
+
+/// Of the patches at an edge the first that is met when one of them is turned about it towards its lit side; `None` where
+/// that is the back of a one-sided surface.
+fn next_around<'a>(
+    scene: &Scene,
+    patches: &[Patch],
+    one: &HalfEdge,
+    run: &'a [HalfEdge],
+) -> Option<&'a HalfEdge> {
+    /// Angles that differ by less are those of faces in one place.
+    const SAME_ANGLE: f32 = 1e-3;
+    let [from, to] = one.ends.map(|end| scene.positions[end as usize]);
+    // Along the edge in the order of the corners, and from it into the patch.
+    let inward = |half: &HalfEdge| {
+        let along = if half.is_forward {
+            to - from
+        } else {
+            from - to
+        };
+        patches[half.triangle as usize]
+            .normal
+            .cross(along)
+            .normalize_or_zero()
+    };
+    let triangle = |half: &HalfEdge| patches[half.triangle as usize].triangle;
+    let (normal, own) = (patches[one.triangle as usize].normal, inward(one));
+    let angle = |half: &HalfEdge| {
+        let other = inward(half);
+        let angle = other.dot(normal).atan2(other.dot(own));
+        if angle < SAME_ANGLE {
+            angle + std::f32::consts::TAU
+        } else {
+            angle
+        }
+    };
+    let others = run.iter().take(2 * MOST_NEIGHBOURS);
+    let others = others.filter(|half| triangle(half) != triangle(one));
+    let nearest = others.clone().map(angle).fold(f32::INFINITY, f32::min);
+    let mut at_nearest = others.filter(|half| angle(half) <= nearest + SAME_ANGLE);
+    at_nearest.find(|half| half.is_forward != one.is_forward)
 }
 
 fn same_material(scene: &Scene, patches: &[Patch], a: u32, b: u32) -> bool {

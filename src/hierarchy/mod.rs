@@ -9,6 +9,7 @@ mod build;
 mod directional;
 mod edge_leaves;
 mod facing;
+mod importance;
 mod mesh;
 mod subtrees;
 mod tables;
@@ -16,6 +17,7 @@ mod validate;
 
 pub use build::PatchTree;
 pub use directional::{Moments, Quantity, Reading};
+pub use importance::{Importance, longest_edge_squared};
 pub use mesh::{Element, Mesh, Vertex};
 pub use subtrees::Subtrees;
 pub use tables::{Tables, luminance};
@@ -27,6 +29,9 @@ use crate::scene::{Scene, TriangleId};
 /// Tasks that work over the patches is shared into, where there are as many. Fewer, and threads wait for the last one; more,
 /// and what each works out for itself of the clusters above adds up.
 const LEAST_TASKS: u32 = 64;
+
+/// A point that is less high over an element than this share of its radius lies in its plane: rounding tilts flat meshes.
+const IN_PLANE: f32 = 1e-3;
 
 /// Index of a patch, in tree order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -139,8 +144,10 @@ pub struct Hierarchy {
     pub patches: Vec<Patch>,
     /// Elements and the vertices that they share.
     pub mesh: Mesh,
-    /// Sum of all patch areas.
-    pub area: f64,
+    /// How much errors on each patch count.
+    pub importance: Importance,
+    /// By cluster: sum of the patch areas, each times its weight.
+    weighted_areas: Vec<f32>,
     /// Parts of the binary tree for several threads.
     pub subtrees: Subtrees,
     /// The patches on the front and on the back of each triangle; `u32::MAX` for a back that is not lit.
@@ -178,13 +185,14 @@ impl Hierarchy {
         for (index, patch) in patches.iter().enumerate() {
             sides[patch.triangle.index()][usize::from(patch.is_back)] = index as u32;
         }
-        let area = patches.iter().map(|patch| f64::from(patch.area)).sum();
+        let importance = Importance::new(scene, &patches);
         Some(Self {
             subtrees: Subtrees::new(&clusters),
+            weighted_areas: weighted_areas(&clusters, &patches, &importance),
             clusters,
             patches,
             mesh,
-            area,
+            importance,
             sides,
         })
     }
@@ -319,6 +327,64 @@ impl Hierarchy {
         }
     }
 
+    /// Whether no other surface stands above the plane of an element within so many of its radii of it.
+    pub fn is_empty_above(&self, element: usize, radii: f32) -> bool {
+        let at = &self.mesh.elements[element];
+        let normal = self.patch_of(element).normal;
+        let reach = radii * at.radius;
+        let height = |point: Vec3| (point - at.centroid).dot(normal);
+        let mut pending = vec![0];
+        while let Some(index) = pending.pop() {
+            let cluster: &Cluster = &self.clusters[index];
+            let nearest = at.centroid.clamp(cluster.min, cluster.max);
+            let middle = (cluster.min + cluster.max) * 0.5;
+            let highest = height(middle) + ((cluster.max - cluster.min) * 0.5).dot(normal.abs());
+            if nearest.distance(at.centroid) > reach || highest <= IN_PLANE * at.radius {
+                continue;
+            }
+            if !cluster.is_leaf() {
+                pending.extend([
+                    cluster.first_child as usize,
+                    cluster.first_child as usize + 1,
+                ]);
+                continue;
+            }
+            let stands_above = |patch: usize| {
+                let corners = self.mesh.corners(patch);
+                let is_above = corners.iter().any(|&c| height(c) > IN_PLANE * at.radius);
+                let [a, b, c] = corners;
+                let near = at.centroid.clamp(a.min(b).min(c), a.max(b).max(c));
+                is_above && near.distance(at.centroid) <= reach
+            };
+            if cluster.patches().any(stands_above) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The part of the scene's area that an element, or a point on it that stands for so much area, has for errors of what
+    /// it receives; above 1 where it is huge.
+    pub fn share_of_area(&self, element: usize, area: f32) -> f32 {
+        let weight = self
+            .importance
+            .weight(self.mesh.elements[element].patch as usize);
+        (f64::from(area * weight) / self.importance.area.max(f64::MIN_POSITIVE)) as f32
+    }
+
+    /// The same for a node.
+    pub fn node_share_of_area(&self, node: NodeId) -> f32 {
+        match self.kind(node) {
+            Kind::Cluster(index) => {
+                let area = f64::from(self.weighted_areas[index]);
+                (area / self.importance.area.max(f64::MIN_POSITIVE)) as f32
+            }
+            Kind::Element(index) => {
+                self.share_of_area(index, self.mesh.elements[index].area_vector.length())
+            }
+        }
+    }
+
     /// The patch that an element lies on.
     pub fn patch_of(&self, element: usize) -> &Patch {
         &self.patches[self.mesh.elements[element].patch as usize]
@@ -329,6 +395,24 @@ impl Hierarchy {
         size_of_val(self.clusters.as_slice())
             + size_of_val(self.patches.as_slice())
             + size_of_val(self.sides.as_slice())
+            + size_of_val(self.weighted_areas.as_slice())
+            + self.importance.memory_bytes()
             + self.mesh.memory_bytes()
     }
+}
+
+/// By cluster: sum of the areas of its patches, each times its weight.
+fn weighted_areas(clusters: &[Cluster], patches: &[Patch], importance: &Importance) -> Vec<f32> {
+    let mut areas = vec![0.0f64; clusters.len()];
+    // Children come after their parents.
+    for (index, cluster) in clusters.iter().enumerate().rev() {
+        areas[index] = if cluster.is_leaf() {
+            let area = |patch: usize| f64::from(patches[patch].area * importance.weight(patch));
+            cluster.patches().map(area).sum()
+        } else {
+            let first = cluster.first_child as usize;
+            areas[first] + areas[first + 1]
+        };
+    }
+    areas.into_iter().map(|area| area as f32).collect()
 }

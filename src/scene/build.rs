@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::crossings::cut_crossings;
 use super::sidedness::{self, Shells};
 use super::texture::{TextureAverage, cured};
 use super::{
-    Frame, Material, MaterialId, Object, Scene, Spared, Surface, Texture, TextureId, Triangle,
-    TriangleId, Warning, WarningKind,
+    Frame, Material, MaterialId, Object, Scene, SizeClasses, Spared, Surface, Texture, TextureId,
+    Triangle, TriangleId, Warning, WarningKind,
 };
 
 /// Which sides of a triangle reflect and emit.
@@ -188,6 +189,7 @@ impl SceneBuilder {
                 place: None,
             });
         }
+        cut_crossings(&mut scene);
         Ok(scene)
     }
 }
@@ -499,7 +501,36 @@ impl SceneBuilder {
                 || (DVec3::MAX, DVec3::MIN),
                 |a, b| (a.0.min(b.0), a.1.max(b.1)),
             );
-        Frame::fitting(min, max)
+        let extent = (max - min).max_element();
+        let frame = Frame::fitting(min, max);
+        let sizes = self.sizes_of_reflecting_faces();
+        let classes = SizeClasses::new(sizes.iter().map(|&(squared, area, _)| (squared, area)));
+        let detail = LARGEST_EXTENT * classes.area.sqrt();
+        frame.focused(extent, detail, || {
+            let fine = sizes
+                .into_iter()
+                .filter(|(squared, ..)| classes.is_fine(*squared));
+            median(fine.map(|(_, _, centroid)| centroid).collect())
+        })
+    }
+
+    /// Squared longest edge, area and centroid of all faces that do not emit, or of all where all do, in world units.
+    fn sizes_of_reflecting_faces(&self) -> Vec<(f64, f64, DVec3)> {
+        let emits = |face: &Face| self.materials[face.material.index()].emission != Vec3::ZERO;
+        let all_emit = self.faces.iter().all(emits);
+        let chosen = self
+            .faces
+            .par_iter()
+            .filter(|face| all_emit || !emits(face));
+        chosen
+            .map(|face| {
+                let [a, b, c] = face.corners.map(|corner| self.positions[corner as usize]);
+                let squares = [a - b, b - c, c - a].map(DVec3::length_squared);
+                let longest = squares.into_iter().fold(0.0, f64::max);
+                let area = 0.5 * (b - a).cross(c - a).length();
+                (longest, area, (a + b + c) / 3.0)
+            })
+            .collect()
     }
 
     /// Merge corners that fall on the same frame position; returns the positions and where each old one went.
@@ -576,6 +607,24 @@ impl SceneBuilder {
             }
         }
         averages
+    }
+}
+
+/// Largest extent of a scene, in multiples of the root of its area, that its frame fits. Usual rooms have less than 1, a
+/// corridor 3; beyond, it is far surroundings, or a stray vertex, that make a scene large.
+const LARGEST_EXTENT: f64 = 4.0;
+
+/// The median of some points by coordinate, zero of none.
+fn median(mut points: Vec<DVec3>) -> DVec3 {
+    let middle = points.len() / 2;
+    let coordinate = |axis: usize| {
+        let (_, point, _) =
+            points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
+        point[axis]
+    };
+    match middle {
+        0 => points.first().copied().unwrap_or_default(),
+        _ => DVec3::from_array([0, 1, 2].map(coordinate)),
     }
 }
 

@@ -1,6 +1,7 @@
-//! The frame in which a scene is computed: centred on the origin, its largest extent [`Frame::EXTENT`].
+//! The frame in which a scene is computed: what is lit lies about the origin and is about [`Frame::EXTENT`] large.
 //!
-//! Radiosity does not depend on scale, but single precision and the ray tree do: far from 1, rays miss silently.
+//! Radiosity does not depend on scale, but single precision and the ray tree do: far from 1, rays miss silently, and where
+//! a sky or a ground is much larger than what stands in it, that must lie where numbers are fine.
 
 use glam::{DVec3, Vec3};
 
@@ -31,6 +32,22 @@ impl Frame {
             scale,
         }
     }
+
+    /// The same frame with `detail` as its largest extent and a centre of its own, where that is smaller than a scene of
+    /// this extent by far.
+    pub fn focused(self, extent: f64, detail: f64, centre: impl FnOnce() -> DVec3) -> Self {
+        let scale = Self::EXTENT / detail;
+        if !(scale.is_finite() && detail < extent) {
+            return self;
+        }
+        Self {
+            centre: centre(),
+            scale: scale.min(Self::MOST_EXTENT / extent),
+        }
+    }
+
+    /// Largest extent of all surroundings in frame units. Larger, and products of distances overflow single precision.
+    const MOST_EXTENT: f64 = 1e8;
 
     /// World to frame.
     pub fn from_world(&self, point: DVec3) -> Vec3 {

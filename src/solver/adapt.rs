@@ -14,13 +14,18 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    hierarchy::{Element, Hierarchy},
+    hierarchy::{Element, Hierarchy, longest_edge_squared},
     transport::luminance,
 };
 
-/// No element is larger than this share of the scene's area: smaller shadows than such an element could be missed by
-/// all its corners. Larger misses more, smaller costs vertices on empty walls.
-const LARGEST_SHARE: f64 = 1.0 / 1000.0;
+/// No element is longer than the longest edge of a right isosceles triangle of this share of the scene's area: smaller
+/// shadows than such an element could be missed by all its corners. Larger misses more, smaller costs vertices on empty
+/// walls.
+const LARGEST_SHARE: f32 = 1.0 / 1000.0;
+
+/// Larger elements are left whole where no other surface stands above their plane within this many radii and light does
+/// not bend: nothing can cast a shadow there. Smaller misses shadows that fall far, larger divides empty ground.
+const EMPTY_RADII: f32 = 16.0;
 
 /// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
 pub(super) const SPREAD_SHARE: f32 = 0.15;
@@ -69,23 +74,32 @@ pub(super) struct DirectField {
 }
 
 /// Divide elements that are too large to be trusted with their corners. Returns whether all could be. Where nothing casts
-/// a shadow, `lights` tell over which elements their light does not bend: these stay whole.
+/// a shadow, in all of the scene if `is_clear`, `lights` tell over which elements their light does not bend: these stay
+/// whole.
 pub(super) fn divide_coarse(
     hierarchy: &mut Hierarchy,
     lights: Option<&Lights>,
+    is_clear: bool,
     limits: Limits,
 ) -> bool {
-    let largest = ((hierarchy.area * LARGEST_SHARE) as f32).max(4.0 * limits.min_area);
     loop {
-        let elements = &hierarchy.mesh.elements;
         let large: Vec<usize> = hierarchy
             .mesh
             .held_leaves()
-            .filter(|&leaf| elements[leaf].area_vector.length() > largest)
+            .filter(|&leaf| is_large(hierarchy, leaf, limits))
             .collect();
+        // Elsewhere than in the clear, links divide elements for the light that they carry.
+        let bends = |leaf: usize| match lights {
+            Some(lights) if is_clear || lights.are_all(hierarchy) => {
+                lights.bend_over(hierarchy, leaf, limits)
+            }
+            _ => is_clear,
+        };
         let wanted: Vec<u32> = large
             .into_par_iter()
-            .filter(|&leaf| lights.is_none_or(|lights| lights.bend_over(hierarchy, leaf, limits)))
+            .filter(|&leaf| {
+                (!is_clear && !hierarchy.is_empty_above(leaf, EMPTY_RADII)) || bends(leaf)
+            })
             .map(|leaf| leaf as u32)
             .collect();
         if !hierarchy.mesh.fits(&wanted, limits.most_elements) {
@@ -95,6 +109,14 @@ pub(super) fn divide_coarse(
             return true;
         }
     }
+}
+
+/// Whether an element is too large, or too long, to be trusted with its corners.
+fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
+    let squared = longest_edge_squared(hierarchy.mesh.corners(leaf)) as f32;
+    // The area of a right isosceles triangle with that edge.
+    let area = squared * 0.25;
+    hierarchy.share_of_area(leaf, area) > LARGEST_SHARE && area > 4.0 * limits.min_area
 }
 
 /// Leaves between whose corners the light that they found over links bends, as [`DirectField::adapt`] has it.
@@ -120,15 +142,16 @@ pub(super) fn bent_under(
 /// Root of an element's share of the area: what an error on it counts.
 pub(super) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     let area = hierarchy.mesh.elements[element].area_vector.length();
-    (area / hierarchy.area as f32).sqrt()
+    hierarchy.share_of_area(element, area).sqrt()
 }
 
 /// The same for each vertex: a third of the leaves about it is its own.
 pub(super) fn vertex_share_roots(hierarchy: &Hierarchy) -> Vec<f32> {
-    let areas = hierarchy.mesh.areas_about_vertices().into_iter();
-    areas
-        .map(|area| (area / (3.0 * hierarchy.area as f32)).sqrt())
-        .collect()
+    let mesh = &hierarchy.mesh;
+    let shares = mesh.sums_about_vertices(|leaf| {
+        hierarchy.share_of_area(leaf, mesh.elements[leaf].area_vector.length())
+    });
+    shares.into_iter().map(|sum| (sum / 3.0).sqrt()).collect()
 }
 
 /// The centroid of an element, as a place to be lit.
@@ -269,12 +292,7 @@ impl DirectField {
     }
 
     fn mean(&self, hierarchy: &Hierarchy) -> f32 {
-        let sum = super::gather::area_sum(hierarchy, |leaf| self.element(hierarchy, leaf));
-        luminance(
-            (sum / hierarchy.area.max(f64::MIN_POSITIVE))
-                .as_vec3()
-                .extend(0.0),
-        )
+        super::gather::scale(hierarchy, |leaf| self.element(hierarchy, leaf))
     }
 
     /// How much the luminance of the corners varies, times the weight of the element, relative to the mean.
@@ -302,6 +320,30 @@ impl DirectField {
         most * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
+    /// How far light that nothing blocks is from linear between the corners of an element, as `spread` counts; 0 where it
+    /// cannot be above the tolerance, or where none reaches the corners.
+    fn bend_unoccluded(
+        &self,
+        hierarchy: &Hierarchy,
+        element: usize,
+        limits: Limits,
+        mean: f32,
+    ) -> f32 {
+        let lights = hierarchy.mesh.elements[element]
+            .vertices
+            .map(|vertex| self.vertices[vertex as usize].unwrap_or_default());
+        let corners = lights.map(|light| luminance(light.unoccluded()));
+        let weight = share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE);
+        let brightest = luminance(self.lights.brightest());
+        let is_dark = lights.iter().all(|light| light.fraction() == Vec4::ZERO);
+        if is_dark || brightest * weight <= limits.tolerance {
+            return 0.0;
+        }
+        let centre = centre_of(hierarchy, element);
+        let at_centre = luminance(self.lights.unoccluded(&centre, &mut Vec::new()));
+        (at_centre - corners.iter().sum::<f32>() / 3.0).abs() * weight
+    }
+
     /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance. Returns the rays
     /// shot.
     fn probe_centres(
@@ -322,6 +364,7 @@ impl DirectField {
                     && hierarchy.mesh.elements[leaf].is_open()
                     && self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
+                        || self.bend_unoccluded(hierarchy, leaf, limits, mean) > limits.tolerance
                         || self.may_show(hierarchy, leaf, limits, mean)
                         || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
             })

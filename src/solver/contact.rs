@@ -120,7 +120,7 @@ impl Solver {
         // The same in all steps, whose tolerances fall.
         let limits = self.direct_limits(1.0);
         let root = CONTACT_TOLERANCE * limits.tolerance;
-        (root * root * self.hierarchy.area as f32).max(limits.min_area)
+        (root * root * self.hierarchy.importance.area as f32).max(limits.min_area)
     }
 }
 

@@ -139,6 +139,11 @@ impl Lights {
         irradiance.min(self.brightest)
     }
 
+    /// Largest radiosity of an emitter by channel.
+    pub(super) fn brightest(&self) -> Vec4 {
+        self.brightest
+    }
+
     /// Whether nothing is sampled.
     pub(super) fn is_empty(&self) -> bool {
         self.emitters.is_empty()
@@ -160,11 +165,13 @@ impl Lights {
         held.all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
     }
 
-    /// Luminance of the power of the emitters per area of the scene: the mean irradiance if all of it arrives.
+    /// Luminance of the power of the emitters per area of the scene: the mean irradiance if all of it arrives, where that is
+    /// no more than can.
     pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
         let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
         let sum: f64 = self.emitters.iter().map(power).sum();
-        (sum / hierarchy.area.max(f64::MIN_POSITIVE)) as f32
+        let mean = (sum / hierarchy.importance.area.max(f64::MIN_POSITIVE)) as f32;
+        mean.min(luminance(self.brightest))
     }
 
     /// The patches that are sampled.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{Cancel, Push, anderson::ordered_sum};
 use crate::{
     hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
-    transport::{Kernel, LinkStore, self_irradiance},
+    transport::{Kernel, LinkStore, luminance, self_irradiance},
 };
 
 /// Nodes that one task gathers for.
@@ -257,4 +257,27 @@ pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync)
         let area = f64::from(elements[index].area_vector.length());
         of(index).truncate().as_dvec3() * area
     })
+}
+
+/// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
+pub(super) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
+    let importance = &hierarchy.importance;
+    let elements = &hierarchy.mesh.elements;
+    let measured = |leaf: usize| of(leaf) * importance.measure(elements[leaf].patch as usize);
+    let sum = area_sum(hierarchy, measured) / importance.area.max(f64::MIN_POSITIVE);
+    sum.as_vec3().extend(0.0)
+}
+
+/// Part of the scene that is taken to be lit at least: light on less of it is measured by its root mean square and not by
+/// its mean, which would tell of the dark.
+const LEAST_LIT: f32 = 1.0 / 9.0;
+
+/// The luminance by which errors of a quantity are measured: its mean over the scene, or, where it is concentrated on a
+/// small part, what the mean would be if that part were [`LEAST_LIT`] of the scene.
+pub(super) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
+    let moments = mean(hierarchy, |leaf| {
+        let value = luminance(of(leaf));
+        Vec4::new(value, value * value, 0.0, 0.0)
+    });
+    moments.x.max((moments.y * LEAST_LIT).sqrt())
 }

@@ -419,8 +419,8 @@ impl Solver {
     /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
     fn divide_coarse(&mut self, limits: adapt::Limits) -> bool {
         let lights = self.direct.as_ref().map(|field| &field.lights);
-        let lights = lights.filter(|_| self.plan.follows_light);
-        adapt::divide_coarse(&mut self.hierarchy, lights, limits)
+        let is_clear = self.plan.follows_light;
+        adapt::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
     }
 
     /// Where nothing else divides them, divide elements over which the light of the last step bends.
@@ -472,20 +472,21 @@ impl Solver {
 
     /// Smallest element area that may be divided off, frame units.
     fn min_area(&self) -> f32 {
-        (f64::from(self.settings.min_area) * self.hierarchy.area) as f32
+        (f64::from(self.settings.min_area) * self.hierarchy.importance.area) as f32
     }
 
     /// Mean irradiance (luminance), to which thresholds relate. Before any link it is guessed from the direct light.
     fn estimate_mean(&mut self) {
-        let total = gather::area_sum(&self.hierarchy, |leaf| {
+        let mut mean = gather::scale(&self.hierarchy, |leaf| {
             self.linked[leaf] + self.direct_of(leaf)
         });
-        let linked = gather::area_sum(&self.hierarchy, |leaf| self.linked[leaf]);
-        let area = self.hierarchy.area.max(f64::MIN_POSITIVE);
-        let mut mean = luminance((total / area).as_vec3().extend(0.0));
-        if linked == glam::DVec3::ZERO {
+        let is_dark = |light: &Vec4| light.truncate() == Vec3::ZERO;
+        if self.linked.iter().all(is_dark) {
             let power = gather::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
-            mean += luminance((power / area).as_vec3().extend(0.0));
+            let power = power / self.hierarchy.importance.area.max(f64::MIN_POSITIVE);
+            let brightest = self.power.brightest(&self.hierarchy, Hierarchy::ROOT);
+            // Far surroundings send most of their light past the scene.
+            mean += luminance(power.as_vec3().extend(0.0)).min(luminance(brightest));
         }
         self.mean_irradiance = mean;
     }

@@ -47,17 +47,17 @@ impl Solver {
             .leaves
             .iter()
             .map(|leaf| {
-                let area = self.hierarchy.mesh.elements[leaf.element as usize]
-                    .area_vector
-                    .length();
+                let element = &self.hierarchy.mesh.elements[leaf.element as usize];
+                let measure = self.hierarchy.importance.measure(element.patch as usize);
+                let area = element.area_vector.length() * measure;
                 f64::from(area) * f64::from(leaf.error).powi(2)
             })
             .sum();
-        let mean = gather::area_sum(&self.hierarchy, |leaf| {
+        let mean = gather::mean(&self.hierarchy, |leaf| {
             self.linked[leaf] + self.direct_of(leaf)
-        }) / self.hierarchy.area.max(f64::MIN_POSITIVE);
-        let reference = f64::from(luminance(mean.as_vec3().extend(0.0)));
-        let root = (sum / self.hierarchy.area.max(f64::MIN_POSITIVE)).sqrt();
+        });
+        let reference = f64::from(luminance(mean));
+        let root = (sum / self.hierarchy.importance.area.max(f64::MIN_POSITIVE)).sqrt();
         if reference > 0.0 {
             (root / reference) as f32
         } else {

@@ -453,9 +453,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
 
     /// Root of the receiver's share of the area: error is summed in squares over area.
     fn weight(&self, receiver: NodeId) -> f32 {
-        let share = f64::from(self.hierarchy().node_area(receiver))
-            / self.hierarchy().area.max(f64::MIN_POSITIVE);
-        (share as f32).sqrt()
+        self.hierarchy().node_share_of_area(receiver).sqrt()
     }
 
     pub(super) fn random(&self, source: NodeId, receiver: NodeId) -> Random {

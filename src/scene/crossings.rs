@@ -1,0 +1,526 @@
+//! Faces cut along the lines where other surfaces cross them or stand on them.
+//!
+//! Light is different on both sides of a wall that stands on a floor or goes through it, so no element may lie on both
+//! (discontinuities of the value itself: Heckbert 1992; Lischinski, Tampieri & Greenberg 1992). Large faces are cut by
+//! large faces; where small ones cross, elements are small enough.
+
+use std::collections::{BTreeMap, HashMap};
+
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+
+use super::{Scene, SizeClasses, Surface, Triangle, TriangleId, build::is_degenerate};
+
+/// Faces are cut whose longest edge, squared, is more than this part of the scene's area. Smaller cuts what elements resolve
+/// anyway, larger leaves furniture whole.
+const LEAST_CUT: f64 = 4e-4;
+
+/// Lines cut that are longer, squared, than this part of the scene's area. Smaller makes slivers about small things, larger
+/// leaves the feet of furniture on whole floors.
+const LEAST_LINE: f64 = 1e-5;
+
+/// Lines by which a face is cut at most: what is crossed by more is clutter, and its parts would be slivers.
+const MOST_LINES: usize = 64;
+
+/// What is nearer than this lies in one place, frame units: half of the distance that rays keep from their ends.
+const SAME_PLACE: f64 = 5e-5;
+
+/// And relative to the distance from the origin: what single precision tells apart.
+const SAME_PLACE_RELATIVE: f64 = 5e-7;
+
+/// Cut the faces of a scene. Parts keep what their face has.
+pub(super) fn cut_crossings(scene: &mut Scene) {
+    let lines = lines(scene);
+    if lines.is_empty() {
+        return;
+    }
+    let mut points = Points::new(scene);
+    let on_edges = points.on_edges(scene, &lines);
+    let is_cut = |index: usize| {
+        lines.contains_key(&index)
+            || edges_of(scene.triangles[index].corners)
+                .iter()
+                .any(|edge| on_edges.contains_key(edge))
+    };
+    let mut parts: Vec<Parts> = Vec::with_capacity(scene.triangles.len());
+    for index in 0..scene.triangles.len() {
+        parts.push(match is_cut(index) {
+            true => points.parts(scene, index, lines.get(&index), &on_edges),
+            false => Parts::default(),
+        });
+    }
+    scene.positions = points.positions;
+    replace(scene, &parts);
+}
+
+/// Where a point lies on a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum On {
+    Corner(usize),
+    /// Edge k begins at corner k.
+    Edge(usize),
+    Inside,
+}
+
+impl On {
+    /// Bit k: whether the point lies on edge k.
+    fn edges(self) -> u8 {
+        match self {
+            Self::Corner(corner) => 1 << corner | 1 << ((corner + 2) % 3),
+            Self::Edge(edge) => 1 << edge,
+            Self::Inside => 0,
+        }
+    }
+}
+
+/// A line on a triangle by its ends.
+type Line = [(DVec3, On); 2];
+
+/// The two ends of an edge, the lesser first.
+type EdgeKey = [u32; 2];
+
+fn edges_of([a, b, c]: [u32; 3]) -> [EdgeKey; 3] {
+    [[a, b], [b, c], [c, a]].map(|[from, to]| [from.min(to), from.max(to)])
+}
+
+/// Distance within which a place is the same as this one.
+fn tolerance(at: DVec3) -> f64 {
+    SAME_PLACE.max(SAME_PLACE_RELATIVE * at.abs().max_element())
+}
+
+/// The lines by which triangles are to be cut.
+fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
+    let corners = |index: usize| scene.corners(TriangleId(index as u32)).map(Vec3::as_dvec3);
+    let longest = |index: usize| {
+        let [a, b, c] = corners(index);
+        [a - b, b - c, c - a]
+            .map(DVec3::length_squared)
+            .into_iter()
+            .fold(0.0, f64::max)
+    };
+    let count = scene.triangles.len();
+    let squares: Vec<f64> = (0..count).into_par_iter().map(longest).collect();
+    let areas = scene
+        .surfaces
+        .iter()
+        .map(|surface| f64::from(surface.area_vector.length()));
+    let whole = SizeClasses::new(squares.iter().copied().zip(areas)).area;
+    // By the lower end along an axis, so that those which may touch a box are found by search.
+    let mut cutters: Vec<(Vec3, Vec3, usize)> = (0..count)
+        .filter(|&index| squares[index] > LEAST_LINE * whole)
+        .map(|index| {
+            let [a, b, c] = scene.corners(TriangleId(index as u32));
+            (a.min(b).min(c), a.max(b).max(c), index)
+        })
+        .collect();
+    cutters.sort_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.2.cmp(&b.2)));
+    let least = LEAST_LINE * whole;
+    let lines_on = |&(min, max, index): &(Vec3, Vec3, usize)| {
+        if squares[index] <= LEAST_CUT * whole {
+            return None;
+        }
+        let slack = tolerance(min.abs().max(max.abs()).as_dvec3()) as f32;
+        let (min, max) = (min - slack, max + slack);
+        let last = cutters.partition_point(|other| other.0.x <= max.x);
+        let own = corners(index);
+        let mut found = Vec::new();
+        for &(from, to, other) in &cutters[..last] {
+            let is_near = to.cmpge(min).all() && from.cmple(max).all();
+            if other == index || !is_near || shared_corners(scene, index, other) > 1 {
+                continue;
+            }
+            let line = crossing(own, corners(other));
+            let is_wanted = |[(from, a), (to, b)]: &Line| {
+                a.edges() & b.edges() == 0 && from.distance_squared(*to) > least
+            };
+            found.extend(line.filter(is_wanted));
+            if found.len() > MOST_LINES {
+                return None;
+            }
+        }
+        (!found.is_empty()).then_some((index, found))
+    };
+    let found: Vec<(usize, Vec<Line>)> = cutters.par_iter().filter_map(lines_on).collect();
+    found.into_iter().collect()
+}
+
+fn shared_corners(scene: &Scene, a: usize, b: usize) -> usize {
+    let [a, b] = [a, b].map(|index| scene.triangles[index].corners);
+    a.iter().filter(|corner| b.contains(corner)).count()
+}
+
+/// A point of a triangle in the plane of another one.
+struct InPlane {
+    place: DVec3,
+    on: On,
+}
+
+/// The line on the first of two triangles along which they cross or touch; `None` where they do not or lie in one plane.
+fn crossing(first: [DVec3; 3], second: [DVec3; 3]) -> Option<Line> {
+    let [normal, other] = [first, second].map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero());
+    let along = normal.cross(other);
+    let own = in_plane(first, second[0], other)?;
+    let others = in_plane(second, first[0], normal)?;
+    let along = along.try_normalize()?;
+    let sorted = |[a, b]: [InPlane; 2]| {
+        if a.place.dot(along) <= b.place.dot(along) {
+            [a, b]
+        } else {
+            [b, a]
+        }
+    };
+    let ([from, to], [other_from, other_to]) = (sorted(own), sorted(others));
+    let at = |point: &InPlane| point.place.dot(along);
+    let slack = tolerance(from.place);
+    // Own ends are preferred: it is known where on the triangle they lie.
+    let start = if at(&from) >= at(&other_from) - slack {
+        (from.place, from.on)
+    } else {
+        (other_from.place, place_on(first, other_from.place))
+    };
+    let end = if at(&to) <= at(&other_to) + slack {
+        (to.place, to.on)
+    } else {
+        (other_to.place, place_on(first, other_to.place))
+    };
+    (end.0.dot(along) - start.0.dot(along) > 2.0 * slack).then_some([start, end])
+}
+
+/// The two points of the outline of a triangle that lie in a plane, given by a point and its unit normal.
+fn in_plane(corners: [DVec3; 3], origin: DVec3, normal: DVec3) -> Option<[InPlane; 2]> {
+    let heights = corners.map(|corner| {
+        let height = (corner - origin).dot(normal);
+        if height.abs() <= tolerance(corner) {
+            0.0
+        } else {
+            height
+        }
+    });
+    let mut found = Vec::with_capacity(3);
+    for corner in 0..3 {
+        let next = (corner + 1) % 3;
+        if heights[corner] == 0.0 {
+            found.push(InPlane {
+                place: corners[corner],
+                on: On::Corner(corner),
+            });
+        } else if heights[corner] * heights[next] < 0.0 {
+            // From the same end whichever triangle asks: both sides of an edge get the same point.
+            let is_first = corners[corner].to_array() < corners[next].to_array();
+            let (from, to) = if is_first {
+                (corner, next)
+            } else {
+                (next, corner)
+            };
+            let share = heights[from] / (heights[from] - heights[to]);
+            found.push(InPlane {
+                place: corners[from].lerp(corners[to], share),
+                on: On::Edge(corner),
+            });
+        }
+    }
+    found.try_into().ok()
+}
+
+/// Where a point in the plane of a triangle lies on it.
+fn place_on(corners: [DVec3; 3], point: DVec3) -> On {
+    let slack = 2.0 * tolerance(point);
+    if let Some(corner) = (0..3).find(|&corner| corners[corner].distance(point) <= slack) {
+        return On::Corner(corner);
+    }
+    let is_near = |&edge: &usize| {
+        let (from, to) = (corners[edge], corners[(edge + 1) % 3]);
+        let share = (point - from).dot(to - from) / (to - from).length_squared();
+        from.lerp(to, share.clamp(0.0, 1.0)).distance(point) <= slack
+    };
+    (0..3).find(is_near).map_or(On::Inside, On::Edge)
+}
+
+/// The points of a scene, old and new.
+struct Points {
+    positions: Vec<Vec3>,
+    known: HashMap<[u32; 3], u32>,
+}
+
+/// What a triangle is cut into: corners with their barycentric coordinates on it; empty where it stays whole.
+#[derive(Clone, Debug, Default)]
+struct Parts(Vec<[(u32, DVec3); 3]>);
+
+/// New points on edges, in order from the lesser end.
+type OnEdges = BTreeMap<EdgeKey, Vec<(f64, u32)>>;
+
+/// A point on its way into a triangulation.
+#[derive(Clone, Copy)]
+struct Corner {
+    at: DVec2,
+    point: u32,
+    /// See [`On::edges`].
+    edges: u8,
+}
+
+/// Stands for a point where two lines cross, which is not made yet.
+const UNMADE: u32 = u32::MAX;
+
+impl HasPosition for Corner {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        Point2::new(self.at.x, self.at.y)
+    }
+}
+
+impl Points {
+    fn new(scene: &Scene) -> Self {
+        let positions = scene.positions.clone();
+        let numbered = positions.iter().zip(0..);
+        Self {
+            known: numbered
+                .map(|(at, index)| (at.to_array().map(f32::to_bits), index))
+                .collect(),
+            positions,
+        }
+    }
+
+    /// The point at a place, made if it is not there.
+    fn at(&mut self, place: DVec3) -> u32 {
+        // Adding 0 turns -0 into 0, so that both have the same bits.
+        let at = place.as_vec3() + 0.0;
+        *self
+            .known
+            .entry(at.to_array().map(f32::to_bits))
+            .or_insert_with(|| {
+                self.positions.push(at);
+                self.positions.len() as u32 - 1
+            })
+    }
+
+    /// The ends of lines that lie on edges, for both faces at each.
+    fn on_edges(&mut self, scene: &Scene, lines: &BTreeMap<usize, Vec<Line>>) -> OnEdges {
+        let mut on_edges = OnEdges::new();
+        for (&index, lines) in lines {
+            let corners = scene.triangles[index].corners;
+            for &(place, on) in lines.iter().flatten() {
+                let On::Edge(edge) = on else { continue };
+                let key = edges_of(corners)[edge];
+                let [from, to] = key.map(|end| scene.positions[end as usize].as_dvec3());
+                let length = from.distance(to);
+                let share = (place - from).dot(to - from) / (length * length);
+                let slack = 2.0 * tolerance(place) / length;
+                let known = on_edges.entry(key).or_default();
+                if share > slack
+                    && share < 1.0 - slack
+                    && known.iter().all(|(other, _)| (other - share).abs() > slack)
+                {
+                    known.push((share, self.at(place)));
+                }
+            }
+        }
+        on_edges.retain(|_, points| !points.is_empty());
+        for points in on_edges.values_mut() {
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        on_edges
+    }
+
+    /// The parts of a triangle; none where it cannot be cut.
+    fn parts(
+        &mut self,
+        scene: &Scene,
+        index: usize,
+        lines: Option<&Vec<Line>>,
+        on_edges: &OnEdges,
+    ) -> Parts {
+        let ids = scene.triangles[index].corners;
+        let corners = ids.map(|id| scene.positions[id as usize].as_dvec3());
+        let plane = Plane::of(corners);
+        let mut triangulation = ConstrainedDelaunayTriangulation::<Corner>::new();
+        // The outline.
+        for (corner, &id) in ids.iter().enumerate() {
+            let at = plane.flat(corners[corner]);
+            let edges = On::Corner(corner).edges();
+            let _ = triangulation.insert(Corner {
+                at,
+                point: id,
+                edges,
+            });
+        }
+        for (edge, key) in edges_of(ids).into_iter().enumerate() {
+            for &(_, point) in on_edges.get(&key).into_iter().flatten() {
+                let at = plane.flat(self.positions[point as usize].as_dvec3());
+                let edges = On::Edge(edge).edges();
+                let _ = triangulation.insert(Corner { at, point, edges });
+            }
+        }
+        // The lines.
+        for line in lines.into_iter().flatten() {
+            let ends = line.map(|(place, on)| {
+                let corner = match on {
+                    On::Corner(corner) => Some(ids[corner]),
+                    On::Edge(edge) => {
+                        nearest(&self.positions, on_edges.get(&edges_of(ids)[edge]), place)
+                    }
+                    On::Inside => Some(self.at(place)),
+                };
+                let point = corner.unwrap_or_else(|| {
+                    // Too near to a corner to be a point of its own.
+                    let distance = |&corner: &usize| corners[corner].distance_squared(place);
+                    let nearest = (0..3).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                    ids[nearest.unwrap_or(0)]
+                });
+                let at = plane.flat(self.positions[point as usize].as_dvec3());
+                triangulation
+                    .insert(Corner {
+                        at,
+                        point,
+                        edges: on.edges(),
+                    })
+                    .ok()
+            });
+            if let [Some(from), Some(to)] = ends {
+                if from != to {
+                    triangulation.add_constraint_and_split(from, to, |at| Corner {
+                        at: DVec2::new(at.x, at.y),
+                        point: UNMADE,
+                        edges: 0,
+                    });
+                }
+            }
+        }
+        let faces: Vec<[Corner; 3]> = triangulation
+            .inner_faces()
+            .map(|face| face.vertices().map(|vertex| *vertex.data()))
+            .filter(|[a, b, c]| a.edges & b.edges & c.edges == 0)
+            .collect();
+        let mut made = |corner: Corner| {
+            let place = plane.place(corner.at);
+            let point = if corner.point == UNMADE {
+                self.at(place)
+            } else {
+                corner.point
+            };
+            (point, plane.barycentric(corner.at))
+        };
+        let parts: Vec<[(u32, DVec3); 3]> =
+            faces.into_iter().map(|face| face.map(&mut made)).collect();
+        let is_sound = |part: &[(u32, DVec3); 3]| {
+            let corners = part.map(|(point, _)| self.positions[point as usize].as_dvec3());
+            !is_degenerate(corners)
+        };
+        Parts(parts.into_iter().filter(is_sound).collect())
+    }
+}
+
+/// The point on an edge that is nearest to a place.
+fn nearest(positions: &[Vec3], on_edge: Option<&Vec<(f64, u32)>>, place: DVec3) -> Option<u32> {
+    let distance = |point: u32| positions[point as usize].as_dvec3().distance_squared(place);
+    let points = on_edge?.iter().map(|&(_, point)| point);
+    let nearest = points.min_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
+    let slack = 4.0 * tolerance(place);
+    (distance(nearest) <= slack * slack).then_some(nearest)
+}
+
+/// Coordinates in the plane of a triangle.
+struct Plane {
+    origin: DVec3,
+    axes: [DVec3; 2],
+    corners: [DVec2; 3],
+}
+
+impl Plane {
+    fn of([a, b, c]: [DVec3; 3]) -> Self {
+        let x = (b - a).normalize_or_zero();
+        let y = (b - a).cross(c - a).cross(b - a).normalize_or_zero();
+        let mut plane = Self {
+            origin: a,
+            axes: [x, y],
+            corners: [DVec2::ZERO; 3],
+        };
+        plane.corners = [a, b, c].map(|corner| plane.flat(corner));
+        plane
+    }
+
+    fn flat(&self, place: DVec3) -> DVec2 {
+        let offset = place - self.origin;
+        DVec2::from_array(self.axes.map(|axis| offset.dot(axis)))
+    }
+
+    fn place(&self, at: DVec2) -> DVec3 {
+        self.origin + self.axes[0] * at.x + self.axes[1] * at.y
+    }
+
+    fn barycentric(&self, at: DVec2) -> DVec3 {
+        let [a, b, c] = self.corners;
+        let whole = (b - a).perp_dot(c - a);
+        let second = (at - a).perp_dot(c - a) / whole;
+        let third = (b - a).perp_dot(at - a) / whole;
+        DVec3::new(1.0 - second - third, second, third)
+    }
+}
+
+/// Put parts in the place of their faces.
+fn replace(scene: &mut Scene, parts: &[Parts]) {
+    let mut first = Vec::with_capacity(parts.len() + 1);
+    let mut count = 0u32;
+    for part in parts {
+        first.push(count);
+        count += part.0.len().max(1) as u32;
+    }
+    first.push(count);
+    let old = std::mem::take(&mut scene.triangles);
+    let surfaces = std::mem::take(&mut scene.surfaces);
+    for ((triangle, surface), parts) in old.iter().zip(&surfaces).zip(parts) {
+        if parts.0.is_empty() {
+            scene.triangles.push(*triangle);
+            scene.surfaces.push(*surface);
+            continue;
+        }
+        let share = |[(_, a), (_, b), (_, c)]: &[(u32, DVec3); 3]| {
+            0.0f64.max((b.y - a.y) * (c.z - a.z) - (b.z - a.z) * (c.y - a.y))
+        };
+        let whole: f64 = parts.0.iter().map(share).sum();
+        for part in &parts.0 {
+            let corners = part.map(|(point, _)| point);
+            scene.triangles.push(Triangle {
+                corners,
+                ..*triangle
+            });
+            let area_vector = surface.area_vector * (share(part) / whole) as f32;
+            scene.surfaces.push(Surface {
+                area_vector,
+                ..*surface
+            });
+        }
+    }
+    scene.texcoords = spread(&scene.texcoords, parts, |[a, b, c]: [Vec2; 3], at| {
+        (a.as_dvec2() * at.x + b.as_dvec2() * at.y + c.as_dvec2() * at.z).as_vec2()
+    });
+    scene.normals = spread(&scene.normals, parts, |[a, b, c]: [Vec3; 3], at| {
+        (a.as_dvec3() * at.x + b.as_dvec3() * at.y + c.as_dvec3() * at.z).as_vec3()
+    });
+    for object in &mut scene.objects {
+        object.start = TriangleId(first[object.start.index()]);
+        object.end = TriangleId(first[object.end.index()]);
+    }
+}
+
+/// Values at corners for the parts of all faces; nothing where there are none.
+fn spread<T: Copy>(
+    values: &[[T; 3]],
+    parts: &[Parts],
+    between: impl Fn([T; 3], DVec3) -> T,
+) -> Vec<[T; 3]> {
+    let mut all = Vec::new();
+    for (&value, parts) in values.iter().zip(parts) {
+        match parts.0.is_empty() {
+            true => all.push(value),
+            false => all.extend(
+                parts
+                    .0
+                    .iter()
+                    .map(|part| part.map(|(_, at)| between(value, at))),
+            ),
+        }
+    }
+    all
+}
