@@ -2,9 +2,11 @@
 //!
 //! A link knows of what stands between its ends only which part gets through, and it takes that part for the same all
 //! over its receiver. In the corner between a floor and what stands on it that shows: light from beyond the object
-//! leaks into the corner, however small the elements there are. So a few cosine-weighted rays from each vertex look at
-//! the radiosity of what they meet. Where vertices and their neighbours together find something else than the links,
-//! many rays do. What is kept is a factor by vertex, so that it holds for other lights on the same links, too.
+//! leaks into the corner, however small the elements there are, and into closed rooms. So a few cosine-weighted rays from
+//! each vertex look at the radiosity of what they meet. Where vertices and their neighbours together find something else
+//! than the links, many rays do. What rays met is remembered, so that it can be asked again once the light there has been
+//! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
+//! factor by vertex, so that it holds for other lights on the same links, too.
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -48,6 +50,23 @@ const DEVIATIONS: f32 = 1.5;
 /// Part of the light at a vertex that must be indirect for rays to look at it.
 const LEAST_INDIRECT: f32 = 0.1;
 
+/// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
+const MOST_ROUNDS: u32 = 32;
+
+/// Rays are asked again until what that changes falls below this share of all light. Larger leaves light where none is.
+const SETTLED: f64 = 1e-5;
+
+/// What a ray met.
+#[derive(Clone, Copy)]
+enum Met {
+    /// Nothing that sends light.
+    Nothing,
+    /// The back of a one-sided surface.
+    Back,
+    /// A leaf, with the shares that its first two corners have in the light there.
+    Leaf(u32, [f32; 2]),
+}
+
 /// A vertex that rays look at.
 struct Look {
     vertex: usize,
@@ -58,6 +77,7 @@ struct Look {
     all: f32,
     /// Root of the vertex's share of the area.
     weight: f32,
+    met: Vec<Met>,
     found: Gathered,
 }
 
@@ -88,7 +108,8 @@ impl Solver {
         let limits = self.direct_limits(1.0);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
-        self.gather_at(&mut looks, &received, |_| looking, cancel)?;
+        self.shoot(&mut looks, |_| looking, cancel)?;
+        self.ask(&mut looks, &received);
         looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
         let edges = edges(&self.hierarchy);
         let is_corner = in_corners(&edges, self.hierarchy.mesh.vertices.len(), &looks, limits);
@@ -99,18 +120,49 @@ impl Solver {
                 true => most,
                 false => look.found.rays,
             };
-            self.gather_at(&mut looks, &received, more, cancel)?;
+            self.shoot(&mut looks, more, cancel)?;
+            self.ask(&mut looks, &received);
         }
-        let mesh = &self.hierarchy.mesh;
-        let mut ratios = vec![None; mesh.vertices.len()];
-        for look in &looks {
-            ratios[look.vertex] = Some(look.found.over(look.linked));
-        }
-        let mut factors = factors(ratios, &edges);
-        let tells = |element: &Element, side| !element.is_covered(side);
-        carry_over(mesh, tells, &mut factors);
-        self.gathered = factors;
+        self.gathered = self.settled_factors(&mut looks, &edges, &linked, received, cancel)?;
         Some(())
+    }
+
+    /// Ask what rays met for its light, correct the light at the vertices, and ask again until nothing changes. Returns
+    /// factors by vertex.
+    fn settled_factors(
+        &self,
+        looks: &mut [Look],
+        edges: &[[usize; 2]],
+        linked: &[Vec4],
+        mut received: Vec<Vec4>,
+        cancel: &Cancel,
+    ) -> Option<Vec<Vec4>> {
+        let mesh = &self.hierarchy.mesh;
+        let areas = mesh.areas_about_vertices();
+        let tells = |element: &Element, side| !element.is_covered(side);
+        let mut round = 0;
+        loop {
+            cancel.proceed()?;
+            let mut ratios = vec![None; mesh.vertices.len()];
+            for look in &*looks {
+                ratios[look.vertex] = Some(look.found.over(look.linked));
+            }
+            let mut factors = factors(ratios, edges);
+            carry_over(mesh, tells, &mut factors);
+            let (mut change, mut all) = (0.0f64, 0.0f64);
+            for (vertex, light) in received.iter_mut().enumerate() {
+                let corrected = linked[vertex] * factors[vertex] + self.direct_shown(vertex as u32);
+                let area = f64::from(areas[vertex]);
+                change += area * f64::from(luminance((corrected - *light).abs()));
+                all += area * f64::from(luminance(corrected));
+                *light = corrected;
+            }
+            round += 1;
+            if change <= SETTLED * all || round >= MOST_ROUNDS {
+                return Some(factors);
+            }
+            self.ask(looks, &received);
+        }
     }
 
     /// Direct irradiance that is shown at a vertex.
@@ -136,6 +188,7 @@ impl Solver {
                 linked,
                 all,
                 weight: weights[vertex as usize],
+                met: Vec::new(),
                 found: Gathered::default(),
             })
         };
@@ -148,10 +201,9 @@ impl Solver {
     }
 
     /// Shoot rays until each vertex has had as many as are wanted.
-    fn gather_at(
+    fn shoot(
         &mut self,
         looks: &mut [Look],
-        received: &[Vec4],
         wanted: impl Fn(&Look) -> u32 + Sync,
         cancel: &Cancel,
     ) -> Option<()> {
@@ -165,12 +217,11 @@ impl Solver {
                 }
                 let mut random = Random::new(this.settings.seed, look.vertex as u64);
                 let shift = random.uniform_2d();
-                let (before, rays) = (look.found.rays, wanted(look));
+                let (before, rays) = (look.met.len() as u32, wanted(look));
                 for index in before..rays {
                     let square = low_discrepancy_2d(index, shift);
                     let direction = cosine_direction(look.place.normal, square);
-                    look.found
-                        .count(this.radiosity_met(&look.place, direction, received));
+                    look.met.push(this.meet(&look.place, direction));
                 }
                 rays - before
             })
@@ -180,30 +231,52 @@ impl Solver {
         Some(())
     }
 
-    /// Radiosity of what a ray meets first, of irradiance `received` at vertices and linear between them; `None` where that
-    /// is the back of a one-sided surface.
-    fn radiosity_met(&self, from: &Receiver, direction: Vec3, received: &[Vec4]) -> Option<Vec4> {
+    /// What a ray meets first.
+    fn meet(&self, from: &Receiver, direction: Vec3) -> Met {
         let hit = self
             .rays
             .closest(from.point, direction, Some(from.triangle));
         let Some(hit) = hit else {
-            return Some(Vec4::ZERO);
+            return Met::Nothing;
         };
         let hierarchy = &self.hierarchy;
-        let patch = hierarchy.side_met(hit.triangle, direction)?;
+        let Some(patch) = hierarchy.side_met(hit.triangle, direction) else {
+            return Met::Back;
+        };
         if !hierarchy.held().contains(&patch) {
-            return Some(Vec4::ZERO);
+            return Met::Nothing;
         }
         let point = from.point + direction * hit.distance;
-        let leaf = hierarchy.mesh.leaf_at(patch, point)?;
-        let shares = barycentric(point, hierarchy.mesh.corners(leaf)).to_array();
-        let vertices = hierarchy.mesh.elements[leaf].vertices;
-        let irradiance: Vec4 = vertices
-            .into_iter()
-            .zip(shares)
-            .map(|(vertex, share)| received[vertex as usize] * share)
-            .sum();
-        Some(self.radiosity_under(leaf, irradiance).with_w(0.0))
+        let Some(leaf) = hierarchy.mesh.leaf_at(patch, point) else {
+            return Met::Back;
+        };
+        let [a, b, _] = barycentric(point, hierarchy.mesh.corners(leaf)).to_array();
+        Met::Leaf(leaf as u32, [a, b])
+    }
+
+    /// Count the radiosity of what rays met, of irradiance `received` at vertices and linear between them.
+    fn ask(&self, looks: &mut [Look], received: &[Vec4]) {
+        let radiosity = |met: &Met| match *met {
+            Met::Nothing => Some(Vec4::ZERO),
+            Met::Back => None,
+            Met::Leaf(leaf, [a, b]) => {
+                let vertices = self.hierarchy.mesh.elements[leaf as usize].vertices;
+                let shares = [a, b, 1.0 - a - b];
+                let irradiance: Vec4 = vertices
+                    .into_iter()
+                    .zip(shares)
+                    .map(|(vertex, share)| received[vertex as usize] * share)
+                    .sum();
+                let radiosity = self.radiosity_under(leaf as usize, irradiance);
+                Some(radiosity.with_w(0.0))
+            }
+        };
+        looks.par_iter_mut().with_min_len(64).for_each(|look| {
+            look.found = Gathered::default();
+            for met in &look.met {
+                look.found.count(radiosity(met));
+            }
+        });
     }
 }
 
