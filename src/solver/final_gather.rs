@@ -51,10 +51,11 @@ const DEVIATIONS: f32 = 1.5;
 const LEAST_INDIRECT: f32 = 0.1;
 
 /// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
-const MOST_ROUNDS: u32 = 32;
+const MOST_ROUNDS: u32 = 64;
 
-/// Rays are asked again until what that changes falls below this share of all light. Larger leaves light where none is.
-const SETTLED: f64 = 1e-5;
+/// Rays are asked again until that changes no vertex by more than this share of the scene's mean. Larger leaves light in
+/// closed rooms, where each round takes away what walls absorb.
+const SETTLED: f32 = 1e-5;
 
 /// What a ray met.
 #[derive(Clone, Copy)]
@@ -99,11 +100,11 @@ impl Solver {
             field.smooth(&self.hierarchy);
         }
         let linked = VertexMeans::new(&self.hierarchy, &self.leaves, &[]).irradiance;
-        let received: Vec<Vec4> = linked
-            .par_iter()
-            .enumerate()
-            .map(|(vertex, &linked)| linked + self.direct_shown(vertex as u32))
+        let direct: Vec<Vec4> = (0..linked.len() as u32)
+            .into_par_iter()
+            .map(|vertex| self.direct_shown(vertex))
             .collect();
+        let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         let mut looks = self.looks(&linked);
         let limits = self.direct_limits(1.0);
         let looking = MOST_LOOKING / looks.len().max(1);
@@ -123,7 +124,7 @@ impl Solver {
             self.shoot(&mut looks, more, cancel)?;
             self.ask(&mut looks, &received);
         }
-        self.gathered = self.settled_factors(&mut looks, &edges, &linked, received, cancel)?;
+        self.gathered = self.settled_factors(&mut looks, &edges, &linked, &direct, cancel)?;
         Some(())
     }
 
@@ -134,12 +135,12 @@ impl Solver {
         looks: &mut [Look],
         edges: &[[usize; 2]],
         linked: &[Vec4],
-        mut received: Vec<Vec4>,
+        direct: &[Vec4],
         cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.hierarchy.mesh;
-        let areas = mesh.areas_about_vertices();
         let tells = |element: &Element, side| !element.is_covered(side);
+        let mut received: Vec<Vec4> = Vec::new();
         let mut round = 0;
         loop {
             cancel.proceed()?;
@@ -149,16 +150,17 @@ impl Solver {
             }
             let mut factors = factors(ratios, edges);
             carry_over(mesh, tells, &mut factors);
-            let (mut change, mut all) = (0.0f64, 0.0f64);
-            for (vertex, light) in received.iter_mut().enumerate() {
-                let corrected = linked[vertex] * factors[vertex] + self.direct_shown(vertex as u32);
-                let area = f64::from(areas[vertex]);
-                change += area * f64::from(luminance((corrected - *light).abs()));
-                all += area * f64::from(luminance(corrected));
-                *light = corrected;
-            }
+            let lights = linked.iter().zip(direct).zip(&factors);
+            let corrected: Vec<Vec4> = lights.map(|((l, d), factor)| l * *factor + d).collect();
+            let changes = corrected.iter().zip(&received);
+            let change = changes
+                .map(|(new, old)| luminance((new - old).abs()))
+                .fold(0.0, f32::max);
+            let is_first = received.is_empty();
+            received = corrected;
             round += 1;
-            if change <= SETTLED * all || round >= MOST_ROUNDS {
+            let is_settled = !is_first && change <= SETTLED * self.mean_irradiance;
+            if is_settled || round >= MOST_ROUNDS {
                 return Some(factors);
             }
             self.ask(looks, &received);
