@@ -20,8 +20,12 @@ use crate::{
     scene::{DisjointSets, HalfEdge, Scene, half_edges},
 };
 
-/// Halvings at most, but for what balance asks: beyond, single precision cannot tell neighbours apart.
-const DEEPEST_LEVEL: u8 = 28;
+/// Halvings at most, but for what balance asks: a hundred-thousandth of the largest triangle squared.
+const DEEPEST_LEVEL: u8 = 64;
+
+/// Elements whose radius is a smaller share of their coordinates are not divided: single precision would hardly tell
+/// neighbours apart.
+const LEAST_RADIUS: f32 = 4e-6;
 
 /// Triangles that are longer than so many times their height are halved and not quartered: quarters would be as thin.
 const SLIVER: f32 = 3.0;
@@ -279,7 +283,11 @@ impl Mesh {
             self.leaves_at = Some(EdgeLeaves::new(self.patch_edges()));
         }
         let before = self.elements.len();
-        let is_deepest = |&index: &u32| self.elements[index as usize].level >= DEEPEST_LEVEL;
+        let is_deepest = |&index: &u32| {
+            let element = &self.elements[index as usize];
+            element.level >= DEEPEST_LEVEL
+                || element.radius < LEAST_RADIUS * element.centroid.abs().max_element()
+        };
         let mut pending: Vec<u32> = wanted
             .iter()
             .copied()

@@ -30,8 +30,9 @@ use crate::scene::{Scene, TriangleId};
 /// and what each works out for itself of the clusters above adds up.
 const LEAST_TASKS: u32 = 64;
 
-/// A point that is less high over an element than this share of its radius lies in its plane: rounding tilts flat meshes.
-const IN_PLANE: f32 = 1e-3;
+/// A point that is less high over an element than this share of the coordinates lies in its plane: rounding tilts flat
+/// meshes. Larger, and a house on a huge ground lies in it.
+const IN_PLANE: f32 = 2e-7;
 
 /// Index of a patch, in tree order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -332,6 +333,7 @@ impl Hierarchy {
         let at = &self.mesh.elements[element];
         let normal = self.patch_of(element).normal;
         let reach = radii * at.radius;
+        let least = IN_PLANE * (at.radius + at.centroid.abs().max_element());
         let height = |point: Vec3| (point - at.centroid).dot(normal);
         let mut pending = vec![0];
         while let Some(index) = pending.pop() {
@@ -339,7 +341,7 @@ impl Hierarchy {
             let nearest = at.centroid.clamp(cluster.min, cluster.max);
             let middle = (cluster.min + cluster.max) * 0.5;
             let highest = height(middle) + ((cluster.max - cluster.min) * 0.5).dot(normal.abs());
-            if nearest.distance(at.centroid) > reach || highest <= IN_PLANE * at.radius {
+            if nearest.distance(at.centroid) > reach || highest <= least {
                 continue;
             }
             if !cluster.is_leaf() {
@@ -351,7 +353,7 @@ impl Hierarchy {
             }
             let stands_above = |patch: usize| {
                 let corners = self.mesh.corners(patch);
-                let is_above = corners.iter().any(|&c| height(c) > IN_PLANE * at.radius);
+                let is_above = corners.iter().any(|&c| height(c) > least);
                 let [a, b, c] = corners;
                 let near = at.centroid.clamp(a.min(b).min(c), a.max(b).max(c));
                 is_above && near.distance(at.centroid) <= reach

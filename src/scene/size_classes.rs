@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 /// it is computed as finely as the thing; larger, and what stands on a huge ground is lost on it.
 const MOST_RATIO: f64 = 1e5;
 
-/// Finer faces that there must be before they limit the area of others: as many as a box has. Fewer are no object.
-const LEAST_FACES: usize = 12;
+/// Finer faces that there must be before they limit the area of others: as many as a plate has. Fewer are a stray one.
+const LEAST_FACES: usize = 2;
 
 /// And their number as a share of all faces. Smaller, and a few stray slivers shrink the measure.
-const LEAST_SHARE: f64 = 1.0 / 64.0;
+const LEAST_SHARE: f64 = 1e-3;
 
 /// The classes of the faces of a scene.
 #[derive(Clone, Debug, Default)]
@@ -90,7 +90,8 @@ mod tests {
         let rooms: [&[(f64, usize)]; 4] = [
             &[(32.0, 12), (1.0, 24)],
             &[(32.0, 12), (1e-4, 40_000)],
-            &[(32.0, 12), (1e-8, 3)],
+            &[(32.0, 12), (1e-8, 1)],
+            &[(32.0, 12_000), (1e-8, 8)],
             &[(1.0, 1)],
         ];
         for faces in rooms {

@@ -34,6 +34,10 @@ pub(super) const SPREAD_SHARE: f32 = 0.15;
 /// times the tolerance. Smaller costs rays in the shade, larger loses light on narrow faces.
 const HIDDEN_TOLERANCE: f32 = 4.0;
 
+/// Part of the smallest area of elements down to which they are divided where light bends that nothing blocks. Smaller
+/// divides without end where a lamp touches a surface; larger misses the light about a lamp far smaller than the scene.
+const SMOOTH_SHARE: f32 = 1e-4;
+
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
 
@@ -409,8 +413,12 @@ impl DirectField {
                     return false;
                 };
                 // What reaches into a solid was divided as far as it shall be.
-                if !element.is_open() || area * 0.25 < limits.min_area {
+                if !element.is_open() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
                     return false;
+                }
+                // Shadows have borders however small elements are; light that nothing blocks does not.
+                if area * 0.25 < limits.min_area {
+                    return self.bend_unoccluded(hierarchy, leaf, limits, mean) > limits.tolerance;
                 }
                 let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
                 let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
