@@ -11,10 +11,10 @@ use crate::scene::{Scene, SizeClasses};
 
 /// Weights of patches.
 pub struct Importance {
-    /// By patch: how much an error of its irradiance shows, 0…1, as the square of a factor: what it reflects beside what it
-    /// emits. The largest is 1.
+    /// By patch: how much an error of its irradiance shows, 0…1, as the square of a factor: 1 but for emitters, whose own
+    /// light hides what they reflect.
     weights: Vec<f32>,
-    /// By patch: the share of its area that counts in means over the scene, 0…1.
+    /// By patch: the share of its area that counts in means over the scene, 0…1; 0 of emitters, unless all emit.
     measures: Vec<f32>,
     /// Sum of what counts, in square frame units.
     pub area: f64,
@@ -25,46 +25,53 @@ impl Importance {
     pub(super) fn new(scene: &Scene, patches: &[Patch]) -> Self {
         let emitted =
             |patch: &Patch| f64::from(luminance(patch.emission.extend(0.0))) * std::f64::consts::PI;
-        let whole: f64 = patches.iter().map(|patch| f64::from(patch.area)).sum();
+        let area_of = |emitters: bool| -> f64 {
+            let chosen = patches
+                .iter()
+                .filter(|patch| (emitted(patch) > 0.0) == emitters);
+            chosen.map(|patch| f64::from(patch.area)).sum()
+        };
+        let (emitting, others) = (area_of(true), area_of(false));
         let power: f64 = patches
             .iter()
             .map(|patch| emitted(patch) * f64::from(patch.area))
             .sum();
-        // The mean irradiance if all light arrives, and is reflected as by white.
-        let received = power / whole.max(f64::MIN_POSITIVE);
+        // The mean irradiance if all light arrives.
+        let received = power / (emitting + others).max(f64::MIN_POSITIVE);
+        // All emitters together count no more than the others.
+        let least = (others / emitting.max(f64::MIN_POSITIVE)).min(1.0);
+        let all_emit = others <= 0.0;
         let weight = |patch: &Patch| match emitted(patch) {
-            emitted if emitted > 0.0 => received / (received + emitted),
+            emitted if emitted > 0.0 && !all_emit => least * received / (received + emitted),
             _ => 1.0,
         };
-        let most = patches.iter().map(weight).fold(0.0, f64::max);
-        let weights: Vec<f64> = patches
-            .iter()
-            .map(|patch| weight(patch) / most.max(f64::MIN_POSITIVE))
-            .collect();
+        let weights: Vec<f64> = patches.iter().map(weight).collect();
         let edges: Vec<f64> = patches
             .iter()
             .map(|patch| longest_edge_squared(scene.corners(patch.triangle)))
             .collect();
-        let faces = patches.iter().zip(&weights).zip(&edges);
-        let classes = SizeClasses::new(
-            faces.map(|((patch, weight), &squared)| (squared, weight * f64::from(patch.area))),
-        );
-        let measures = weights.iter().zip(&edges);
+        let counts = |patch: &Patch| all_emit || emitted(patch) <= 0.0;
+        let sized = patches.iter().zip(&edges);
+        let faces = sized.clone().filter(|(patch, _)| counts(patch));
+        let faces = faces.map(|(patch, &squared)| (squared, f64::from(patch.area)));
+        let classes = SizeClasses::new(faces);
+        let measure = |(patch, &squared): (&Patch, &f64)| match counts(patch) {
+            true => classes.share(squared) as f32,
+            false => 0.0,
+        };
         Self {
-            measures: measures
-                .map(|(weight, &squared)| (weight * classes.share(squared)) as f32)
-                .collect(),
+            measures: sized.map(measure).collect(),
             weights: weights.into_iter().map(|weight| weight as f32).collect(),
             area: classes.area,
         }
     }
 
-    /// See [`Self::weights`].
+    /// How much an error of the irradiance of a patch shows, 0…1; 1 but for emitters.
     pub fn weight(&self, patch: usize) -> f32 {
         self.weights[patch]
     }
 
-    /// See [`Self::measures`].
+    /// The share of a patch's area that counts in means over the scene, 0…1.
     pub fn measure(&self, patch: usize) -> f32 {
         self.measures[patch]
     }

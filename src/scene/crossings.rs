@@ -240,7 +240,8 @@ fn place_on(corners: [DVec3; 3], point: DVec3) -> On {
 /// The points of a scene, old and new.
 struct Points {
     positions: Vec<Vec3>,
-    known: HashMap<[u32; 3], u32>,
+    /// By cell of a grid.
+    known: HashMap<[i64; 3], Vec<u32>>,
 }
 
 /// What a triangle is cut into: corners with their barycentric coordinates on it; empty where it stays whole.
@@ -271,28 +272,50 @@ impl HasPosition for Corner {
 }
 
 impl Points {
+    /// Cells of the grid are so many times larger than what counts as one place.
+    const CELL: f64 = 4.0 * SAME_PLACE;
+
     fn new(scene: &Scene) -> Self {
-        let positions = scene.positions.clone();
-        let numbered = positions.iter().zip(0..);
-        Self {
-            known: numbered
-                .map(|(at, index)| (at.to_array().map(f32::to_bits), index))
-                .collect(),
-            positions,
+        let mut points = Self {
+            positions: scene.positions.clone(),
+            known: HashMap::new(),
+        };
+        for (index, at) in scene.positions.iter().enumerate() {
+            let cell = Self::cell(at.as_dvec3());
+            points.known.entry(cell).or_default().push(index as u32);
         }
+        points
     }
 
-    /// The point at a place, made if it is not there.
+    fn cell(place: DVec3) -> [i64; 3] {
+        (place / Self::CELL).floor().to_array().map(|x| x as i64)
+    }
+
+    /// The point at a place, made if there is none: both faces that cross, and their neighbours, find the same one, though
+    /// each computes it from its own plane.
     fn at(&mut self, place: DVec3) -> u32 {
+        // Of what is far out not all cells are looked at.
+        let slack = (2.0 * tolerance(place)).min(Self::CELL);
+        let [low, high] = [place - slack, place + slack].map(Self::cell);
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let near = self.known.get(&[x, y, z]).into_iter().flatten();
+                    let distance = |point: u32| {
+                        let at = self.positions[point as usize].as_dvec3();
+                        at.distance(place)
+                    };
+                    if let Some(&point) = near.clone().find(|&&point| distance(point) <= slack) {
+                        return point;
+                    }
+                }
+            }
+        }
         // Adding 0 turns -0 into 0, so that both have the same bits.
-        let at = place.as_vec3() + 0.0;
-        *self
-            .known
-            .entry(at.to_array().map(f32::to_bits))
-            .or_insert_with(|| {
-                self.positions.push(at);
-                self.positions.len() as u32 - 1
-            })
+        self.positions.push(place.as_vec3() + 0.0);
+        let point = self.positions.len() as u32 - 1;
+        self.known.entry(Self::cell(place)).or_default().push(point);
+        point
     }
 
     /// The ends of lines that lie on edges, for both faces at each.

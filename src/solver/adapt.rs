@@ -36,7 +36,7 @@ const HIDDEN_TOLERANCE: f32 = 4.0;
 
 /// Part of the smallest area of elements down to which they are divided where light bends that nothing blocks. Smaller
 /// divides without end where a lamp touches a surface; larger misses the light about a lamp far smaller than the scene.
-const SMOOTH_SHARE: f32 = 1e-4;
+const SMOOTH_SHARE: f32 = 1e-6;
 
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;

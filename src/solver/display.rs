@@ -2,7 +2,7 @@
 
 use std::{f32::consts::PI, sync::Arc};
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 use super::{
     Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable,
@@ -161,6 +161,18 @@ impl Solver {
         if place.is_finite() { place } else { uv[0] }
     }
 
+    /// Largest radiosity by channel: no irradiance can be larger.
+    fn brightest(&self) -> Vec4 {
+        let sampled = |leaf: usize| match self.is_sampled(leaf) {
+            true => (self.hierarchy.patch_of(leaf).emission * PI).extend(0.0),
+            false => Vec4::ZERO,
+        };
+        let mesh = &self.hierarchy.mesh;
+        mesh.leaves()
+            .map(|leaf| self.radiosity(leaf) + sampled(leaf))
+            .fold(Vec4::ZERO, Vec4::max)
+    }
+
     fn vertex_light(&self, means: &VertexMeans, mesh: &DisplayMesh) -> VertexLight {
         let count = means.irradiance.len();
         let mut light = VertexLight {
@@ -168,13 +180,16 @@ impl Solver {
             direct: Vec::with_capacity(count),
             uncertainty: Vec::with_capacity(count),
         };
+        let brightest = self.brightest();
         for (vertex, (&linked, &error)) in means.irradiance.iter().zip(&means.error).enumerate() {
             let (direct, noise) = self
                 .direct
                 .as_ref()
                 .map(|field| field.vertex(&self.hierarchy, vertex as u32))
                 .unwrap_or_default();
-            light.irradiance.push(displayable(linked + direct));
+            light
+                .irradiance
+                .push(displayable((linked + direct).min(brightest)));
             light.direct.push(displayable(direct));
             let error = error + noise;
             light
