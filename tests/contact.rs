@@ -3,46 +3,19 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{f32::consts::PI, sync::Arc};
+mod boxes;
 
+use std::f32::consts::PI;
+
+use boxes::{cuboid, solved};
 use glam::{DVec3, Vec3};
 use vecrad::{
-    scene::{Material, MaterialId, SceneBuilder, SceneOptions, Sides},
-    solver::{Cancel, Direct, Snapshot, SolveSettings, Solver},
+    scene::{Material, SceneBuilder, Sides},
+    solver::{Direct, Snapshot, SolveSettings},
 };
 
 const EMITTED: f32 = 0.25;
 const REFLECTANCE: f32 = 0.5;
-
-/// Six sides of a box, seen from outside or from inside.
-fn cuboid(builder: &mut SceneBuilder, low: DVec3, high: DVec3, inward: bool, paint: MaterialId) {
-    let corner = |index: usize| {
-        let pick = |bit: usize, axis: usize| {
-            if index & bit == 0 {
-                low[axis]
-            } else {
-                high[axis]
-            }
-        };
-        DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2))
-    };
-    let corners: Vec<u32> = (0..8)
-        .map(|index| builder.push_position(corner(index)))
-        .collect();
-    for [a, b, c, d] in [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ] {
-        for [a, b, c] in [[a, b, c], [a, c, d]] {
-            let triangle = if inward { [a, c, b] } else { [a, b, c] };
-            builder.push_triangle(triangle.map(|index: usize| corners[index]), paint);
-        }
-    }
-}
 
 /// A furnace with a box in it, whose floor runs from -1 to 1 both ways at height 0; places as in the file.
 fn furnished(low: DVec3, high: DVec3) -> Snapshot {
@@ -55,25 +28,7 @@ fn furnished(low: DVec3, high: DVec3) -> Snapshot {
     let room = [DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 2.0, 1.0)];
     cuboid(&mut builder, room[0], room[1], true, paint);
     cuboid(&mut builder, low, high, false, paint);
-    solved(builder, SolveSettings::default())
-}
-
-/// The light of a scene; places as in the file.
-fn solved(builder: SceneBuilder, settings: SolveSettings) -> Snapshot {
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = Arc::new(builder.finish(&options).unwrap());
-    let frame = scene.frame;
-    let mut solver = Solver::new(scene, settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    let mut snapshot = solver.snapshot();
-    let mesh = Arc::make_mut(&mut snapshot.mesh);
-    for position in &mut mesh.positions {
-        *position = frame.to_world(*position).as_vec3();
-    }
-    snapshot
+    solved(builder, Sides::One, SolveSettings::default())
 }
 
 /// How far what shows on the floor within 0.1 of the box is off: on average, and at worst.
@@ -149,7 +104,7 @@ fn links_let_no_light_into_the_corner_at_the_foot_of_an_object() {
         direct: Direct::Linked,
         ..SolveSettings::default()
     };
-    let snapshot = solved(builder, settings);
+    let snapshot = solved(builder, Sides::One, settings);
     let (mesh, light) = (&snapshot.mesh, &snapshot.light);
     let (mut count, mut sum) = (0, 0.0);
     for (vertex, position) in mesh.positions.iter().enumerate() {

@@ -9,6 +9,10 @@ use glam::Vec3;
 use super::{Patch, luminance};
 use crate::scene::{Scene, SizeClasses};
 
+/// Area of all emitters together that counts at most, relative to that of all others. Smaller, and what emitters receive
+/// is coarse where nearly all surfaces emit; larger, and a sky of emitting faces takes the elements of what it lights.
+const EMITTERS_SHARE: f64 = 10.0;
+
 /// Weights of patches.
 pub struct Importance {
     /// By patch: how much an error of its irradiance shows, 0…1, as the square of a factor: 1 but for emitters, whose own
@@ -38,8 +42,7 @@ impl Importance {
             .sum();
         // The mean irradiance if all light arrives.
         let received = power / (emitting + others).max(f64::MIN_POSITIVE);
-        // All emitters together count no more than the others.
-        let least = (others / emitting.max(f64::MIN_POSITIVE)).min(1.0);
+        let least = (EMITTERS_SHARE * others / emitting.max(f64::MIN_POSITIVE)).min(1.0);
         let all_emit = others <= 0.0;
         let weight = |patch: &Patch| match emitted(patch) {
             emitted if emitted > 0.0 && !all_emit => least * received / (received + emitted),

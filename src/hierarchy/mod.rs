@@ -34,6 +34,10 @@ const LEAST_TASKS: u32 = 64;
 /// meshes. Larger, and a house on a huge ground lies in it.
 const IN_PLANE: f32 = 2e-7;
 
+/// See [`Hierarchy::is_empty_above`]. Smaller leaves the walls of long halls whole, larger divides a huge ground where it
+/// meets a huge sky.
+const LARGE: f32 = 4.0;
+
 /// Index of a patch, in tree order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PatchId(pub u32);
@@ -328,7 +332,8 @@ impl Hierarchy {
         }
     }
 
-    /// Whether no other surface stands above the plane of an element within so many of its radii of it.
+    /// Whether no other surface stands above the plane of an element within so many of its radii of it. Of surfaces that are
+    /// larger than [`LARGE`] times that, their parts that are near do not count: they cast no small shadow.
     pub fn is_empty_above(&self, element: usize, radii: f32) -> bool {
         let at = &self.mesh.elements[element];
         let normal = self.patch_of(element).normal;
@@ -352,6 +357,9 @@ impl Hierarchy {
                 continue;
             }
             let stands_above = |patch: usize| {
+                if self.mesh.elements[patch].radius > LARGE * reach {
+                    return false;
+                }
                 let corners = self.mesh.corners(patch);
                 let is_above = corners.iter().any(|&c| height(c) > least);
                 let [a, b, c] = corners;

@@ -16,12 +16,15 @@ use super::{Scene, SizeClasses, Surface, Triangle, TriangleId, build::is_degener
 /// anyway, larger leaves furniture whole.
 const LEAST_CUT: f64 = 4e-4;
 
-/// Lines cut that are longer, squared, than this part of the scene's area. Smaller makes slivers about small things, larger
-/// leaves the feet of furniture on whole floors.
-const LEAST_LINE: f64 = 1e-5;
+/// Faces cut others whose longest edge, squared, is more than this part of the scene's area. Smaller makes slivers about
+/// small things, larger leaves the feet of furniture on whole floors.
+const LEAST_CUTTER: f64 = 1e-5;
 
-/// Lines by which a face is cut at most: what is crossed by more is clutter, and its parts would be slivers.
-const MOST_LINES: usize = 64;
+/// Lines by which a face is cut at most, the longest: what is crossed by more is clutter.
+const MOST_LINES: usize = 128;
+
+/// Corners of the parts of a face at most: lines that cross each other make more.
+const MOST_CORNERS: usize = 512;
 
 /// What is nearer than this lies in one place, frame units: half of the distance that rays keep from their ends.
 const SAME_PLACE: f64 = 5e-5;
@@ -108,14 +111,13 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
     let whole = SizeClasses::new(squares.iter().copied().zip(areas)).area;
     // By the lower end along an axis, so that those which may touch a box are found by search.
     let mut cutters: Vec<(Vec3, Vec3, usize)> = (0..count)
-        .filter(|&index| squares[index] > LEAST_LINE * whole)
+        .filter(|&index| squares[index] > LEAST_CUTTER * whole)
         .map(|index| {
             let [a, b, c] = scene.corners(TriangleId(index as u32));
             (a.min(b).min(c), a.max(b).max(c), index)
         })
         .collect();
     cutters.sort_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.2.cmp(&b.2)));
-    let least = LEAST_LINE * whole;
     let lines_on = |&(min, max, index): &(Vec3, Vec3, usize)| {
         if squares[index] <= LEAST_CUT * whole {
             return None;
@@ -131,14 +133,13 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
                 continue;
             }
             let line = crossing(own, corners(other));
-            let is_wanted = |[(from, a), (to, b)]: &Line| {
-                a.edges() & b.edges() == 0 && from.distance_squared(*to) > least
-            };
+            // Along an edge there is nothing to cut.
+            let is_wanted = |[(_, a), (_, b)]: &Line| a.edges() & b.edges() == 0;
             found.extend(line.filter(is_wanted));
-            if found.len() > MOST_LINES {
-                return None;
-            }
         }
+        let length = |[(from, _), (to, _)]: &Line| from.distance_squared(*to);
+        found.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        found.truncate(MOST_LINES);
         (!found.is_empty()).then_some((index, found))
     };
     let found: Vec<(usize, Vec<Line>)> = cutters.par_iter().filter_map(lines_on).collect();
@@ -377,6 +378,9 @@ impl Points {
         }
         // The lines.
         for line in lines.into_iter().flatten() {
+            if triangulation.num_vertices() > MOST_CORNERS {
+                break;
+            }
             let ends = line.map(|(place, on)| {
                 let corner = match on {
                     On::Corner(corner) => Some(ids[corner]),

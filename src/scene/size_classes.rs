@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// Area of a class that counts at most, relative to that of all finer faces. Smaller, and a room with one small thing in
 /// it is computed as finely as the thing; larger, and what stands on a huge ground is lost on it.
-const MOST_RATIO: f64 = 1e5;
+const MOST_RATIO: f64 = 1e3;
 
 /// Finer faces that there must be before they limit the area of others: as many as a plate has. Fewer are a stray one.
 const LEAST_FACES: usize = 2;
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn in_usual_scenes_all_area_counts() {
-        let rooms: [&[(f64, usize)]; 4] = [
+        let rooms: [&[(f64, usize)]; 5] = [
             &[(32.0, 12), (1.0, 24)],
             &[(32.0, 12), (1e-4, 40_000)],
             &[(32.0, 12), (1e-8, 1)],
