@@ -374,12 +374,13 @@ impl Hierarchy {
     }
 
     /// The part of the scene's area that an element, or a point on it that stands for so much area, has for errors of what
-    /// it receives; above 1 where it is huge.
+    /// it receives, 0…1. What is huge beside all that counts is as large as that.
     pub fn share_of_area(&self, element: usize, area: f32) -> f32 {
         let weight = self
             .importance
             .weight(self.mesh.elements[element].patch as usize);
-        (f64::from(area * weight) / self.importance.area.max(f64::MIN_POSITIVE)) as f32
+        let share = f64::from(area * weight) / self.importance.area.max(f64::MIN_POSITIVE);
+        share.min(1.0) as f32
     }
 
     /// The same for a node.
@@ -387,7 +388,7 @@ impl Hierarchy {
         match self.kind(node) {
             Kind::Cluster(index) => {
                 let area = f64::from(self.weighted_areas[index]);
-                (area / self.importance.area.max(f64::MIN_POSITIVE)) as f32
+                (area / self.importance.area.max(f64::MIN_POSITIVE)).min(1.0) as f32
             }
             Kind::Element(index) => {
                 self.share_of_area(index, self.mesh.elements[index].area_vector.length())
