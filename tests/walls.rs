@@ -39,7 +39,7 @@ fn house(overshoot: f64, pieces: [[u32; 2]; 6], turn: DQuat) -> SceneBuilder {
     let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(past);
     let sheets = [(x, y, DVec3::Z), (x, z, DVec3::Y), (y, z, DVec3::X)];
     for (sheet, (first, second, across)) in sheets.into_iter().enumerate() {
-        let before = -overshoot * (first + second).signum();
+        let before = -overshoot * (DVec3::ONE - across);
         for (side, place) in [DVec3::ZERO, ROOM * across].into_iter().enumerate() {
             let pieces = pieces[2 * sheet + side];
             wall(&mut builder, before + place, [first, second], pieces, white);

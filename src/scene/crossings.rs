@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
-use super::{Scene, SizeClasses, Surface, Triangle, TriangleId, build::is_degenerate};
+use super::{Scene, SizeClasses, Surface, Triangle, TriangleId};
 
 /// Faces are cut whose longest edge, squared, is more than this part of the scene's area. Smaller cuts what elements resolve
 /// anyway, larger leaves furniture whole.
@@ -430,9 +430,12 @@ impl Points {
         };
         let parts: Vec<[(u32, DVec3); 3]> =
             faces.into_iter().map(|face| face.map(&mut made)).collect();
+        // Points of one line are on it but for rounding: what lies between them lies within what crosses.
         let is_sound = |part: &[(u32, DVec3); 3]| {
-            let corners = part.map(|(point, _)| self.positions[point as usize].as_dvec3());
-            !is_degenerate(corners)
+            let [a, b, c] = part.map(|(point, _)| self.positions[point as usize].as_dvec3());
+            let longest = [a - b, b - c, c - a].map(DVec3::length);
+            let longest = longest.into_iter().fold(0.0, f64::max);
+            (b - a).cross(c - a).length() > 2.0 * tolerance(a) * longest
         };
         Parts(parts.into_iter().filter(is_sound).collect())
     }
