@@ -139,6 +139,94 @@ fn a_limit_ends_with_code_4_and_writes_what_there_is() {
 }
 
 #[test]
+fn a_step_that_the_time_limit_interrupts_counts_in_the_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "solve",
+        "--scene",
+        "gallery",
+        "--preset",
+        "final",
+        "--threads",
+        "1",
+        "--time-limit",
+        "0.5",
+        "--report",
+        "-",
+    ];
+    let output = vecrad(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(4), "{}", error_of(&output));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let totals = &report["totals"];
+    let elapsed = totals["elapsed_s"].as_f64().unwrap();
+    assert!(elapsed >= 0.5, "{totals}");
+    let steps = report["steps"].as_array().unwrap();
+    let done = steps
+        .last()
+        .map_or(&totals["prepare_s"], |last| &last["solve_s"]);
+    let all = totals["solve_s"].as_f64().unwrap();
+    let interrupted = totals["interrupted_s"].as_f64().unwrap_or(0.0);
+    let difference = all - interrupted - done.as_f64().unwrap();
+    assert!(difference.abs() < 1e-9, "{totals}");
+}
+
+#[test]
+fn any_number_of_steps_comes_to_an_end() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scene, more) in [
+        ("plates", &[][..]),
+        ("perpendicular-plates", &["--epsilon", "0.05"]),
+        ("furnace", &["--preset", "draft"]),
+    ] {
+        let start = ["solve", "--scene", scene, "--max-steps", "4294967295"];
+        let arguments = [&start[..], &["--report", "-"], more].concat();
+        let output = vecrad(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["stop_reason"], "converged");
+        let steps = report["steps"].as_array().unwrap();
+        assert!((5..12).contains(&steps.len()), "{scene}: {}", steps.len());
+        assert!(steps.iter().all(|step| step["epsilon"].is_number()));
+    }
+}
+
+#[test]
+fn help_names_defaults_and_every_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = vecrad(folder.path(), &["solve", "--help"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "[default: 0.005, draft 0.03, final 0.002]",
+        "[default: 5, draft 3, final 6]",
+        "1 to 4096 [default: 4]",
+        "radiosity matrix (matrix",
+        "[default: none]",
+        "[default: automatic, one for each core]",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn a_misspelt_scene_gets_a_suggestion() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, suggestion) in [
+        (&["solve", "--scene", "cornel"][..], "'cornell'"),
+        (&["solve", "cornell"], "--scene cornell"),
+        (
+            &["report", "--scene", "galery", "--output", "out"],
+            "'gallery'",
+        ),
+    ] {
+        let output = vecrad(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(3), "{arguments:?}");
+        let sentence = error_of(&output);
+        assert!(sentence.contains(suggestion), "{sentence}");
+    }
+}
+
+#[test]
 fn wrong_usage_ends_with_code_2_and_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, sentence) in [
@@ -316,6 +404,7 @@ fn a_report_writes_tables_and_a_plot() {
         let error = number("error_trimmed");
         assert!(error.is_finite() && error >= 0.0, "{row:?}");
         assert!((number("repeats") - 3.0).abs() < 1e-9);
+        assert_eq!(&row[column("is_cut_short")], "false", "{row:?}");
     }
     assert_eq!(kinds[0], "solver");
     assert!(kinds[1..].iter().all(|kind| kind == "bake") && kinds.len() > 1);
@@ -382,6 +471,10 @@ fn a_report_cut_short_by_its_limit_ends_with_code_4_and_whole_files() {
     let json = fs::read(folder.path().join("out/report.json")).unwrap();
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!(json["scenes"][0]["runs"][0]["is_cut_short"], true);
+    let table = fs::read_to_string(folder.path().join("out/report.md")).unwrap();
+    assert!(table.contains("| bounded † |"), "{table}");
+    let plot = fs::read_to_string(folder.path().join("out/plates.svg")).unwrap();
+    assert!(plot.contains("bounded (cut short)"));
 }
 
 #[test]

@@ -54,6 +54,7 @@ fn matrix_agrees_with_path_tracing() {
             Some(6 + usize::from(is_back))
         }
     };
+    const CEILING: usize = 5;
     for wanted in 0..8 {
         let patches: Vec<f64> = matrix
             .patches
@@ -66,6 +67,11 @@ fn matrix_agrees_with_path_tracing() {
             .iter()
             .filter(|point| region(point.triangle, point.is_back) == Some(wanted))
             .collect();
+        // Of the ceiling, which emits, light that arrives is not asked for.
+        if wanted == CEILING {
+            assert!(points.is_empty());
+            continue;
+        }
         let expected = patches.iter().sum::<f64>() / patches.len() as f64;
         let count = points.len() as f64;
         let mean = points

@@ -548,9 +548,21 @@ fn the_time_limit_interrupts_a_step_and_continue_grants_it_anew() {
         ..one_thread()
     };
     worker.start(triangle(), short(), options);
-    for _ in 0..2 {
+    for limits in 1..=2 {
         let events = wait_for(&worker, is_finished);
         assert_eq!(events.last(), Some(&Event::Finished(StopReason::TimeLimit)));
+        let times = events.iter().find_map(|event| match event {
+            Event::Interrupted { elapsed_s, solve_s } => Some([*elapsed_s, *solve_s]),
+            _ => None,
+        });
+        let spent = 0.03 * f64::from(limits);
+        assert!(
+            times
+                .unwrap()
+                .iter()
+                .all(|time| (spent..60.0).contains(time)),
+            "the interrupted step counts: {times:?}"
+        );
         worker.resume();
     }
     assert_eq!(script.made.load(Ordering::SeqCst), 1);

@@ -1,6 +1,6 @@
 //! Flags shared by the commands, and what they set. A flag that is not given leaves the preset as it is.
 
-use std::{str::FromStr, time::Duration};
+use std::{fmt::Display, str::FromStr, time::Duration};
 
 use clap::{Args, ValueEnum};
 
@@ -29,8 +29,17 @@ pub struct SceneFlags {
     /// Which sides of faces reflect and emit
     #[arg(long, value_enum, default_value = "auto", help_heading = "Scene")]
     pub sides: SidesFlag,
-    /// Clamp reflectance to this, 0 to 1
-    #[arg(long, value_name = "R", value_parser = fraction, help_heading = "Scene")]
+    /// Maximum reflectance, 0 to 1
+    #[arg(
+        long,
+        value_name = "R",
+        value_parser = fraction,
+        help = format!(
+            "Maximum reflectance, 0 to 1 [default: {}]",
+            SceneOptions::default().max_reflectance
+        ),
+        help_heading = "Scene"
+    )]
     pub max_reflectance: Option<f32>,
     /// Encoding of Kd and Ke in the MTL file
     #[arg(long, value_enum, default_value = "linear", help_heading = "Scene")]
@@ -65,32 +74,97 @@ impl SceneFlags {
 /// Flags of [`SolveSettings`].
 #[derive(Clone, Debug, Args)]
 pub struct SettingFlags {
-    /// Settings to start from, by default normal; single flags override it
+    /// Settings to start from; single flags override it [default: normal]
     #[arg(long, value_enum, help_heading = "Settings")]
     pub preset: Option<Preset>,
     /// How clusters store power and area
-    #[arg(long, value_enum, help_heading = "Settings")]
+    #[arg(
+        long,
+        value_enum,
+        help = with_default_name(
+            "How clusters store power and area",
+            |flag: &MethodFlag, normal| flag.method() == normal.method
+        ),
+        help_heading = "Settings"
+    )]
     pub method: Option<MethodFlag>,
-    /// How the error of a link is judged
-    #[arg(long, value_enum, help_heading = "Settings")]
+    /// How the error of a link is estimated
+    #[arg(
+        long,
+        value_enum,
+        help = with_default_name(
+            "How the error of a link is estimated",
+            |flag: &OracleFlag, normal| flag.oracle() == normal.oracle
+        ),
+        help_heading = "Settings"
+    )]
     pub oracle: Option<OracleFlag>,
-    /// How light straight from emitters is computed
-    #[arg(long, value_enum, help_heading = "Settings")]
+    /// How direct light is computed
+    #[arg(
+        long,
+        value_enum,
+        help = with_default_name(
+            "How direct light is computed",
+            |flag: &DirectFlag, normal| flag.direct() == normal.direct
+        ),
+        help_heading = "Settings"
+    )]
     pub direct: Option<DirectFlag>,
-    /// Link threshold at the last step; lower is better and slower
-    #[arg(long, value_name = "E", value_parser = at_least_zero, help_heading = "Settings")]
+    /// Link threshold ε at the last step
+    #[arg(
+        long,
+        value_name = "E",
+        value_parser = at_least_zero,
+        help = with_defaults(
+            "Link threshold ε at the last step; lower is more accurate and slower",
+            |settings| settings.epsilon
+        ),
+        help_heading = "Settings"
+    )]
     pub epsilon: Option<f32>,
     /// Sample pairs of a link in the samples oracle, 1 to 4096
-    #[arg(long, value_name = "P", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Settings")]
+    #[arg(
+        long,
+        value_name = "P",
+        value_parser = clap::value_parser!(u32).range(1..=4096),
+        help = with_defaults(
+            "Sample pairs for each link with --oracle samples, 1 to 4096",
+            |settings| settings.samples
+        ),
+        help_heading = "Settings"
+    )]
     pub samples: Option<u32>,
-    /// Smallest element as a fraction of the scene's area
-    #[arg(long, value_name = "A", value_parser = at_least_zero, help_heading = "Settings")]
+    /// Minimum area of an element as a fraction of the scene's area
+    #[arg(
+        long,
+        value_name = "A",
+        value_parser = at_least_zero,
+        help = with_defaults(
+            "Minimum area of an element as a fraction of the scene's area",
+            |settings| settings.min_area
+        ),
+        help_heading = "Settings"
+    )]
     pub min_area: Option<f32>,
-    /// Steps at most
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Settings")]
+    /// Maximum steps
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..),
+        help = with_defaults(
+            "Maximum steps; the threshold is halved from step to step down to ε",
+            |settings| settings.max_steps
+        ),
+        help_heading = "Settings"
+    )]
     pub max_steps: Option<u32>,
-    /// Seed of every random choice
-    #[arg(long, value_name = "N", help_heading = "Settings")]
+    /// Seed of all random numbers
+    #[arg(
+        long,
+        value_name = "N",
+        help = with_defaults("Seed of all random numbers", |settings| settings.seed),
+        help_heading = "Settings"
+    )]
     pub seed: Option<u64>,
     /// Do not leave this out where the scene does not need it; may be given several times
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Settings")]
@@ -149,22 +223,22 @@ impl SettingFlags {
 /// Flags of [`RunOptions`] and of the colours of exports.
 #[derive(Clone, Debug, Args)]
 pub struct RunFlags {
-    /// Stop after this time
+    /// Stop after this time [default: none]
     #[arg(long, value_name = "SEC", value_parser = seconds, help_heading = "Limits")]
     pub time_limit: Option<Duration>,
-    /// Stop when the solver holds this much
+    /// Stop when the solver uses this much memory [default: none]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40), help_heading = "Limits")]
     pub memory_limit: Option<u64>,
-    /// Solver threads, by default one for each core
+    /// Solver threads [default: automatic, one for each core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Limits")]
     pub threads: Option<u16>,
-    /// Exposure in stops; by default 0 in files, and automatic in pictures and the window
+    /// Exposure in stops [default: 0 in exported files, automatic in pictures and the window]
     #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
     pub exposure: Option<f32>,
-    /// Multiply what all emitters emit, in files and pictures
+    /// Factor on the emission of all emitters, in exported files and pictures [default: 1]
     #[arg(long, value_name = "FACTOR", value_parser = at_least_zero, help_heading = "Output")]
     pub emission_scale: Option<f32>,
-    /// Tone curve of the byte colours, by default neutral
+    /// Tone curve of the byte colours [default: neutral]
     #[arg(long, value_enum, help_heading = "Output")]
     pub tonemap: Option<ToneMapFlag>,
 }
@@ -199,6 +273,38 @@ impl RunFlags {
     }
 }
 
+/// A flag's explanation with its value in every preset, in which only what differs from the default is named.
+fn with_defaults<T: Display + PartialEq>(text: &str, value: fn(&SolveSettings) -> T) -> String {
+    let default = value(&SolveSettings::default());
+    let others = [
+        ("draft", SolveSettings::draft()),
+        ("final", SolveSettings::finest()),
+    ];
+    let differing: String = others
+        .iter()
+        .map(|(name, settings)| (name, value(settings)))
+        .filter(|(_, value)| *value != default)
+        .map(|(name, value)| format!(", {name} {value}"))
+        .collect();
+    format!("{text} [default: {default}{differing}]")
+}
+
+/// A flag's explanation with the name of its default.
+fn with_default_name<T: ValueEnum>(
+    text: &str,
+    is_default: impl Fn(&T, &SolveSettings) -> bool,
+) -> String {
+    let normal = SolveSettings::default();
+    let name = T::value_variants()
+        .iter()
+        .find(|flag| is_default(flag, &normal))
+        .and_then(|flag| flag.to_possible_value());
+    match name {
+        Some(value) => format!("{text} [default: {}]", value.get_name()),
+        None => text.to_owned(),
+    }
+}
+
 /// `--reference`: what to measure the error against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reference {
@@ -208,15 +314,18 @@ pub enum Reference {
     Matrix,
 }
 
+impl Reference {
+    /// Enough to tell an error of a few per cent in usual rooms.
+    pub const DEFAULT_SAMPLES: u32 = 256;
+}
+
 impl FromStr for Reference {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        /// Enough to tell an error of a few per cent in usual rooms.
-        const DEFAULT_SAMPLES: u32 = 256;
         let samples = match text.split_once('=') {
             None if text == "matrix" => return Ok(Self::Matrix),
-            None if text == "paths" => DEFAULT_SAMPLES,
+            None if text == "paths" => Self::DEFAULT_SAMPLES,
             Some(("paths", samples)) => samples
                 .parse()
                 .ok()
@@ -318,7 +427,7 @@ impl OracleFlag {
 /// `--direct`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DirectFlag {
-    /// Whichever suits the emitters
+    /// Whichever suits each emitter
     Auto,
     /// Shadow rays from every vertex
     Sampled,
@@ -343,7 +452,7 @@ pub enum KeepFlag {
     Unlit,
     /// Rays where nothing can block them
     Rays,
-    /// Elements where light does not bend and nothing casts a shadow
+    /// Elements where light varies little and nothing casts a shadow
     Elements,
     /// Links of clusters where nothing casts a shadow and there are few patches
     Clusters,
@@ -398,6 +507,24 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn explanations_tell_the_default_and_where_presets_differ() {
+        assert_eq!(
+            with_defaults("steps", |settings| settings.max_steps),
+            "steps [default: 5, draft 3, final 6]"
+        );
+        assert_eq!(
+            with_defaults("seed", |settings| settings.seed),
+            "seed [default: 1]"
+        );
+        assert_eq!(
+            with_default_name("a", |flag: &OracleFlag, normal| {
+                flag.oracle() == normal.oracle
+            }),
+            "a [default: interval]"
+        );
+    }
 
     #[test]
     fn a_reference_is_read_with_and_without_samples() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::{self, BuildError, ReadError, Scene, SceneOptions};
+use crate::scene::{self, BuildError, ReadError, Scene, SceneOptions, builtin};
 
 /// Why there is no scene.
 #[derive(Debug, thiserror::Error)]
@@ -11,8 +11,11 @@ pub enum LoadError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// There is no such built-in scene.
-    #[error("no built-in scene is named '{0}'; 'vecrad scenes' lists them")]
+    #[error("no built-in scene is named '{0}'; {hint}", hint = hint(.0))]
     Unknown(String),
+    /// A built-in scene is named where a file is expected.
+    #[error("there is no such file; for the built-in scene of this name write --scene {0}")]
+    NotFile(String),
     /// Neither a file nor a built-in scene is named.
     #[error("no scene is named")]
     Nothing,
@@ -31,8 +34,76 @@ pub fn load(
     options: &SceneOptions,
 ) -> Result<Scene, LoadError> {
     if let Some(name) = name {
-        let made = scene::builtin::builtin(name, options);
+        let made = builtin::builtin(name, options);
         return Ok(made.ok_or_else(|| LoadError::Unknown(name.to_owned()))??);
     }
-    Ok(scene::read_obj(path.ok_or(LoadError::Nothing)?, options)?)
+    let path = path.ok_or(LoadError::Nothing)?;
+    check_is_file(path)?;
+    Ok(scene::read_obj(path, options)?)
+}
+
+/// Refuse the name of a built-in scene that stands for a file and is none.
+///
+/// # Errors
+/// [`LoadError::NotFile`]
+pub(super) fn check_is_file(path: &Path) -> Result<(), LoadError> {
+    match path.to_str().and_then(builtin::find_builtin) {
+        Some(found) if !path.exists() => Err(LoadError::NotFile(found.name.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Names that are less alike than this are not suggested: it is what clap takes for flags. Lower, and names are suggested
+/// that have nothing in common; higher, and two swapped letters of a short name are not forgiven.
+const ALIKE: f64 = 0.7;
+
+/// What to do about an unknown name.
+fn hint(name: &str) -> String {
+    let name = name.to_lowercase();
+    let closest = builtin::builtin_names()
+        .map(|known| (strsim::jaro(&name, known), known))
+        .max_by(|(one, _), (other, _)| one.total_cmp(other));
+    match closest {
+        Some((likeness, known)) if likeness > ALIKE => format!("did you mean '{known}'?"),
+        _ => "'vecrad scenes' lists them".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_scene_gets_a_suggestion_and_another_word_does_not() {
+        for (name, meant) in [
+            ("cornel", "cornell"),
+            ("Cornell", "cornell"),
+            ("galery", "gallery"),
+            ("galllery", "gallery"),
+            ("room1022", "room-1022"),
+            ("tiledroom", "tiled-room"),
+            ("furnance", "furnace"),
+            ("sopu", "soup"),
+        ] {
+            let sentence = LoadError::Unknown(name.to_owned()).to_string();
+            let end = format!("named '{name}'; did you mean '{meant}'?");
+            assert!(sentence.ends_with(&end), "{sentence}");
+        }
+        for name in ["", "kitchen", "xyzzy"] {
+            let sentence = LoadError::Unknown(name.to_owned()).to_string();
+            assert!(
+                sentence.ends_with("'vecrad scenes' lists them"),
+                "{sentence}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_built_in_scene_in_the_place_of_a_file_is_recognised() {
+        let options = SceneOptions::default();
+        let error = load(Some(Path::new("cornell")), None, &options).unwrap_err();
+        assert!(error.to_string().ends_with("--scene cornell"), "{error}");
+        let error = load(Some(Path::new("missing.obj")), None, &options).unwrap_err();
+        assert!(matches!(error, LoadError::Read(ReadError::NotFound { .. })));
+    }
 }

@@ -20,6 +20,7 @@ use crate::{
         camera::UpAxis,
         loader, opening,
         render::headless::{self, Subject},
+        stderr::StderrCapture,
         view::{ClusterOverlay, ClusterRequest, ToneMap, ViewMode, ViewRequest, ViewSettings},
     },
 };
@@ -27,23 +28,23 @@ use crate::{
 /// What a picture shows, and from where.
 #[derive(Clone, Debug, Args)]
 pub struct ViewFlags {
-    /// What the surfaces show, by default radiance
+    /// What the surfaces show [default: radiance]
     #[arg(long, value_name = "MODE", value_parser = view_mode(), help_heading = "Picture")]
     pub view: Option<String>,
-    /// Draw cluster boxes: those of a level of the tree; size=PART for the largest below a part of the scene's extent;
-    /// used for the ends of links
+    /// Draw cluster boxes: of a level of the tree; with size=PART the largest below this part of the scene's extent; with
+    /// used those at the ends of links
     #[arg(long, value_name = "LEVEL", help_heading = "Picture")]
     pub clusters: Option<Clusters>,
     /// Draw the edges of the elements
     #[arg(long, help_heading = "Picture")]
     pub edges: bool,
-    /// Space false colours logarithmically
+    /// Logarithmic scale for false colours
     #[arg(long, help_heading = "Picture")]
     pub logarithmic: bool,
-    /// Ends of the false colours
+    /// Range of the false colours [default: that of the light]
     #[arg(long, value_name = "LOW,HIGH", help_heading = "Picture")]
     pub range: Option<Range>,
-    /// Eye in the file's units
+    /// Camera position in the file's units
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -51,7 +52,7 @@ pub struct ViewFlags {
         help_heading = "Picture"
     )]
     pub camera_position: Option<Point>,
-    /// Point that is looked at, in the file's units
+    /// Look-at point of the camera in the file's units
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -59,7 +60,7 @@ pub struct ViewFlags {
         help_heading = "Picture"
     )]
     pub camera_focal_point: Option<Point>,
-    /// What is up in the picture, instead of the scene's up axis
+    /// Up direction of the camera [default: the scene's up axis]
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -67,7 +68,7 @@ pub struct ViewFlags {
         help_heading = "Picture"
     )]
     pub camera_view_up: Option<Direction>,
-    /// Vertical angle of view in degrees, 1 to 170
+    /// Vertical field of view in degrees, 1 to 170
     #[arg(long, value_name = "DEGREES", value_parser = view_angle, help_heading = "Picture")]
     pub camera_view_angle: Option<f32>,
 }
@@ -128,7 +129,7 @@ pub struct PictureFlags {
         help_heading = "Picture"
     )]
     pub size: Size,
-    /// Leave the background out: straight alpha in a PNG, colours multiplied by alpha in an EXR
+    /// Transparent background: straight alpha in a PNG, premultiplied alpha in an EXR
     #[arg(long, requires = "screenshot", help_heading = "Picture")]
     pub transparent: bool,
     /// What it shows
@@ -152,6 +153,15 @@ impl PictureFlags {
             bail!(UsageError(message));
         }
         output::check(path)
+    }
+
+    /// Refuse a picture that this machine cannot draw.
+    pub fn check_size(&self) -> Result<()> {
+        if self.screenshot.is_some() {
+            let _capture = StderrCapture::begin();
+            headless::check(self.size.0, self.transparent)?;
+        }
+        Ok(())
     }
 
     /// Whether a picture of the measured error is asked for.
@@ -193,10 +203,13 @@ impl PictureFlags {
             snapshot,
             errors,
         };
-        let encoded = if self.transparent {
-            headless::cutout(subject, &camera, &view, size)?.encode(path)
-        } else {
-            headless::picture(subject, &camera, &view, size)?.encode(path)
+        let encoded = {
+            let _capture = StderrCapture::begin();
+            if self.transparent {
+                headless::cutout(subject, &camera, &view, size)?.encode(path)
+            } else {
+                headless::picture(subject, &camera, &view, size)?.encode(path)
+            }
         };
         let bytes = encoded.with_context(|| format!("cannot write {}", path.display()))?;
         output::write_whole(path, |out| out.write_all(&bytes))

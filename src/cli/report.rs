@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::{
     export::ColorOptions,
     metrics::ErrorMeasures,
+    reference::SampledSurfaces,
     scene::{Frame, Scene, Warning},
     solver::{LeftOut, SolveSettings, StepReport},
     worker::StopReason,
@@ -20,6 +21,9 @@ pub(super) struct SolveReport {
     /// What was skipped because this scene does not need it, and why.
     pub(super) left_out: Vec<LeftOut>,
     pub(super) warnings: Vec<WarningFacts>,
+    /// What the errors of the steps are measured against.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) reference: Option<ReferenceFacts>,
     pub(super) steps: Vec<StepFacts>,
     pub(super) stop_reason: StopReason,
     pub(super) totals: Totals,
@@ -99,6 +103,19 @@ impl WarningFacts {
     }
 }
 
+/// What errors are measured against.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct ReferenceFacts {
+    pub(super) method: &'static str,
+    /// Paths at each point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) samples: Option<u32>,
+    pub(super) points: usize,
+    pub(super) surfaces: SampledSurfaces,
+    /// What the errors are means of, in words.
+    pub(super) error_of: String,
+}
+
 /// A step and its error.
 #[derive(Debug, Serialize)]
 pub(super) struct StepFacts {
@@ -108,7 +125,7 @@ pub(super) struct StepFacts {
     pub(super) error: Option<ErrorMeasures>,
 }
 
-/// Times in seconds; the figures of the last step are in `steps`.
+/// Times in seconds, a step that was interrupted included; the figures of whole steps are in `steps`.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub(super) struct Totals {
     pub(super) steps: usize,
@@ -116,7 +133,11 @@ pub(super) struct Totals {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) reference_s: Option<f64>,
     pub(super) prepare_s: f64,
+    /// Preparing and stepping.
     pub(super) solve_s: f64,
+    /// The part of `solve_s` that went into a step that a limit interrupted, and left no light.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) interrupted_s: Option<f64>,
     pub(super) elapsed_s: f64,
 }
 

@@ -15,9 +15,12 @@ use clap::Args;
 use super::{
     Outcome, Reference, RunFlags, SceneFlags, SettingFlags, UsageError,
     load::load,
-    output,
+    output::{self, Destination},
     progress::Progress,
-    report::{Machine, SceneFacts, SolveReport, StepFacts, Totals, WarningFacts, core_count},
+    report::{
+        Machine, ReferenceFacts, SceneFacts, SolveReport, StepFacts, Totals, WarningFacts,
+        core_count,
+    },
     truth::{self, Errors, Truth},
 };
 use crate::{
@@ -48,8 +51,17 @@ pub struct SolveArguments {
     /// Write the report (JSON; - for standard output)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub report: Option<PathBuf>,
-    /// Measure the error of every step: paths or paths=SAMPLES
-    #[arg(long, value_name = "HOW", help_heading = "Output")]
+    /// Measure the error of every step against a reference
+    #[arg(
+        long,
+        value_name = "HOW",
+        help = format!(
+            "Measure the error of every step against path tracing (paths or paths=SAMPLES, by default {}) or the full \
+             radiosity matrix (matrix, for small scenes)",
+            Reference::DEFAULT_SAMPLES
+        ),
+        help_heading = "Output"
+    )]
     pub reference: Option<Reference>,
     /// Pictures
     #[cfg(feature = "viewer")]
@@ -72,10 +84,18 @@ pub struct SolveArguments {
     pub run_flags: RunFlags,
 }
 
+/// What errors are measured against, and errors by step.
+struct Measured {
+    reference: Option<ReferenceFacts>,
+    errors: Errors,
+}
+
 /// What a drained run brought.
 struct Run {
     steps: Vec<StepReport>,
     prepare_s: f64,
+    /// Running time and time spent at the end, in seconds; a step that was interrupted counts.
+    times: (f64, f64),
     stop_reason: StopReason,
     snapshot: Arc<Snapshot>,
 }
@@ -83,7 +103,7 @@ struct Run {
 /// Light the scene, write the files, say how it ended.
 pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     let interruption = Interruption::listen()?;
-    check_outputs(arguments)?;
+    let destinations = check_outputs(arguments)?;
     let begin = Instant::now();
     let options = arguments.scene_flags.options();
     interruption.ends_at_once(true);
@@ -95,12 +115,13 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     interruption.ends_at_once(false);
     let interrupted = interruption.flag;
     let read_s = begin.elapsed().as_secs_f64();
+    output::check_inputs_kept(&destinations, &scene.files)?;
     for warning in &scene.warnings {
         output::say(format_args!("warning: {warning}"));
     }
     let errors = Errors::default();
     let traced = Instant::now();
-    let mut worker = worker(arguments, &scene, &interrupted, &errors)?;
+    let (mut worker, reference) = worker(arguments, &scene, &interrupted, &errors)?;
     let reference_s = arguments.reference.map(|_| traced.elapsed().as_secs_f64());
     worker.start(
         scene.clone(),
@@ -114,8 +135,9 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         reference_s,
         ..Totals::default()
     };
+    let measured = Measured { reference, errors };
     // What cannot be written does not keep the rest from being written.
-    let report = write_report(arguments, &scene, &run, &errors, totals);
+    let report = write_report(arguments, &scene, &run, &measured, totals);
     if run.snapshot.mesh.positions.is_empty() && writes_light(arguments) {
         report?;
         bail!("stopped before there was any light, so no mesh and no picture was written");
@@ -126,7 +148,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &scene,
         arguments.scene.as_deref(),
         &run.snapshot,
-        errors_of(arguments, &scene, &run, &errors, &interrupted).as_ref(),
+        errors_of(arguments, &scene, &run, &measured.errors, &interrupted).as_ref(),
         &arguments.run_flags,
         arguments.scene_flags.up,
     );
@@ -162,8 +184,8 @@ fn errors_of(
     truth::vertex_errors(scene, &run.snapshot, paths, reference_rms, &cancel).map(Arc::new)
 }
 
-/// Refuse what cannot be written before the work begins.
-fn check_outputs(arguments: &SolveArguments) -> Result<()> {
+/// Refuse what cannot be written before the work begins; else the files that will be.
+fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
     if let Some(path) = &arguments.export {
         MeshFormat::of(path).map_err(|error| UsageError(error.to_string()))?;
         output::check(path)?;
@@ -177,7 +199,23 @@ fn check_outputs(arguments: &SolveArguments) -> Result<()> {
             bail!(UsageError(message.to_owned()));
         }
     }
-    arguments.report.as_deref().map_or(Ok(()), output::check)
+    arguments.report.as_deref().map_or(Ok(()), output::check)?;
+    let named = [
+        ("--export", &arguments.export),
+        ("--report", &arguments.report),
+        #[cfg(feature = "viewer")]
+        ("--screenshot", &arguments.picture.screenshot),
+    ];
+    let destinations: Vec<Destination> = named
+        .into_iter()
+        .filter_map(|(label, path)| Destination::new(label, path.as_deref()?))
+        .collect();
+    output::check_distinct(&destinations)?;
+    // The rest of the scene's files is known once it is read.
+    output::check_inputs_kept(&destinations, arguments.path.as_slice())?;
+    #[cfg(feature = "viewer")]
+    arguments.picture.check_size()?;
+    Ok(destinations)
 }
 
 /// Whether files with light are asked for.
@@ -220,13 +258,13 @@ impl Interruption {
     }
 }
 
-/// A worker that measures errors if a reference is asked for.
+/// A worker that measures errors if a reference is asked for, and what is known of that.
 fn worker(
     arguments: &SolveArguments,
     scene: &Arc<Scene>,
     interrupted: &Arc<AtomicBool>,
     errors: &Errors,
-) -> Result<WorkerHandle> {
+) -> Result<(WorkerHandle, Option<ReferenceFacts>)> {
     let wake = Arc::new(|| {});
     let seed = arguments.setting_flags.settings().seed;
     let cancel = || interrupted.load(Ordering::Relaxed);
@@ -238,13 +276,14 @@ fn worker(
             found => Some(found?),
         },
     };
-    match truth {
+    let facts = truth.as_ref().map(|truth| truth.facts.clone());
+    let worker = match truth {
         None => WorkerHandle::spawn(wake),
         Some(truth) => {
             WorkerHandle::with_steppers(wake, truth::measured_solvers(truth, errors.clone()))
         }
-    }
-    .context("cannot start the solver thread")
+    };
+    Ok((worker.context("cannot start the solver thread")?, facts))
 }
 
 /// Follow the run to its end.
@@ -254,7 +293,7 @@ fn drain(
     arguments: &SolveArguments,
 ) -> Result<Run> {
     let mut progress = Progress::new(arguments.quiet);
-    let (mut steps, mut prepare_s) = (Vec::new(), 0.0);
+    let (mut steps, mut prepare_s, mut times) = (Vec::new(), 0.0, (0.0, 0.0));
     let mut is_stopping = false;
     let stop_reason = loop {
         if interrupted.load(Ordering::Relaxed) {
@@ -271,14 +310,17 @@ fn drain(
             None => progress.show(),
             Some(Event::Prepared { seconds }) => {
                 prepare_s = seconds;
+                times = (seconds, seconds);
                 if arguments.explain {
                     explain(&worker.latest().unwrap_or_default());
                 }
             }
             Some(Event::Stepped(report)) => {
                 progress.stepped(&report);
+                times = (report.elapsed_s, report.solve_s);
                 steps.push(report);
             }
+            Some(Event::Interrupted { elapsed_s, solve_s }) => times = (elapsed_s, solve_s),
             Some(Event::Finished(reason)) => break reason,
             Some(Event::Failed(message)) => bail!("the solver failed: {message}"),
             Some(
@@ -294,6 +336,7 @@ fn drain(
     Ok(Run {
         steps,
         prepare_s,
+        times,
         stop_reason,
         snapshot: worker.latest().unwrap_or_default(),
     })
@@ -324,13 +367,13 @@ fn write_report(
     arguments: &SolveArguments,
     scene: &Scene,
     run: &Run,
-    errors: &Errors,
+    measured: &Measured,
     totals: Totals,
 ) -> Result<()> {
     let Some(path) = &arguments.report else {
         return Ok(());
     };
-    let report = report(arguments, scene, run, errors, totals);
+    let report = report(arguments, scene, run, measured, totals);
     output::write_whole(path, |out| {
         serde_json::to_writer_pretty(&mut *out, &report)?;
         out.write_all(b"\n")
@@ -341,10 +384,13 @@ fn report(
     arguments: &SolveArguments,
     scene: &Scene,
     run: &Run,
-    errors: &Errors,
+    measured: &Measured,
     totals: Totals,
 ) -> SolveReport {
-    let errors = errors.lock().unwrap_or_else(PoisonError::into_inner);
+    let errors = measured
+        .errors
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
     let steps: Vec<StepFacts> = run
         .steps
         .iter()
@@ -353,7 +399,8 @@ fn report(
             error: errors.get(&report.step).cloned(),
         })
         .collect();
-    let last = run.steps.last();
+    let (elapsed_s, solve_s) = run.times;
+    let done_s = run.steps.last().map_or(run.prepare_s, |last| last.solve_s);
     SolveReport {
         version: env!("CARGO_PKG_VERSION"),
         scene: SceneFacts::of(scene),
@@ -361,12 +408,14 @@ fn report(
         color: arguments.run_flags.export(arguments.scene_flags.up).color,
         left_out: run.snapshot.left_out.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),
+        reference: measured.reference.clone(),
         stop_reason: run.stop_reason,
         totals: Totals {
             steps: steps.len(),
             prepare_s: run.prepare_s,
-            solve_s: last.map_or(run.prepare_s, |last| last.solve_s),
-            elapsed_s: last.map_or(run.prepare_s, |last| last.elapsed_s),
+            solve_s,
+            interrupted_s: (solve_s > done_s).then_some(solve_s - done_s),
+            elapsed_s,
             ..totals
         },
         steps,

@@ -1,13 +1,13 @@
 //! `--reference`: the error of every step against path tracing or the full matrix.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
     sync::{Arc, Mutex, PoisonError},
 };
 
 use glam::{Vec2, Vec3};
 
-use super::observed::observed_solvers;
+use super::{observed::observed_solvers, report::ReferenceFacts};
 #[cfg(feature = "viewer")]
 use crate::metrics::VertexReference;
 use crate::{
@@ -15,9 +15,9 @@ use crate::{
     metrics::{ErrorMeasures, MeshLookup, measure_error},
     reference::{
         MatrixError, MatrixPatch, MatrixSettings, PathSettings, PathTracer, ReferencePoint,
-        solve_matrix,
+        sample_points, solve_matrix,
     },
-    scene::Scene,
+    scene::{Scene, TriangleId},
     solver::Snapshot,
     worker::MakeStepper,
 };
@@ -27,14 +27,16 @@ pub(super) type Errors = Arc<Mutex<BTreeMap<u32, ErrorMeasures>>>;
 
 /// What measured light is compared with.
 pub(super) struct Truth {
-    /// Area-weighted random points with their light.
+    /// What to say of it.
+    pub(super) facts: ReferenceFacts,
+    /// Random points with their light.
     points: Vec<ReferencePoint>,
     /// Where the measured light of each point is looked up and averaged: as many places in turn for every point.
     probes: Vec<ReferencePoint>,
 }
 
-/// Patches drawn, in proportion to their area, to stand for the matrix.
-const MATRIX_POINTS: usize = 4000;
+/// Patches drawn, as points of the path-traced reference are, to stand for the matrix.
+const MATRIX_POINTS: u32 = 4000;
 
 /// Places per drawn patch: the matrix knows means of patches only, so the mean of the mesh is compared.
 const MATRIX_PROBES: u32 = 8;
@@ -54,10 +56,17 @@ impl Truth {
             ..PathSettings::default()
         };
         let mut tracer = PathTracer::new(scene.clone(), rays, settings);
-        let points = tracer.pass(cancel).then(|| tracer.result().points)?;
+        let traced = tracer.pass(cancel).then(|| tracer.result())?;
         Some(Self {
-            probes: points.clone(),
-            points,
+            facts: ReferenceFacts {
+                method: "paths",
+                samples: Some(traced.samples),
+                points: traced.points.len(),
+                surfaces: traced.surfaces,
+                error_of: traced.surfaces.to_string(),
+            },
+            probes: traced.points.clone(),
+            points: traced.points,
         })
     }
 
@@ -75,23 +84,32 @@ impl Truth {
             ..MatrixSettings::default()
         };
         let solution = solve_matrix(scene, &RayTree::new(scene), &settings, cancel)?;
-        let area = |patch: &MatrixPatch| {
-            f64::from(scene.surfaces[patch.triangle.index()].area_vector.length())
-        };
-        let total: f64 = solution.patches.iter().map(area).sum();
+        let patches: HashMap<(TriangleId, bool), &MatrixPatch> = solution
+            .patches
+            .iter()
+            .map(|patch| ((patch.triangle, patch.is_back), patch))
+            .collect();
+        let (chosen, surfaces) = sample_points(scene, MATRIX_POINTS, seed);
         let (mut points, mut probes) = (Vec::new(), Vec::new());
-        let mut sum = 0.0;
-        for patch in &solution.patches {
-            sum += area(patch);
-            while (points.len() as f64 + 0.5) * total < sum * MATRIX_POINTS as f64 {
-                points.push(matrix_point(scene, patch, Vec3::splat(1.0 / 3.0)));
-                for probe in 0..MATRIX_PROBES {
-                    let at = triangle_point(low_discrepancy_2d(probe, Vec2::ZERO));
-                    probes.push(matrix_point(scene, patch, at));
-                }
+        let patch_of = |point: &ReferencePoint| patches.get(&(point.triangle, point.is_back));
+        for patch in chosen.iter().filter_map(patch_of) {
+            points.push(matrix_point(scene, patch, Vec3::splat(1.0 / 3.0)));
+            for probe in 0..MATRIX_PROBES {
+                let at = triangle_point(low_discrepancy_2d(probe, Vec2::ZERO));
+                probes.push(matrix_point(scene, patch, at));
             }
         }
-        Ok(Self { points, probes })
+        Ok(Self {
+            facts: ReferenceFacts {
+                method: "matrix",
+                samples: None,
+                points: points.len(),
+                surfaces,
+                error_of: surfaces.to_string(),
+            },
+            points,
+            probes,
+        })
     }
 
     /// Error of what a snapshot shows.

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 
-use super::{LoadError, Outcome, RunFlags, SceneFlags, SettingFlags, picture::ViewFlags};
+use super::{
+    LoadError, Outcome, RunFlags, SceneFlags, SettingFlags, load::check_is_file, picture::ViewFlags,
+};
 use crate::{
     scene::{ReadError, builtin},
     viewer::{self, loader::SceneSource},
@@ -50,6 +52,7 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
     if let Some(path) = source.path()
         && !path.is_file()
     {
+        check_is_file(path)?;
         bail!(LoadError::Read(ReadError::NotFound {
             path: path.to_owned(),
         }));

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{Measurement, Runner, Trajectory};
+use super::{Measurement, Runner, Trajectory, error_text, smallest_error};
+use crate::reference::SampledSurfaces;
 
 /// Errors for which the table tells the time.
 pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
@@ -10,14 +11,11 @@ pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 /// Errors at which runs are compared with the bake.
 const RATIO_TARGETS: [f64; 2] = [0.1, 0.05];
 
-/// Trimmed errors below this share of the reference's noise are not told. Trimming drops points whose noise is large,
-/// so what is subtracted from the others is a little too much: by 0.3 of the noise where that is Gaussian and even.
-/// A smaller share calls noise an error of 0; a larger one hides what longer references would confirm.
-const RELIABLE_SHARE: f64 = 0.3;
-
 /// What errors are measured against.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReferenceFacts {
+    /// What the errors are means of.
+    pub surfaces: SampledSurfaces,
     /// Surface points.
     pub points: usize,
     /// Paths at each point.
@@ -61,6 +59,7 @@ pub struct Row<'a> {
     memory_bytes: u64,
     reference_noise: f64,
     repeats: u32,
+    is_cut_short: bool,
 }
 
 impl SceneComparison {
@@ -84,7 +83,7 @@ impl SceneComparison {
 
     /// The smallest error that can be told from none.
     pub fn smallest_error(&self) -> f64 {
-        RELIABLE_SHARE * self.reference.noise_floor
+        smallest_error(self.reference.noise_floor)
     }
 
     /// A Markdown table with a line for each run.
@@ -106,18 +105,16 @@ impl SceneComparison {
     }
 
     fn markdown_line(&self, run: &Trajectory) -> String {
-        let mut line = format!("\n| {} |", run.label.replace('|', "/"));
+        let mut line = format!("\n| {} |", run.marked_label().replace('|', "/"));
         for target in TARGETS {
             line += &format!(" {} |", self.time_cell(run, target));
         }
         let Some(best) = run.best() else {
             return line + &" – |".repeat(5 + RATIO_TARGETS.len());
         };
-        let (error, smallest) = (best.error.relative_rms_trimmed, self.smallest_error());
-        let sign = if error < smallest { "< " } else { "" };
         line += &format!(
-            " {sign}{:.2} % | {} | {} | {} | {} MiB |",
-            100.0 * error.max(smallest),
+            " {} | {} | {} | {} | {} MiB |",
+            error_text(best.error.relative_rms_trimmed, self.reference.noise_floor),
             seconds(best.time_s),
             grouped(best.rays),
             if run.runner == Runner::Solver {
@@ -184,6 +181,7 @@ fn row<'a>(scene: &'a SceneComparison, run: &'a Trajectory, point: &Measurement)
         memory_bytes: point.memory_bytes,
         reference_noise: scene.reference.noise_floor,
         repeats: run.repeats,
+        is_cut_short: run.is_cut_short,
     }
 }
 
@@ -217,7 +215,7 @@ pub fn grouped(count: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::trajectory::tests::trajectory_along;
+    use crate::metrics::{trajectory::CUT_SHORT_MARK, trajectory::tests::trajectory_along};
 
     fn run(label: &str, runner: Runner, curve: &[(f64, f64)]) -> Trajectory {
         Trajectory {
@@ -232,6 +230,7 @@ mod tests {
             scene: "box".to_owned(),
             triangles: 12,
             reference: ReferenceFacts {
+                surfaces: SampledSurfaces::default(),
                 points: 10,
                 samples: 8,
                 noise_floor: 0.01,
@@ -276,9 +275,25 @@ mod tests {
         comparison.reference.noise_floor = 0.05;
         let table = comparison.markdown();
         // 0.3 of 5 %: 2 % is told, 1 % is not.
-        assert!(table.contains("| ? | < 1.50 % |"), "{table}");
+        assert!(table.contains("| ? | below noise (5.0 %) |"), "{table}");
         comparison.reference.noise_floor = 0.001;
-        assert!(comparison.markdown().contains("< 0.03 %"));
+        assert!(comparison.markdown().contains("below noise (0.10 %)"));
+    }
+
+    #[test]
+    fn runs_that_were_cut_short_are_marked() {
+        let mut comparison = comparison();
+        assert!(!comparison.markdown().contains(CUT_SHORT_MARK));
+        comparison.runs[1].is_cut_short = true;
+        let table = comparison.markdown();
+        let marked: Vec<&str> = table
+            .lines()
+            .filter(|line| line.contains(CUT_SHORT_MARK))
+            .collect();
+        assert_eq!(marked.len(), 1, "{table}");
+        assert!(marked[0].starts_with("| bake † |"), "{table}");
+        let cut: Vec<bool> = comparison.rows().map(|row| row.is_cut_short).collect();
+        assert_eq!(cut, [false, false, true, true]);
     }
 
     #[test]

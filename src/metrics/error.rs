@@ -1,8 +1,9 @@
 //! Error of measured radiance against path-traced points, with the reference's own noise taken out.
 //!
-//! With x the luminance measured, r that of the reference and s its standard error, over n area-weighted points:
-//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. Points on emitters are left out, since their
-//! own light would dwarf the rest; where every point emits, all count.
+//! With x the luminance measured, r that of the reference and s its standard error, over n points:
+//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. What means over the points are means of is told
+//! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are left out, since their own light would
+//! dwarf the rest; where every point emits, all count.
 
 use glam::Vec3;
 use serde::Serialize;
@@ -42,6 +43,37 @@ pub struct ErrorMeasures {
     pub unmatched: usize,
     /// Points whose measured value is not finite; they count as 0.
     pub nonfinite: usize,
+}
+
+/// Noise-corrected errors below this share of the reference's noise cannot be told from none. Trimming drops points whose
+/// noise is large, so what is subtracted from the others is a little too much: by 0.3 of the noise where that is Gaussian
+/// and even. A smaller share calls noise an error of 0; a larger one hides what longer references would confirm.
+const RELIABLE_SHARE: f64 = 0.3;
+
+/// The smallest error that can be told from none under a reference with this noise; all relative.
+pub fn smallest_error(noise_floor: f64) -> f64 {
+    RELIABLE_SHARE * noise_floor
+}
+
+/// A noise-corrected error for people, in per cent, or that it lies below the noise. Both are relative.
+pub fn error_text(error: f64, noise_floor: f64) -> String {
+    if error < smallest_error(noise_floor) {
+        format!("below noise ({})", per_cent(noise_floor))
+    } else {
+        per_cent(error)
+    }
+}
+
+/// A share in per cent, with about two significant digits.
+fn per_cent(share: f64) -> String {
+    let value = 100.0 * share;
+    let digits = match value {
+        _ if value >= 10.0 || value <= 0.0 => 0,
+        _ if value >= 1.0 => 1,
+        _ if value >= 0.1 => 2,
+        _ => 3,
+    };
+    format!("{value:.digits$} %")
 }
 
 /// Compare measured radiance, one entry per reference point, with the reference. `None` without points.
@@ -270,6 +302,16 @@ mod tests {
         let bright = measure_error(&values(&[f32::MAX / 4.0]), &reference).unwrap();
         assert!(bright.relative_rms.is_finite() && bright.p95_pointwise.is_finite());
         assert!(measure_error(&[], &[]).is_none());
+    }
+
+    #[test]
+    fn an_error_within_the_noise_is_not_told_as_none() {
+        assert_eq!(error_text(0.0, 0.1), "below noise (10 %)");
+        assert_eq!(error_text(0.029, 0.1), "below noise (10 %)");
+        assert_eq!(error_text(0.031, 0.1), "3.1 %");
+        assert_eq!(error_text(0.0, 0.0004), "below noise (0.040 %)");
+        assert_eq!(error_text(0.0, 0.0), "0 %");
+        assert_eq!(error_text(0.123, 0.002), "12 %");
     }
 
     #[test]

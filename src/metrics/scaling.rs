@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Trajectory, digits, grouped};
+use super::{CUT_SHORT_MARK, Trajectory, digits, error_text, grouped};
 
 /// Cost of one run on a scene of some size. Field names are the header of the table of figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -15,7 +15,7 @@ pub struct SizeCost {
     pub to_10_percent_s: Option<f64>,
     /// Seconds to 5 % trimmed error.
     pub to_5_percent_s: Option<f64>,
-    /// Seconds of the whole run.
+    /// Seconds of the whole run, unless it was cut short.
     pub whole_s: Option<f64>,
     /// Smallest trimmed error.
     pub best_error: Option<f64>,
@@ -25,11 +25,15 @@ pub struct SizeCost {
     pub rays_per_triangle: f64,
     /// Bytes at the end.
     pub memory_bytes: u64,
+    /// Whether a limit or an interruption cut the run short; other figures are then those until it came.
+    pub is_cut_short: bool,
+    /// Noise of the reference, relative.
+    pub reference_noise: f64,
 }
 
 impl SizeCost {
     /// Read the figures off a run.
-    pub fn of(triangles: usize, run: &Trajectory) -> Self {
+    pub fn of(triangles: usize, run: &Trajectory, reference_noise: f64) -> Self {
         let seconds_to = |target| run.time_to(target).map(|crossing| crossing.time_s);
         let last = run.points.last();
         let per_triangle = |count: Option<u64>| count.unwrap_or(0) as f64 / triangles.max(1) as f64;
@@ -38,11 +42,13 @@ impl SizeCost {
             first_light_s: run.points.first().map(|first| first.time_s),
             to_10_percent_s: seconds_to(0.1),
             to_5_percent_s: seconds_to(0.05),
-            whole_s: last.map(|last| last.time_s),
+            whole_s: last.filter(|_| !run.is_cut_short).map(|last| last.time_s),
             best_error: run.best().map(|best| best.error.relative_rms_trimmed),
             links_per_triangle: per_triangle(last.map(|last| last.links)),
             rays_per_triangle: per_triangle(last.map(|last| last.rays)),
             memory_bytes: last.map_or(0, |last| last.memory_bytes),
+            is_cut_short: run.is_cut_short,
+            reference_noise,
         }
     }
 }
@@ -111,20 +117,24 @@ pub fn scaling_markdown(costs: &[SizeCost]) -> String {
     text += " best error | links per triangle | rays per triangle | memory |\n|---:|";
     text += &"---:|".repeat(COST_KINDS.len() + 4);
     for cost in costs {
-        text += &format!("\n| {} |", grouped(cost.triangles as u64));
+        text += &format!("\n| {}", grouped(cost.triangles as u64));
+        if cost.is_cut_short {
+            text += &format!(" {CUT_SHORT_MARK}");
+        }
+        text += " |";
         for kind in &COST_KINDS {
             let cell =
                 (kind.seconds)(cost).map_or("–".to_owned(), |s| format!("{} s", digits(s)));
             text += &format!(" {cell} |");
         }
-        let error = cost
-            .best_error
-            .map_or("–".to_owned(), |error| format!("{:.1} %", 100.0 * error));
+        let error = cost.best_error.map_or("–".to_owned(), |error| {
+            error_text(error, cost.reference_noise)
+        });
         text += &format!(
             " {error} | {} | {} | {} MiB |",
             digits(cost.links_per_triangle),
             digits(cost.rays_per_triangle),
-            grouped(cost.memory_bytes >> 20),
+            digits(cost.memory_bytes as f64 / f64::from(1 << 20)),
         );
     }
     text += "\n| exponent |";
@@ -150,6 +160,8 @@ mod tests {
             links_per_triangle: 3.0,
             rays_per_triangle: 40.0,
             memory_bytes: 5 << 20,
+            is_cut_short: false,
+            reference_noise: 0.001,
         }
     }
 

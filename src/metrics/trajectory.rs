@@ -51,7 +51,7 @@ pub struct Trajectory {
     pub settings: Option<SolveSettings>,
     /// Runs behind the median times.
     pub repeats: u32,
-    /// Whether a limit or an interruption came before the end of its settings.
+    /// Whether a limit or an interruption came before the end of its settings; of repeated runs, before any one's.
     pub is_cut_short: bool,
     /// In the order of time.
     pub points: Vec<Measurement>,
@@ -66,10 +66,21 @@ pub struct Crossing {
     pub is_bound: bool,
 }
 
+/// Behind the names of runs in tables that a limit or an interruption cut short.
+pub const CUT_SHORT_MARK: char = '†';
+
 /// Errors below this are taken for it where a logarithm is needed; a noise-corrected error may be 0.
 const SMALLEST_ERROR: f64 = 1e-9;
 
 impl Trajectory {
+    /// Its name, marked where it was cut short.
+    pub fn marked_label(&self) -> String {
+        match self.is_cut_short {
+            true => format!("{} {CUT_SHORT_MARK}", self.label),
+            false => self.label.clone(),
+        }
+    }
+
     /// When the trimmed error first reaches `target` (relative, above 0), interpolated between measurements in the
     /// logarithms of both; `None` if it never does.
     pub fn time_to(&self, target: f64) -> Option<Crossing> {
@@ -101,8 +112,10 @@ impl Trajectory {
             })
             .collect();
         let repeats = runs.len() as u32;
+        let is_cut_short = runs.iter().any(|run| run.is_cut_short);
         let mut merged = runs.into_iter().max_by_key(|run| run.points.len())?;
         merged.repeats = repeats;
+        merged.is_cut_short = is_cut_short;
         for point in &mut merged.points {
             let of_step = times
                 .iter()

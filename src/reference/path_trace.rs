@@ -1,22 +1,23 @@
 //! Irradiance at random surface points by path tracing, pass by pass, with its standard error.
 //!
-//! Points are spread evenly over the lit area, so plain means over them are area-weighted. Each takes its samples in
+//! Where the points lie, and what means over them are means of, is told in [`super::points`]. Each takes its samples in
 //! groups; a group covers the hemisphere with a randomly shifted low-discrepancy sequence, and since groups are
 //! independent their scatter gives an unbiased variance. All random numbers belong to a point and a group, so the
 //! result does not depend on threads.
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
     emitters::Emitters,
     estimator::{Bounce, Estimator, PathPoint},
     luminance,
+    points::{SampledSurfaces, sample_points},
 };
 use crate::{
-    geometry::{Random, RayTree, low_discrepancy_2d, triangle_point},
+    geometry::{Random, RayTree, low_discrepancy_2d},
     scene::{Scene, TriangleId},
 };
 
@@ -79,8 +80,10 @@ impl ReferencePoint {
 /// A reference as it stands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathTraced {
-    /// Area-weighted random points.
+    /// Random points.
     pub points: Vec<ReferencePoint>,
+    /// What means over them are means of.
+    pub surfaces: SampledSurfaces,
     /// Samples taken at each point so far.
     pub samples: u32,
     /// Rays shot so far.
@@ -102,6 +105,7 @@ pub struct PathTracer {
     emitters: Emitters,
     settings: PathSettings,
     points: Vec<ReferencePoint>,
+    surfaces: SampledSurfaces,
     sums: Vec<Sums>,
     group_count: u32,
     ray_count: u64,
@@ -110,7 +114,7 @@ pub struct PathTracer {
 impl PathTracer {
     /// Choose the points. `rays` is the ray tree of the scene.
     pub fn new(scene: Arc<Scene>, rays: Arc<RayTree>, settings: PathSettings) -> Self {
-        let points = surface_points(&scene, settings);
+        let (points, surfaces) = sample_points(&scene, settings.point_count, settings.seed);
         Self {
             emitters: Emitters::new(&scene),
             sums: vec![Sums::default(); points.len()],
@@ -118,6 +122,7 @@ impl PathTracer {
             rays,
             settings,
             points,
+            surfaces,
             group_count: 0,
             ray_count: 0,
         }
@@ -167,6 +172,7 @@ impl PathTracer {
         }
         PathTraced {
             points,
+            surfaces: self.surfaces,
             samples: self.group_count * GROUP,
             rays: self.ray_count,
         }
@@ -239,54 +245,4 @@ fn estimate_group(estimator: &Estimator<'_>, start: PathPoint, random: &mut Rand
         ray_count += u64::from(rays);
     }
     (sum / GROUP as f32, ray_count)
-}
-
-/// Points spread over the lit sides: systematically along their running area, low-discrepancy within a triangle.
-fn surface_points(scene: &Scene, settings: PathSettings) -> Vec<ReferencePoint> {
-    let mut random = Random::new(settings.seed, u64::MAX);
-    let offset = f64::from(random.uniform());
-    let shift = random.uniform_2d();
-    let sides: Vec<(TriangleId, bool)> = lit_sides(scene).collect();
-    let area = |id: TriangleId| f64::from(scene.surfaces[id.index()].area_vector.length());
-    let total: f64 = sides.iter().map(|&(id, _)| area(id)).sum();
-    let (mut points, mut passed) = (Vec::new(), 0.0);
-    let mut next = 0;
-    for (id, is_back) in sides {
-        passed += area(id);
-        while next < settings.point_count
-            && (f64::from(next) + offset) * total < passed * f64::from(settings.point_count)
-        {
-            let square = low_discrepancy_2d(next, shift);
-            points.push(surface_point(scene, id, is_back, square));
-            next += 1;
-        }
-    }
-    points
-}
-
-/// Every side that receives light: all fronts, and the backs of two-sided triangles.
-fn lit_sides(scene: &Scene) -> impl Iterator<Item = (TriangleId, bool)> {
-    scene.triangle_ids().flat_map(|id| {
-        let back = scene.triangles[id.index()].two_sided;
-        std::iter::once((id, false)).chain(back.then_some((id, true)))
-    })
-}
-
-/// The point of a side that belongs to a point of the unit square, not yet lit.
-fn surface_point(scene: &Scene, id: TriangleId, is_back: bool, square: Vec2) -> ReferencePoint {
-    let barycentric = triangle_point(square);
-    let [a, b, c] = scene.corners(id);
-    let front = scene.surfaces[id.index()].area_vector.normalize_or_zero();
-    ReferencePoint {
-        triangle: id,
-        is_back,
-        barycentric,
-        position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
-        normal: if is_back { -front } else { front },
-        reflectance: scene.reflectance_at(id, barycentric),
-        emission: scene.emission_at(id, barycentric),
-        irradiance: Vec3::ZERO,
-        irradiance_error: 0.0,
-        standard_error: 0.0,
-    }
 }

@@ -1,6 +1,7 @@
 //! From raw faces in world coordinates to a [`Scene`] that keeps its promises.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -68,6 +69,8 @@ pub struct Source {
     pub name: String,
     /// File name without folder, empty for generated scenes.
     pub file: String,
+    /// See [`Scene::files`].
+    pub files: Vec<PathBuf>,
 }
 
 /// Collects faces in world coordinates and turns them into a [`Scene`].
@@ -165,6 +168,7 @@ impl SceneBuilder {
         let surfaces = self.surfaces(&frame, options);
         let mut scene = Scene {
             name: self.source.name,
+            files: self.source.files,
             frame,
             positions,
             triangles: triangles.list,

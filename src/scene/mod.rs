@@ -39,6 +39,8 @@ pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
 
+use std::path::PathBuf;
+
 use glam::{Vec2, Vec3};
 
 /// Index of a [`Material`] in [`Scene::materials`].
@@ -143,6 +145,9 @@ pub struct Object {
 pub struct Scene {
     /// What to call it in titles and reports: the file's stem or the built-in name.
     pub name: String,
+    /// The files that it comes from: the OBJ file, then MTL files and pictures that were found, those that no face shows
+    /// included. Empty for generated scenes.
+    pub files: Vec<PathBuf>,
     /// How positions relate to the file's coordinates.
     pub frame: Frame,
     /// Vertex positions in frame units, equal positions merged; all finite.

@@ -114,6 +114,7 @@ pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError>
             source: Source {
                 name: stem.to_string_lossy().into_owned(),
                 file,
+                files: vec![path.to_owned()],
             },
             ..SceneBuilder::default()
         },
@@ -341,6 +342,7 @@ impl Import<'_> {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
+        self.builder.source.files.push(self.root.join(path));
         let log = &mut self.notes.log;
         let materials = File::open(self.root.join(path))
             .map_err(|error| format!("it cannot be opened ({error})"))
@@ -375,7 +377,10 @@ impl Import<'_> {
             if shown.has_texcoords || (shown.has_faces && color.is_none()) {
                 return self.texture(map.as_ref(), defined);
             }
-            self.builder.spared.unused_textures += usize::from(map.is_some());
+            if let Some(map) = map {
+                self.builder.spared.unused_textures += 1;
+                self.note_unread(map, defined);
+            }
             None
         };
         let reflectance_texture = texture(diffuse_map, diffuse);
@@ -460,15 +465,24 @@ impl Import<'_> {
         if let Some(known) = self.textures.get(path) {
             return known.ok_or_else(|| "see above".to_owned());
         }
-        let read = Texture::read(&self.root.join(path), name).map(|texture| {
+        let file = self.root.join(path);
+        let read = Texture::read(&file, name).map(|texture| {
             let texture = texture.reduced_to(self.pixel_budget / 4);
             self.pixel_budget = self.pixel_budget.saturating_sub(texture.pixels.len());
             self.builder.textures.push(texture);
             TextureId(self.builder.textures.len() as u32 - 1)
         });
+        self.builder.source.files.push(file);
         self.textures
             .insert(path.to_owned(), read.as_ref().ok().copied());
         read
+    }
+
+    /// A picture that is not read belongs to the scene, too.
+    fn note_unread(&mut self, reference: &TextureReference, defined: &Defined) {
+        if let Ok(path) = locate(&self.root, &defined.folder, &reference.name) {
+            self.builder.source.files.push(self.root.join(path));
+        }
     }
 
     /// Copy all parsed faces into the builder.

@@ -282,7 +282,7 @@ impl Solver {
         self.gather_for_leaves(is_coarse(fineness), cancel)?;
         cancel.proceed()?;
         self.gathered.clear();
-        if self.is_full || report.step >= self.settings.max_steps {
+        if self.is_full || report.step >= self.settings.step_count() {
             self.final_gather(cancel)?;
         }
         self.fill(&mut report);
@@ -291,14 +291,14 @@ impl Solver {
             self.step -= 1;
             return None;
         }
-        report.is_final = report.is_full || self.step >= self.settings.max_steps;
+        report.is_final = report.is_full || self.step >= self.settings.step_count();
         self.relighting.end_step(&report);
         Some(report)
     }
 
     /// By what the threshold of a step is above the last one's.
     fn fineness_of(&self, step: u32) -> f32 {
-        THRESHOLD_FACTOR.powi(self.settings.max_steps.saturating_sub(step) as i32)
+        THRESHOLD_FACTOR.powi(self.settings.step_count().saturating_sub(step) as i32)
     }
 
     /// Let each leaf gather once more, for the vertices.

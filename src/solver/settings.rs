@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::Keep;
+use super::{THRESHOLD_FACTOR, plan::Keep};
 
 /// How a cluster's directional power and area are represented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -85,7 +85,8 @@ pub struct SolveSettings {
     pub mesh_tolerance: f32,
     /// Edges with a larger angle between their faces are creases, in degrees; 0…180.
     pub crease_degrees: f32,
-    /// Steps at most; at least 1. The threshold falls geometrically to `epsilon` over about this many.
+    /// Steps at most; at least 1. The threshold falls geometrically to `epsilon` over this many, or over fewer where the
+    /// first ones would refine nothing (see [`Self::step_count`]).
     pub max_steps: u32,
     /// Sweeps stop when what a sweep changes, and what it leaves to be changed, fall below this fraction of the total
     /// power; above 0.
@@ -143,7 +144,24 @@ impl SolveSettings {
     }
 }
 
+/// Thresholds above this are not tried: an error of one link as large as the scene's mean irradiance is left alone by
+/// hardly any link, so the step before would refine nothing. Smaller, and the first picture of a fine solve comes late;
+/// larger, and steps pass in which nothing changes. The presets start at 0.06 to 0.12.
+const COARSEST_THRESHOLD: f32 = 1.0;
+
+/// Thresholds below this count as this where steps are counted: from [`COARSEST_THRESHOLD`] a threshold of 0 is never
+/// reached by halving.
+const FINEST_THRESHOLD: f32 = 1e-4;
+
 impl SolveSettings {
+    /// Steps of a solve from its beginning: `max_steps`, or as many as lead from [`COARSEST_THRESHOLD`] to `epsilon`
+    /// where these are fewer.
+    pub fn step_count(&self) -> u32 {
+        let span = COARSEST_THRESHOLD / self.epsilon.max(FINEST_THRESHOLD);
+        let halvings = span.log(THRESHOLD_FACTOR).ceil().max(0.0) as u32;
+        self.max_steps.min(halvings + 1)
+    }
+
     /// The first setting out of its range, as one sentence.
     ///
     /// # Errors
@@ -192,6 +210,29 @@ impl Default for SolveSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn steps_are_as_many_as_asked_for_but_none_refines_nothing() {
+        for preset in [
+            SolveSettings::draft(),
+            SolveSettings::normal(),
+            SolveSettings::finest(),
+        ] {
+            assert_eq!(preset.step_count(), preset.max_steps);
+        }
+        let endless = |epsilon| SolveSettings {
+            epsilon,
+            max_steps: u32::MAX,
+            ..SolveSettings::normal()
+        };
+        // 1, 1/2, … 1/256 < 0.005.
+        assert_eq!(endless(0.005).step_count(), 9);
+        assert_eq!(endless(0.5).step_count(), 2);
+        assert_eq!(endless(7.0).step_count(), 1);
+        for epsilon in [0.0, 1e-30, 1e-4] {
+            assert_eq!(endless(epsilon).step_count(), 15, "{epsilon}");
+        }
+    }
 
     #[test]
     fn presets_are_in_range_and_numbers_out_of_it_are_named() {

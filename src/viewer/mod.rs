@@ -10,6 +10,8 @@ pub mod camera;
 pub mod change;
 pub mod cluster_lines;
 pub mod clusters;
+#[cfg(target_os = "linux")]
+mod display_server;
 pub mod fonts;
 pub mod frame_time;
 pub mod inspection;
@@ -31,6 +33,7 @@ pub mod session;
 pub mod stage;
 pub mod start;
 pub mod state;
+pub mod stderr;
 pub mod theme;
 pub mod truth;
 pub mod view;

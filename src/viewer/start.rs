@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     app::App, camera::Camera, fonts::SystemFonts, loader::SceneSource, render::Gpu,
-    view::ViewRequest,
+    stderr::StderrCapture, view::ViewRequest,
 };
 use crate::{
     scene::{Frame, SceneOptions},
@@ -112,6 +112,7 @@ pub fn run(options: Options) -> Result<(), ViewerError> {
     let source = options.source.as_ref();
     let title = source.map_or_else(|| "vecrad".to_owned(), title);
     let app_faults = faults.clone();
+    let capture = StderrCapture::begin();
     let ended = eframe::run_native(
         "vecrad",
         native_options(&title),
@@ -119,6 +120,8 @@ pub fn run(options: Options) -> Result<(), ViewerError> {
             cc.egui_ctx
                 .add_font_provider(Arc::new(SystemFonts::default()));
             app_faults.listen_to_signals(cc.egui_ctx.clone());
+            // The adapter has been found.
+            drop(capture);
             Ok(Box::new(App::new(cc, options, app_faults)?))
         }),
     );
@@ -137,6 +140,7 @@ fn native_options(title: &str) -> eframe::NativeOptions {
     let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
     setup.device_descriptor = Arc::new(Gpu::device_descriptor);
     eframe::NativeOptions {
+        event_loop_builder: event_loop_builder(),
         viewport: egui::ViewportBuilder::default()
             .with_title(title)
             .with_app_id("vecrad")
@@ -153,6 +157,18 @@ fn native_options(title: &str) -> eframe::NativeOptions {
         system_font_fallback: false,
         ..Default::default()
     }
+}
+
+/// Asks for X11 where the Wayland display that is named does not answer.
+fn event_loop_builder() -> Option<eframe::EventLoopBuilderHook> {
+    #[cfg(target_os = "linux")]
+    if super::display_server::needs_x11(|name| std::env::var_os(name)) {
+        use winit::platform::x11::EventLoopBuilderExtX11 as _;
+        return Some(Box::new(|builder| {
+            builder.with_x11();
+        }));
+    }
+    None
 }
 
 /// The icon of the window: an empty one where the picture cannot be read.

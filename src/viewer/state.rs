@@ -123,8 +123,8 @@ impl Run {
                     *last = report;
                 }
             }
-            // Kept apart: it is of what is selected, not of the run.
-            Event::Inspected(_) => {}
+            // Inspections are kept apart: they are of what is selected, not of the run.
+            Event::Inspected(_) | Event::Interrupted { .. } => {}
             Event::Paused => self.status = RunStatus::Paused,
             Event::Continued => self.status = RunStatus::Running,
             Event::Finished(reason) => self.status = RunStatus::Finished(reason),

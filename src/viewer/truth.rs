@@ -193,6 +193,7 @@ impl Truth {
             scene: scene.name.clone(),
             triangles: scene.triangles.len(),
             reference: ReferenceFacts {
+                surfaces: self.progress.surfaces,
                 points: self.progress.points,
                 samples: self.progress.samples,
                 noise_floor: newest.map_or(0.0, |error| error.noise_floor),

@@ -283,11 +283,17 @@ impl Controller {
             Outcome::Stepped(report, snapshot) => {
                 run.solving += trip.spent;
                 self.outbox.publish(generation, snapshot);
-                if let Some(report) = report {
-                    run.ask_again();
-                    let report = run.take_note(report);
-                    self.outbox.send(generation, Event::Stepped(report));
-                }
+                let event = match report {
+                    Some(report) => {
+                        run.ask_again();
+                        Event::Stepped(run.take_note(report))
+                    }
+                    None => {
+                        let (elapsed_s, solve_s) = run.times();
+                        Event::Interrupted { elapsed_s, solve_s }
+                    }
+                };
+                self.outbox.send(generation, event);
             }
             Outcome::Relit(Some(relit), snapshot) => {
                 self.outbox.publish(generation, snapshot);

@@ -81,6 +81,13 @@ pub enum Event {
     },
     /// A step is done; its light is in the slot.
     Stepped(StepReport),
+    /// A step was interrupted on its way and its work is lost; the times count it.
+    Interrupted {
+        /// Running time so far, in seconds, as in [`StepReport::elapsed_s`].
+        elapsed_s: f64,
+        /// Time spent on preparing and stepping, in seconds, as in [`StepReport::solve_s`].
+        solve_s: f64,
+    },
     /// Materials look otherwise; their light is in the slot. The figures are those of the last step, but for what has
     /// changed.
     Relit {

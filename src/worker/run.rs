@@ -191,6 +191,13 @@ impl Run {
         self.since.checked_add(limit)
     }
 
+    /// Running time and time spent, in seconds, as the solve comes home from a step.
+    pub(super) fn times(&self) -> (f64, f64) {
+        // A step that was interrupted ran on until now.
+        let elapsed = self.before + self.since.elapsed();
+        (elapsed.as_secs_f64(), self.solving.as_secs_f64())
+    }
+
     /// Give a report the times of the last step: changing the light is no part of the way there.
     pub(super) fn dated(&self, mut report: StepReport) -> StepReport {
         (report.elapsed_s, report.solve_s) = self.last_times;
@@ -199,11 +206,7 @@ impl Run {
 
     /// Complete the report of a step, and end the run if it was the last.
     pub(super) fn take_note(&mut self, report: StepReport) -> StepReport {
-        // A step that was interrupted too late ran on until now.
-        self.last_times = (
-            (self.before + self.since.elapsed()).as_secs_f64(),
-            self.solving.as_secs_f64(),
-        );
+        self.last_times = self.times();
         let report = self.dated(report);
         if let Some(reason) = self.end_after(&report) {
             // Lower settings that came during the step ask for more.

@@ -29,6 +29,9 @@ trait Contestant: Send {
     /// Whether it may go on.
     fn has_more(&self) -> bool;
 
+    /// Whether it ends by itself, so that a limit that comes before cuts it short.
+    fn has_end(&self) -> bool;
+
     /// How it stands; step and time are for the caller to fill in.
     fn measure(&self, truth: &Truth) -> Option<Measurement>;
 }
@@ -92,15 +95,15 @@ fn repeat(
     scene: &Scene,
     label: &str,
     runner: Runner,
-    mut run: impl FnMut(&mut Session<'_>) -> Vec<Measurement>,
+    mut run: impl FnMut(&mut Session<'_>) -> Race,
 ) -> Trajectory {
-    let trajectory = |points| Trajectory {
+    let trajectory = |race: Race| Trajectory {
         label: label.to_owned(),
         runner,
         settings: None,
         repeats: 1,
-        is_cut_short: false,
-        points,
+        is_cut_short: race.is_cut_short,
+        points: race.points,
     };
     let mut runs = Vec::new();
     for _ in 0..session.arguments.plan.repeats {
@@ -110,9 +113,17 @@ fn repeat(
         session.say(format!("{}: {label}", scene.name));
         runs.push(trajectory(run(session)));
     }
-    let mut merged = Trajectory::median(runs).unwrap_or_else(|| trajectory(Vec::new()));
-    merged.is_cut_short = session.is_interrupted();
+    let mut merged = Trajectory::median(runs).unwrap_or_else(|| trajectory(Race::default()));
+    merged.is_cut_short |= session.is_interrupted();
     merged
+}
+
+/// How a contestant fared.
+#[derive(Default)]
+struct Race {
+    points: Vec<Measurement>,
+    /// Whether the time limit came before its end.
+    is_cut_short: bool,
 }
 
 /// Pass after pass until it is done, its time is over, or someone interrupts.
@@ -121,7 +132,7 @@ fn race(
     truth: &Truth,
     mut contestant: impl Contestant,
     prepared: Duration,
-) -> Vec<Measurement> {
+) -> Race {
     let (limit, mut spent) = (session.time_limit(), prepared);
     let mut points = Vec::new();
     while contestant.has_more() && spent < limit && !session.is_interrupted() {
@@ -143,7 +154,10 @@ fn race(
         }
         session.tick();
     }
-    points
+    Race {
+        points,
+        is_cut_short: contestant.has_end() && contestant.has_more(),
+    }
 }
 
 /// A bake of some mesh.
@@ -163,6 +177,10 @@ impl Contestant for Baking<'_> {
 
     fn has_more(&self) -> bool {
         self.bake.samples() < self.most_samples
+    }
+
+    fn has_end(&self) -> bool {
+        true
     }
 
     fn measure(&self, truth: &Truth) -> Option<Measurement> {
@@ -232,6 +250,10 @@ impl Contestant for Shooting {
 
     fn has_more(&self) -> bool {
         self.emitted_rays < u32::MAX
+    }
+
+    fn has_end(&self) -> bool {
+        false
     }
 
     fn measure(&self, truth: &Truth) -> Option<Measurement> {

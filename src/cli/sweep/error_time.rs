@@ -15,7 +15,10 @@ use super::{
     session::{Session, Source, Truth},
 };
 use crate::{
-    cli::{output::write_whole, report::Machine},
+    cli::{
+        output::{Destination, check_inputs_kept, write_whole},
+        report::Machine,
+    },
     export::{Curve, CurvePlot, write_csv},
     metrics::{Runner, SceneComparison, Trajectory, grouped},
     scene::{Scene, SceneOptions},
@@ -46,6 +49,7 @@ pub(super) fn compare(session: &mut Session<'_>, sources: &[Source]) -> Result<(
             break;
         }
         let scene = session.load(source)?;
+        check_inputs_kept(&destinations(session, &scene), &scene.files)?;
         if let Some(truth) = session.trace(&scene) {
             scenes.push(compare_on(session, &scene, &truth)?);
         }
@@ -91,6 +95,18 @@ fn compare_on(
         .runs
         .retain(|run| !run.points.is_empty() || run.runner == Runner::Solver);
     Ok(comparison)
+}
+
+/// The files that are written for a scene.
+fn destinations(session: &Session<'_>, scene: &Scene) -> Vec<Destination> {
+    let stem = file_stem(&scene.name);
+    let names = ["report.md", "report.csv", "report.json"].map(str::to_owned);
+    let plots = ["svg", "png"].map(|ending| format!("{stem}.{ending}"));
+    names
+        .into_iter()
+        .chain(plots)
+        .filter_map(|name| Destination::new(&name, &session.arguments.output.join(&name)))
+        .collect()
 }
 
 /// Both meshes, or the one where nothing was divided between them.
@@ -162,11 +178,12 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
         "# Error against run time\n\n\
          vecrad {}, {}, {} threads, sides {}, median of {} run{}, at most {} s each.\n\
          Settings of the first run: {settings}.\n\
-         Errors are relative RMS of radiance at area-weighted random points against path tracing, without the worst \
-         1 % of the points and without the noise of the reference.\n\
+         Errors are relative RMS of radiance at random points against path tracing, without the worst 1 % of the points \
+         and without the noise of the reference.\n\
+         \"†\" marks runs that the time limit, or another one, cut short; stochastic Jacobi radiosity has no end but the limit.\n\
          Times are seconds of computing, preparation included, reading the scene and measuring left out; \"≤\" where \
          the first measurement was already better, \"–\" where a run never came so far.\n\
-         Trimming makes errors far below the noise of the reference too small; they are told as bounds, times to them as \"?\".\n\
+         Errors far below the noise of the reference cannot be told from none: they read \"below noise\", times to them \"?\".\n\
          Links, rays and memory are those at the best error. The ratio divides the time of the faster bake, whose mesh \
          is given to it, by the time of the run.\n{interrupted}",
         report.version,
@@ -181,7 +198,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "## {}, {} triangles\n\n![error against run time]({}.svg)\n\n\
-             Reference: {} points of {} samples, {:.1} s, noise {:.2} %.\n\n{}",
+             Reference: {} points of {} samples, {:.1} s, noise {:.2} %. Errors are means over {}.\n\n{}",
             scene.scene,
             grouped(scene.triangles as u64),
             file_stem(&scene.scene),
@@ -189,6 +206,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
             grouped(u64::from(scene.reference.samples)),
             scene.reference.seconds,
             100.0 * scene.reference.noise_floor,
+            scene.reference.surfaces,
             scene.markdown(),
         )?;
     }
@@ -234,8 +252,9 @@ fn plot(scene: &SceneComparison) -> CurvePlot {
 
 fn curve(run: &Trajectory) -> Curve {
     let points = run.points.iter();
+    let cut = if run.is_cut_short { " (cut short)" } else { "" };
     Curve {
-        label: run.label.clone(),
+        label: format!("{}{cut}", run.label),
         points: points
             .map(|point| [point.time_s, 100.0 * point.error.relative_rms_trimmed])
             .collect(),

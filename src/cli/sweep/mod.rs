@@ -40,7 +40,7 @@ pub struct ReportArguments {
     /// Folder for report.md, report.csv, report.json and plots; made where it is missing
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
-    /// Trace the reference with this: paths or paths=SAMPLES
+    /// Reference to measure the error against: path tracing with paths or paths=SAMPLES
     #[arg(long, value_name = "HOW", default_value = "paths=4096", value_parser = reference_samples, help_heading = "Output")]
     pub reference: u32,
     /// No progress line
@@ -66,10 +66,10 @@ pub struct LimitFlags {
     /// Stop each run after this time [default: 60]
     #[arg(long, value_name = "SEC", value_parser = seconds, help_heading = "Limits")]
     pub time_limit: Option<Duration>,
-    /// Stop a run when its solver holds this much
+    /// Stop a run when its solver uses this much memory [default: none]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 40), help_heading = "Limits")]
     pub memory_limit: Option<u64>,
-    /// Threads of solver and baselines, by default one for each core
+    /// Threads of solver and baselines [default: automatic, one for each core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Limits")]
     pub threads: Option<u16>,
 }

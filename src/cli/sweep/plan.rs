@@ -33,7 +33,7 @@ pub struct PlanFlags {
     /// Run every combination, not one change at a time
     #[arg(long, help_heading = "Plan")]
     pub full: bool,
-    /// What else to run
+    /// Baselines to run beside the solver
     #[arg(
         long,
         value_enum,
@@ -42,7 +42,7 @@ pub struct PlanFlags {
         help_heading = "Plan"
     )]
     pub baselines: Vec<Baseline>,
-    /// Paths per vertex of the longest bake
+    /// Maximum paths per vertex of the bake
     #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(1..=1 << 24), help_heading = "Plan")]
     pub max_spp: u32,
     /// Triangles of the rooms in the scaling suite [default: 1022 to 1000000, about fourfold each]
@@ -56,7 +56,7 @@ pub struct PlanFlags {
         help_heading = "Plan"
     )]
     pub cases: Vec<String>,
-    /// Runs of each kind, of whose times the median is taken; best odd; of quick scenes of the plan suite at least 3
+    /// Repetitions of each run, of whose times the median is taken; best odd; at least 3 for quick scenes of the plan suite
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=99), help_heading = "Plan")]
     pub repeats: u32,
 }

@@ -123,6 +123,7 @@ fn drain(
             Some(
                 Event::Started
                 | Event::Prepared { .. }
+                | Event::Interrupted { .. }
                 | Event::Relit { .. }
                 | Event::Inspected(_)
                 | Event::Paused

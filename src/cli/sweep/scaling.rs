@@ -58,7 +58,7 @@ pub(super) fn scale(session: &mut Session<'_>) -> Result<()> {
         if let Some(truth) = session.trace(&scene) {
             let run = runs::solve(session, &scene, &truth, &configuration)?.trajectory;
             sizes.push(Size {
-                cost: SizeCost::of(scene.triangles.len(), &run),
+                cost: SizeCost::of(scene.triangles.len(), &run, truth.facts.noise_floor),
                 reference: truth.facts.clone(),
                 run,
             });
@@ -106,6 +106,7 @@ fn write_markdown(report: &Report<'_>, costs: &[SizeCost], out: &mut dyn Write) 
          vecrad {}, {}, {} threads, median of {} run{}.\n\
          Settings: {}.\n\
          Times are seconds of computing, preparation included; errors are those of `report.md`.\n\
+         \"†\" marks runs that a limit cut short.\n\
          The exponent is that of the power law of the number of triangles that fits the column best.\n\n\
          ![time against triangles](scaling.svg)\n\n{}",
         report.version,

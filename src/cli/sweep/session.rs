@@ -16,7 +16,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::ReportArguments;
 use crate::{
-    cli::{Outcome, load, progress::Progress, report::core_count},
+    cli::{Outcome, load, output::say, progress::Progress, report::core_count},
     geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, ReferenceFacts, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
@@ -56,7 +56,7 @@ pub(super) struct Session<'a> {
 
 /// What the light of a scene is compared with.
 pub(super) struct Truth {
-    /// Area-weighted random points with their light.
+    /// Random points with their light.
     pub(super) points: Vec<ReferencePoint>,
     /// What to say of it.
     pub(super) facts: ReferenceFacts,
@@ -185,7 +185,7 @@ impl<'a> Session<'a> {
             Source::Room(triangles) => room_of(*triangles as usize).finish(&options)?,
         };
         for warning in &scene.warnings {
-            eprintln!("warning: {warning}");
+            say(format_args!("warning: {warning}"));
         }
         Ok(Arc::new(scene))
     }
@@ -209,6 +209,7 @@ impl<'a> Session<'a> {
         let noise = measure_error(&light, &traced.points).map_or(0.0, |error| error.noise_floor);
         Some(Arc::new(Truth {
             facts: ReferenceFacts {
+                surfaces: traced.surfaces,
                 points: traced.points.len(),
                 samples: traced.samples,
                 noise_floor: noise,

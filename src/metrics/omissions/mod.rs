@@ -239,7 +239,7 @@ impl Comparison {
     }
 }
 
-/// Random points of all lit sides, white and dark, so that their radiance is what arrives.
+/// Random points as a reference has them, made white and dark, so that their radiance is what arrives.
 fn points(scene: &Arc<Scene>) -> Vec<ReferencePoint> {
     let settings = PathSettings {
         point_count: POINTS,

@@ -84,6 +84,10 @@ fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
         ui.weak("The first error shows when both the light and the reference are there.");
         return;
     };
+    ui.weak(format!(
+        "Errors are means over {}.",
+        truth.progress.surfaces
+    ));
     row::figures(ui, "error", |ui| {
         row::figure(
             ui,

@@ -31,6 +31,9 @@ pub enum HeadlessError {
     /// Too large for the adapter.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// More than the adapter has memory for, or something else that it does not say in advance.
+    #[error("this graphics adapter cannot hold the picture ({0}); choose a smaller --size")]
+    Refused(String),
     /// It did not come back.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -93,6 +96,24 @@ pub fn open_gpu() -> Result<Gpu, HeadlessError> {
         sample_count,
         ..gpu
     })
+}
+
+/// Try whether there is an adapter that takes a picture of this size in pixels; without its background it takes twice the
+/// memory.
+///
+/// # Errors
+/// See [`HeadlessError`].
+pub fn check(size: [u32; 2], is_cutout: bool) -> Result<(), HeadlessError> {
+    let gpu = open_gpu()?;
+    if is_cutout {
+        CutoutTarget::new(&gpu, size).map(drop)?;
+    } else {
+        Target::new(&gpu, size).map(drop)?;
+    }
+    match gpu.complaint.get() {
+        None => Ok(()),
+        Some(complaint) => Err(HeadlessError::Refused(complaint.clone())),
+    }
 }
 
 /// Draw a snapshot at a size in pixels. Automatic exposure and ranges are taken from its light, as in the window.

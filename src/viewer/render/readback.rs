@@ -110,7 +110,7 @@ fn read_texture(
         .slice(..)
         .get_mapped_range()
         .map_err(|error| failed(&error))?;
-    let mut bytes = Vec::with_capacity((row * height) as usize);
+    let mut bytes = Vec::with_capacity(row as usize * height as usize);
     for padded in mapped.chunks_exact(stride as usize) {
         bytes.extend_from_slice(&padded[..row as usize]);
     }

@@ -21,6 +21,7 @@ use super::{Generation, Wake, Watch, visit::describe};
 use crate::{
     geometry::RayTree,
     metrics::ErrorMeasures,
+    reference::SampledSurfaces,
     scene::Scene,
     solver::{DisplayMesh, Snapshot},
 };
@@ -49,6 +50,8 @@ pub struct VertexErrors {
 pub struct TruthProgress {
     /// Surface points.
     pub points: usize,
+    /// What means over them are means of.
+    pub surfaces: SampledSurfaces,
     /// Samples at each of them.
     pub samples: u32,
     /// Samples after which tracing rests.

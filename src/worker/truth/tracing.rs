@@ -12,7 +12,7 @@ use super::{Desk, MeasuredStep, TruthProgress, VertexErrors};
 use crate::{
     geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, VertexReference, measure_error},
-    reference::{PathSettings, PathTracer, ReferencePoint},
+    reference::{PathSettings, PathTraced, PathTracer, ReferencePoint},
     scene::Scene,
     solver::Snapshot,
     worker::{Wake, priority::give_way},
@@ -67,7 +67,9 @@ impl Tracing {
             ..PathSettings::default()
         };
         let tracer = PathTracer::new(scene.clone(), rays.clone(), settings);
-        let points = tracer.result().points;
+        let PathTraced {
+            points, surfaces, ..
+        } = tracer.result();
         Self {
             scene,
             rays,
@@ -77,6 +79,7 @@ impl Tracing {
             tracer,
             progress: TruthProgress {
                 points: points.len(),
+                surfaces,
                 ..TruthProgress::default()
             },
             points,
