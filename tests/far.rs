@@ -80,7 +80,10 @@ fn light_does_not_depend_on_where_the_room_lies() {
                 // In frame units, of which the room is 100 long.
                 assert!(found.0.abs_diff_eq(expected.0, 1e-3), "{origin}");
                 let error = (found.1 - expected.1).abs().max_element();
-                assert!(error <= 1e-3 * expected.1.max_element().max(0.1), "{origin}: {found:?} for {expected:?}");
+                assert!(
+                    error <= 1e-3 * expected.1.max_element().max(0.1),
+                    "{origin}: {found:?} for {expected:?}"
+                );
             }
         }
     }

@@ -10,8 +10,7 @@ use tempfile::TempDir;
 use vecrad::scene::{ReadError, Scene, SceneOptions, WarningKind, read_obj};
 
 /// A square with texture coordinates.
-const SQUARE: &str =
-    "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
 
 /// Brown, as sRGB bytes and as reflectance.
 const BROWN: [u8; 3] = [188, 137, 99];
@@ -85,7 +84,11 @@ fn utf16_is_read_and_told_once() {
         let scene = read(&folder);
         assert_eq!(scene.triangles.len(), 2);
         assert_eq!(scene.materials[0].name, "床");
-        assert_near(scene.surfaces[0].reflectance, Vec3::new(0.25, 0.5, 0.75), mark);
+        assert_near(
+            scene.surfaces[0].reflectance,
+            Vec3::new(0.25, 0.5, 0.75),
+            mark,
+        );
         let expected = "scene.obj:1: the file is UTF-16, which many programs cannot read, and was decoded (2 times)";
         assert_eq!(said(&scene), [expected]);
     }
@@ -107,7 +110,10 @@ fn numbers_in_other_notations_are_named_with_their_first_line() {
     ] {
         let folder = folder(&[("scene.obj", text)], &[]);
         let error = try_read(folder.path()).unwrap_err().to_string();
-        assert!(error.starts_with(expected) && error.ends_with("scene.obj"), "{error}");
+        assert!(
+            error.starts_with(expected) && error.ends_with("scene.obj"),
+            "{error}"
+        );
     }
     // Where other faces remain, it is a warning.
     let text = format!("{SQUARE}v 1,5 0 0\nv 2,5 0 0\nf 1 2 3 4\nf 1 2 5\nf 1 2 6\n");
@@ -145,7 +151,10 @@ fn names_match_whatever_space_or_comment_ends_them() {
 #[test]
 fn a_material_of_several_spellings_is_one() {
     let obj = format!("mtllib a.mtl\n{SQUARE}usemtl a # one\nf 1 2 3\nusemtl a # two\nf 1 3 4\n");
-    let files = [("scene.obj", &*obj), ("a.mtl", "newmtl a\nKd 0.1 0.1 0.1\n")];
+    let files = [
+        ("scene.obj", &*obj),
+        ("a.mtl", "newmtl a\nKd 0.1 0.1 0.1\n"),
+    ];
     let scene = read(&folder(&files, &[]));
     assert_eq!(scene.materials.len(), 1);
     assert_eq!(scene.triangles[0].material, scene.triangles[1].material);
@@ -172,7 +181,7 @@ fn textures_are_found_by_what_their_names_mean() {
         "Textures/Wood/Floor.PNG",
         "C:\\Projects\\house\\textures\\wood\\floor.png",
         "/home/me/house/Textures/wood/floor.png",
-        "\\\\server\\share\\wood\\floor.png",
+        "\\\\server\\share\\Textures\\wood\\floor.png",
         "my floor.png -s 2 2 1",
         "-s 2 2 1 \"my floor.png\" -clamp off # oak",
         "-colorspace sRGB my floor.png",
@@ -184,7 +193,12 @@ fn textures_are_found_by_what_their_names_mean() {
     ] {
         let (_folder, scene) = textured(&format!("newmtl m\nKd 1 1 1\nmap_Kd {name}\n"), &files);
         let is_told = name.contains("colorspace");
-        assert_eq!(said(&scene).len(), usize::from(is_told), "{:?}", said(&scene));
+        assert_eq!(
+            said(&scene).len(),
+            usize::from(is_told),
+            "{:?}",
+            said(&scene)
+        );
         assert_near(scene.surfaces[0].reflectance, brown(), name);
     }
 }
@@ -248,7 +262,10 @@ fn transparency_is_told_once_and_for_which_materials() {
 fn alpha_of_a_picture_counts_as_transparency_and_hidden_colours_do_not() {
     let folder = folder(
         &[
-            ("a.mtl", "newmtl Leaf\nKd 1 1 1\nmap_Kd leaf.png\nmap_Ke leaf.png\n"),
+            (
+                "a.mtl",
+                "newmtl Leaf\nKd 1 1 1\nmap_Kd leaf.png\nmap_Ke leaf.png\n",
+            ),
             (
                 "scene.obj",
                 &format!("mtllib a.mtl\n{SQUARE}usemtl Leaf\nf 1/1 2/2 3/3 4/4\n"),
@@ -263,7 +280,8 @@ fn alpha_of_a_picture_counts_as_transparency_and_hidden_colours_do_not() {
     });
     leaf.save(folder.path().join("leaf.png")).unwrap();
     let scene = read(&folder);
-    let expected = "a.mtl:1: transparency is not computed; treated as opaque: 'Leaf' (alpha of map_Kd)";
+    let expected =
+        "a.mtl:1: transparency is not computed; treated as opaque: 'Leaf' (alpha of map_Kd)";
     assert_eq!(said(&scene), [expected]);
     for surface in &scene.surfaces {
         assert_near(surface.reflectance, brown(), "reflectance");

@@ -121,7 +121,9 @@ fn header(
         // For programs that have no doubles.
         Coordinate::Double => {
             let DVec3 { x, y, z } = frame.centre;
-            format!("comment origin {x} {y} {z}, to subtract before positions are rounded to floats\n")
+            format!(
+                "comment origin {x} {y} {z}, to subtract before positions are rounded to floats\n"
+            )
         }
     };
     format!(
@@ -190,9 +192,17 @@ mod tests {
         let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
         let header = String::from_utf8(bytes[..start].to_vec()).unwrap();
         let body = &bytes[start..bytes.len() - 13];
-        let is_double = header.contains("property double x\nproperty double y\nproperty double z\n");
-        assert_eq!(header.matches("double").count(), if is_double { 3 } else { 0 });
-        let vertex = if is_double { 12 * 4 + 3 + 12 } else { 12 * 4 + 3 };
+        let is_double =
+            header.contains("property double x\nproperty double y\nproperty double z\n");
+        assert_eq!(
+            header.matches("double").count(),
+            if is_double { 3 } else { 0 }
+        );
+        let vertex = if is_double {
+            12 * 4 + 3 + 12
+        } else {
+            12 * 4 + 3
+        };
         let number = |bytes: &[u8], place: usize| {
             if is_double {
                 f64::from_le_bytes(bytes[8 * place..8 * place + 8].try_into().unwrap())
@@ -226,6 +236,9 @@ mod tests {
             }
         }
         let (header, _) = written_at(DVec3::new(412_345.5, 5_812_345.25, 123.0));
-        assert!(header.contains("comment origin 412345.5 5812345.25 123, "), "{header}");
+        assert!(
+            header.contains("comment origin 412345.5 5812345.25 123, "),
+            "{header}"
+        );
     }
 }

@@ -129,9 +129,7 @@ impl<R: BufRead> BufRead for DecodedText<R> {
     fn fill_buf(&mut self) -> Result<&[u8]> {
         let encoding = match self.encoding {
             Some(encoding) => encoding,
-            None => *self
-                .encoding
-                .insert(Encoding::of(self.source.fill_buf()?)),
+            None => *self.encoding.insert(Encoding::of(self.source.fill_buf()?)),
         };
         if encoding == Encoding::Bytes {
             return self.source.fill_buf();

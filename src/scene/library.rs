@@ -82,7 +82,9 @@ mod tests {
                 folder: PathBuf::new(),
             });
         }
-        library.find(mention).map(|number| library.get(number).material.line)
+        library
+            .find(mention)
+            .map(|number| library.get(number).material.line)
     }
 
     #[test]

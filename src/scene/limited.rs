@@ -151,7 +151,11 @@ mod tests {
             let material = builder.push_material(Material {
                 reflectance_texture: id,
                 emission_texture: id.filter(|_| is_lamp),
-                ..Material::plain(&format!("Kd {reflectance}"), Vec3::splat(reflectance), Vec3::ONE)
+                ..Material::plain(
+                    &format!("Kd {reflectance}"),
+                    Vec3::splat(reflectance),
+                    Vec3::ONE,
+                )
             });
             let height = f64::from(material.0);
             let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
@@ -211,7 +215,10 @@ mod tests {
         {
             assert_near(reflectances(&scene, material), expected);
             let emitting = scene.materials[material].emission_texture.unwrap();
-            assert!(scene.textures[emitting.index()].pixels[1].x <= 0.2, "as it was");
+            assert!(
+                scene.textures[emitting.index()].pixels[1].x <= 0.2,
+                "as it was"
+            );
         }
         let said = "material 'Kd 1': reflectance above 0.98 was clamped to it, since light must lose energy at every bounce (2 times)";
         assert_eq!(clamped(&scene), [said]);
@@ -220,8 +227,14 @@ mod tests {
     #[test]
     fn a_texture_of_one_variant_is_not_copied() {
         let pixels = [0.5, 0.25];
-        assert_eq!(scene(&[(1.0, pixels), (1.0, pixels)], false).textures.len(), 1);
-        assert_eq!(scene(&[(1.0, pixels), (0.5, pixels)], false).textures.len(), 2);
+        assert_eq!(
+            scene(&[(1.0, pixels), (1.0, pixels)], false).textures.len(),
+            1
+        );
+        assert_eq!(
+            scene(&[(1.0, pixels), (0.5, pixels)], false).textures.len(),
+            2
+        );
         assert_eq!(scene(&[(1.0, pixels)], true).textures.len(), 2);
         assert_eq!(scene(&[(0.5, pixels)], true).textures.len(), 1);
     }
@@ -230,6 +243,9 @@ mod tests {
     fn bright_textures_end_at_1() {
         let scene = scene(&[(0.5, [40.0, 0.5])], false);
         assert_near(reflectances(&scene, 0), [0.5, 0.25]);
-        assert_eq!(clamped(&scene), ["texture 't': reflectance above 1 was clamped to 1"]);
+        assert_eq!(
+            clamped(&scene),
+            ["texture 't': reflectance above 1 was clamped to 1"]
+        );
     }
 }

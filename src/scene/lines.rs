@@ -196,10 +196,15 @@ fn without_comment(name: &str) -> &str {
 /// such as `Window #3` are common.
 pub(super) fn label(text: &str) -> &str {
     let mut name = text.trim();
-    if let Some(start) = name.match_indices('#').map(|(start, _)| start).find(|&start| {
-        let is_space = |character: Option<char>| character.is_none_or(char::is_whitespace);
-        is_space(name[..start].chars().next_back()) && is_space(name[start + 1..].chars().next())
-    }) {
+    if let Some(start) = name
+        .match_indices('#')
+        .map(|(start, _)| start)
+        .find(|&start| {
+            let is_space = |character: Option<char>| character.is_none_or(char::is_whitespace);
+            is_space(name[..start].chars().next_back())
+                && is_space(name[start + 1..].chars().next())
+        })
+    {
         name = name[..start].trim_end();
     }
     name
@@ -246,7 +251,13 @@ impl Number {
         if word.contains(&b',') && all(b",.+-eE") {
             return Self::Comma;
         }
-        let exponent = |byte: &u8| if matches!(byte, b'd' | b'D') { b'e' } else { *byte };
+        let exponent = |byte: &u8| {
+            if matches!(byte, b'd' | b'D') {
+                b'e'
+            } else {
+                *byte
+            }
+        };
         let with_e: Vec<u8> = word.iter().map(exponent).collect();
         let is_number = |text: &str| text.parse::<f64>().is_ok();
         if all(b".+-dD") && std::str::from_utf8(&with_e).is_ok_and(is_number) {
@@ -344,7 +355,10 @@ mod tests {
             ("lamp", &["lamp"][..]),
             ("lamp   # 60 W", &["lamp   # 60 W", "lamp"]),
             ("床　木　", &["床　木　", "床　木"]),
-            ("ランプ\u{a0} # 60 W　", &["ランプ\u{a0} # 60 W　", "ランプ\u{a0} # 60 W", "ランプ"]),
+            (
+                "ランプ\u{a0} # 60 W　",
+                &["ランプ\u{a0} # 60 W　", "ランプ\u{a0} # 60 W", "ランプ"],
+            ),
             ("lamp#2", &["lamp#2"]),
             ("# none", &["# none"]),
             ("\u{3000}", &["\u{3000}"]),

@@ -327,7 +327,10 @@ mod tests {
             deep
         );
         assert_eq!(find("", "/home/me/house/textures/wood/floor.png"), deep);
-        assert_eq!(find("", "\\\\server\\share\\Textures\\Wood\\Floor.PNG"), deep);
+        assert_eq!(
+            find("", "\\\\server\\share\\Textures\\Wood\\Floor.PNG"),
+            deep
+        );
         assert_eq!(find("", "../elsewhere/textures/wood/floor.png"), deep);
         assert_eq!(
             find("", "D:/maps/wood/floor.png"),
@@ -366,10 +369,7 @@ mod tests {
         let (_outer, mut folder) = scene_with(&["e\u{301}.png", "E\u{301}.png"]);
         let found = find(&mut folder, "", "\u{e9}.png");
         assert_eq!(found, Ok(PathBuf::from("e\u{301}.png")));
-        assert_eq!(
-            find(&mut folder, "", "\u{e9}.PNG"),
-            Err(Missing::Ambiguous)
-        );
+        assert_eq!(find(&mut folder, "", "\u{e9}.PNG"), Err(Missing::Ambiguous));
     }
 
     #[test]
@@ -377,15 +377,9 @@ mod tests {
         let (_outer, mut folder) = scene_with(&["floor.png", "wood #2.png"]);
         let mut find = |names: &[&str]| folder.locate(Path::new(""), names);
         let found = |number: usize, path: &str| Ok((number, PathBuf::from(path)));
-        assert_eq!(
-            find(&["wood #2.png", "wood"]),
-            found(0, "wood #2.png")
-        );
+        assert_eq!(find(&["wood #2.png", "wood"]), found(0, "wood #2.png"));
         // As it stands goes before any likeness.
-        assert_eq!(
-            find(&["x/FLOOR.png", "floor.png"]),
-            found(1, "floor.png")
-        );
+        assert_eq!(find(&["x/FLOOR.png", "floor.png"]), found(1, "floor.png"));
         assert_eq!(find(&["none", "../none"]), Err(Missing::Outside));
     }
 

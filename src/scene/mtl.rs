@@ -27,13 +27,13 @@ pub(super) struct MtlMaterial {
     /// `map_Ke`.
     pub(super) emissive_map: Option<TextureStatement>,
     /// `d`: 1 is opaque.
-    dissolve: Option<f64>,
+    pub(super) dissolve: Option<f64>,
     /// `Tr`: 0 is opaque.
-    transparency: Option<f64>,
+    pub(super) transparency: Option<f64>,
     /// Whether there is a `map_d`.
-    has_dissolve_map: bool,
+    pub(super) has_dissolve_map: bool,
     /// `illum`.
-    illumination: Option<u8>,
+    pub(super) illumination: Option<u8>,
 }
 
 impl MtlMaterial {

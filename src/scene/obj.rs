@@ -272,6 +272,7 @@ impl Import<'_> {
     /// Make a material of each one that `usemtl` mentions.
     fn materials(&mut self, models: &[tobj::Model]) {
         let library = self.read_libraries();
+        let shown = self.shown(models);
         let mentions = std::mem::take(&mut self.notes.materials);
         let found: Vec<Option<usize>> = mentions
             .iter()
@@ -279,7 +280,7 @@ impl Import<'_> {
             .collect();
         // A material may be mentioned by several names.
         let mut shown_by: HashMap<usize, Shown> = HashMap::new();
-        for (number, shown) in found.iter().zip(self.shown(models)) {
+        for (number, shown) in found.iter().zip(shown) {
             if let Some(number) = number {
                 shown_by.entry(*number).or_default().add(shown);
             }
@@ -380,10 +381,7 @@ impl Import<'_> {
             return vec![path];
         }
         let whole = names[names.len() - 1];
-        let mut words: Vec<&str> = whole
-            .split_whitespace()
-            .take(self.library_budget)
-            .collect();
+        let mut words: Vec<&str> = whole.split_whitespace().take(self.library_budget).collect();
         self.library_budget -= words.len();
         let mut all = Vec::new();
         for word in &words {
@@ -531,7 +529,9 @@ impl Import<'_> {
         let names: Vec<&str> = readings.iter().map(|reading| &*reading.name).collect();
         let located = self.folder.locate(&defined.folder, &names);
         // What is nowhere is named without all that may surround a name.
-        let meant = located.as_ref().map_or(readings.len() - 1, |(number, _)| *number);
+        let meant = located
+            .as_ref()
+            .map_or(readings.len() - 1, |(number, _)| *number);
         let reading = readings.swap_remove(meant);
         if let Some(option) = &reading.ignored {
             let message = format!("texture option {option} is not followed");
@@ -748,7 +748,9 @@ const MOST_LISTED: usize = 8;
 /// Names in quotes, at most so many of them, and how many more there are.
 fn listed<'a>(names: impl ExactSizeIterator<Item = &'a str>, most: usize) -> String {
     let more = names.len().saturating_sub(most);
-    let quoted = names.take(most).map(|name| format!("'{}'", shortened(name)));
+    let quoted = names
+        .take(most)
+        .map(|name| format!("'{}'", shortened(name)));
     let listed = quoted.collect::<Vec<_>>().join(", ");
     match (more, listed.is_empty()) {
         (0, _) => listed,

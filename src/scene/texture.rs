@@ -415,7 +415,7 @@ mod tests {
     ];
 
     fn leaf() -> image::RgbaImage {
-        image::RgbaImage::from_fn(4, 1, |x, _| image::Rgba(LEAF[x as usize]))
+        image::RgbaImage::from_fn(4, 1, |x, _| Rgba(LEAF[x as usize]))
     }
 
     #[test]
@@ -452,7 +452,7 @@ mod tests {
         assert!(!read.is_transparent);
         let expected = Vec3::splat(linear_from_srgb(188.0 / 255.0));
         assert_eq!(read.texture.pixels, [expected; 4]);
-        let nothing = image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 255, 255, 0]));
+        let nothing = image::RgbaImage::from_pixel(2, 2, Rgba([255, 255, 255, 0]));
         assert!(Texture::from_picture(nothing.into(), "", Role::Reflects).is_none());
     }
 
