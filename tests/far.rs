@@ -102,9 +102,9 @@ fn light_does_not_depend_on_where_the_room_lies() {
                 // In frame units, of which the room is 100 long.
                 assert!(found.0.abs_diff_eq(expected.0, 1e-3), "{origin}");
             }
-            // Doubles are 1e-7 apart at 1e9, so few shadow rays meet something else. With floats it is 0.06 at the first.
+            // Doubles are 1e-7 apart at 1e9, so some shadow rays meet something else: 2.3e-5 there, 7e-6 before.
             let difference = difference(&found, &expected);
-            assert!(difference < 1e-3, "{origin}: {difference}");
+            assert!(difference < 1e-4, "{origin}: {difference}");
         }
     }
 }
