@@ -94,6 +94,9 @@ fn mtl(chance: &mut Chance) -> String {
                 "/etc/passwd",
                 "-s 2 2 one.png",
                 "-o 1e30 -clamp on one.png",
+                "One.PNG -s 2 2 -foo # note",
+                "C:\\maps\\one.png",
+                "leaf.png",
             ]);
             match chance.below(8) {
                 0 => writeln!(text, "Kd {number} 0.5 0.2").unwrap(),
@@ -110,11 +113,19 @@ fn mtl(chance: &mut Chance) -> String {
     text
 }
 
+/// A text with a byte-order mark and two bytes for each unit.
+fn utf16(text: &str) -> Vec<u8> {
+    let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+    units.flat_map(u16::to_le_bytes).collect()
+}
+
 /// Pictures that the material files name.
 fn pictures(folder: &Path) {
     let one = image::RgbImage::from_pixel(1, 1, image::Rgb([200, 100, 0]));
     one.save(folder.join("one.png")).unwrap();
     let whole = fs::read(folder.join("one.png")).unwrap();
+    let leaf = image::RgbaImage::from_fn(2, 1, |x, _| image::Rgba([200, 100, 0, 255 * x as u8]));
+    leaf.save(folder.join("leaf.png")).unwrap();
     fs::write(folder.join("cut.png"), &whole[..whole.len() / 2]).unwrap();
     fs::write(folder.join("words.png"), "not a picture").unwrap();
     fs::create_dir(folder.join("folder.png")).unwrap();
@@ -176,6 +187,11 @@ fn spoiled_scenes_are_scenes_or_sentences() {
         let mut chance = Chance::new(case);
         let mut obj = obj(&mut chance).into_bytes();
         let mut mtl = mtl(&mut chance).into_bytes();
+        for text in [&mut obj, &mut mtl] {
+            if chance.below(16) == 0 {
+                *text = utf16(&String::from_utf8_lossy(text));
+            }
+        }
         match chance.below(4) {
             0 => spoil(&mut mtl, &mut chance),
             1 => {
@@ -200,7 +216,7 @@ fn spoiled_scenes_are_scenes_or_sentences() {
 }
 
 /// Lines that are wrong in one way, and what is said of them.
-const FAULTS: [(&str, WarningKind, &str); 10] = [
+const FAULTS: [(&str, WarningKind, &str); 13] = [
     ("f 0 1 2", WarningKind::FaceSkipped, "index 0"),
     ("f 1 2", WarningKind::FaceSkipped, "fewer than three"),
     ("f 1 2 x", WarningKind::FaceSkipped, "no vertex index"),
@@ -208,6 +224,9 @@ const FAULTS: [(&str, WarningKind, &str); 10] = [
     ("f 1 1 2", WarningKind::FaceSkipped, "no area"),
     ("vt x", WarningKind::LineSkipped, "texture coordinate"),
     ("vn 1 nan 0", WarningKind::LineSkipped, "normal"),
+    ("vt 0,5 1", WarningKind::LineSkipped, "decimal comma"),
+    ("vn 0 1.0D+00 0", WarningKind::LineSkipped, "D exponent"),
+    ("f 1 3 2 4", WarningKind::Orientation, "cross each other"),
     ("nonsense", WarningKind::LineSkipped, "no OBJ statement"),
     ("usemtl", WarningKind::LineSkipped, "without a name"),
     ("p 1", WarningKind::Unsupported, "lines and points"),

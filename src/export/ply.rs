@@ -1,15 +1,22 @@
 //! Binary PLY of the display mesh with light at its vertices.
 //!
 //! Per vertex: position in world units, normal, tone-mapped sRGB, linear radiance and irradiance. MeshLab, Blender and
-//! CloudCompare show the bytes; tools that compute read the floats.
+//! CloudCompare show the bytes; tools that compute read the floats. Positions are floats, too, where these hold the shape,
+//! else doubles: coordinates of surveyors have seven digits before the point.
 
 use std::io::{self, Write};
+
+use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{
     MeshOptions, ToneMap,
     mesh::{Light, write_vector},
 };
-use crate::{scene::Frame, solver::Snapshot};
+use crate::{
+    scene::Frame,
+    solver::{DisplayMesh, Snapshot},
+};
 
 /// Write the display mesh of a snapshot in world units.
 ///
@@ -22,10 +29,11 @@ pub(super) fn write_ply(
     options: &MeshOptions,
 ) -> io::Result<()> {
     let mesh = &snapshot.mesh;
-    out.write_all(header(mesh.positions.len(), mesh.indices.len(), options).as_bytes())?;
+    let coordinate = Coordinate::holding(mesh, frame);
+    out.write_all(header(mesh, frame, coordinate, options).as_bytes())?;
     for (index, &position) in mesh.positions.iter().enumerate() {
         let light = Light::at(snapshot, index, options);
-        write_vector(out, frame.to_world(position).as_vec3())?;
+        coordinate.write(out, frame.to_world(position))?;
         write_vector(out, mesh.normals[index])?;
         out.write_all(&options.color.encode(light.radiance))?;
         write_vector(out, light.radiance)?;
@@ -40,38 +48,109 @@ pub(super) fn write_ply(
     Ok(())
 }
 
-fn header(vertex_count: usize, face_count: usize, options: &MeshOptions) -> String {
+/// The type of positions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coordinate {
+    Float,
+    Double,
+}
+
+/// How far rounding to floats may move a corner, as a share of the height of its face. Smaller, and scenes about the
+/// origin get doubles for single slivers, which fewer programs read; larger, and fine meshes far from it are visibly bent.
+const MOST_MOVED_OF_FACE: f64 = 0.01;
+
+/// The same as a share of the scene's extent: faces may be large and lie closely before each other. Smaller, and scenes
+/// some extents from the origin get doubles; larger, and a picture sinks into the wall that it hangs on.
+const MOST_MOVED_OF_SCENE: f64 = 1e-5;
+
+impl Coordinate {
+    /// The smallest type that holds every face of a mesh.
+    fn holding(mesh: &DisplayMesh, frame: &Frame) -> Self {
+        let most_moved = MOST_MOVED_OF_SCENE * Frame::EXTENT / frame.scale;
+        let is_held = |corners: &[u32; 3]| {
+            let exact = corners.map(|corner| frame.to_world(mesh.positions[corner as usize]));
+            let moved = exact.map(|place| (place.as_vec3().as_dvec3() - place).length());
+            let moved = moved.into_iter().fold(0.0, f64::max);
+            let [a, b, c] = exact;
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            let height = (b - a).cross(c - a).length() / longest;
+            // A face without a height has none to lose.
+            moved <= most_moved && !(height > 0.0 && moved > MOST_MOVED_OF_FACE * height)
+        };
+        if mesh.indices.par_iter().all(is_held) {
+            Self::Float
+        } else {
+            Self::Double
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Float => "float",
+            Self::Double => "double",
+        }
+    }
+
+    fn write(self, out: &mut dyn Write, position: DVec3) -> io::Result<()> {
+        match self {
+            Self::Float => write_vector(out, position.as_vec3()),
+            Self::Double => out.write_all(&position.to_array().map(f64::to_le_bytes).concat()),
+        }
+    }
+}
+
+fn header(
+    mesh: &DisplayMesh,
+    frame: &Frame,
+    coordinate: Coordinate,
+    options: &MeshOptions,
+) -> String {
+    let (vertex_count, face_count) = (mesh.positions.len(), mesh.indices.len());
     let tone_map = match options.color.tone_map {
         ToneMap::None => "none",
         ToneMap::Neutral => "Khronos PBR Neutral",
     };
-    let floats = |names: &[&str]| -> String {
+    let properties = |kind: &str, names: &[&str]| -> String {
         names
             .iter()
-            .map(|name| format!("property float {name}\n"))
+            .map(|name| format!("property {kind} {name}\n"))
             .collect()
+    };
+    let origin = match coordinate {
+        Coordinate::Float => String::new(),
+        // For programs that have no doubles.
+        Coordinate::Double => {
+            let DVec3 { x, y, z } = frame.centre;
+            format!(
+                "comment origin {x} {y} {z}, to subtract before positions are rounded to floats\n"
+            )
+        }
     };
     format!(
         "ply\nformat binary_little_endian 1.0\n\
          comment vecrad {version}\n\
          comment exposure {exposure} EV, tone curve {tone_map}, colours sRGB\n\
          comment radiance linear W/(sr m^2), irradiance linear W/m^2, lengths in units of the scene\n\
-         comment up axis {up}\n\
-         element vertex {vertex_count}\n{geometry}\
+         comment up axis {up}\n{origin}\
+         element vertex {vertex_count}\n{position}{normal}\
          property uchar red\nproperty uchar green\nproperty uchar blue\n{light}\
          element face {face_count}\nproperty list uchar int vertex_indices\nend_header\n",
         version = env!("CARGO_PKG_VERSION"),
         exposure = options.color.exposure_ev,
         up = options.up.name(),
-        geometry = floats(&["x", "y", "z", "nx", "ny", "nz"]),
-        light = floats(&[
-            "radiance_r",
-            "radiance_g",
-            "radiance_b",
-            "irradiance_r",
-            "irradiance_g",
-            "irradiance_b",
-        ]),
+        position = properties(coordinate.name(), &["x", "y", "z"]),
+        normal = properties("float", &["nx", "ny", "nz"]),
+        light = properties(
+            "float",
+            &[
+                "radiance_r",
+                "radiance_g",
+                "radiance_b",
+                "irradiance_r",
+                "irradiance_g",
+                "irradiance_b",
+            ],
+        ),
     )
 }
 
@@ -101,6 +180,65 @@ mod tests {
         assert!(
             (float(39) - std::f32::consts::PI).abs() < 1e-6,
             "irradiance"
+        );
+    }
+
+    /// Header and positions of the triangle in a frame about a place, where a frame unit is half a unit of the world.
+    fn written_at(centre: DVec3) -> (String, Vec<DVec3>) {
+        let frame = Frame { centre, scale: 2.0 };
+        let mut bytes = Vec::new();
+        write_ply(&mut bytes, &triangle(), &frame, &MeshOptions::default()).unwrap();
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        let header = String::from_utf8(bytes[..start].to_vec()).unwrap();
+        let body = &bytes[start..bytes.len() - 13];
+        let is_double =
+            header.contains("property double x\nproperty double y\nproperty double z\n");
+        assert_eq!(
+            header.matches("double").count(),
+            if is_double { 3 } else { 0 }
+        );
+        let vertex = if is_double {
+            12 * 4 + 3 + 12
+        } else {
+            12 * 4 + 3
+        };
+        let number = |bytes: &[u8], place: usize| {
+            if is_double {
+                f64::from_le_bytes(bytes[8 * place..8 * place + 8].try_into().unwrap())
+            } else {
+                f32::from_le_bytes(bytes[4 * place..4 * place + 4].try_into().unwrap()).into()
+            }
+        };
+        let positions = body
+            .chunks_exact(vertex)
+            .map(|bytes| DVec3::from_array([0, 1, 2].map(|place| number(bytes, place))));
+        (header, positions.collect())
+    }
+
+    #[test]
+    fn positions_are_doubles_where_floats_lose_the_shape() {
+        for (centre, is_double) in [
+            (DVec3::ZERO, false),
+            (DVec3::new(300.0, -40.0, 9.0), false),
+            // Floats about here are 0.5, 0.125 and 64 apart.
+            (DVec3::new(412_345.678, 5_812_345.432, 123.4), true),
+            (DVec3::new(0.0, 0.0, -1_234_567.3), true),
+            (DVec3::new(1e9 + 0.3, 0.0, 0.0), true),
+        ] {
+            let (header, positions) = written_at(centre);
+            assert_eq!(header.contains("double"), is_double, "{centre}");
+            assert_eq!(header.contains("comment origin"), is_double, "{centre}");
+            let expected = [DVec3::ZERO, DVec3::X * 0.5, DVec3::Y * 0.5];
+            for (position, expected) in positions.into_iter().zip(expected) {
+                let error = (position - centre - expected).length();
+                assert!(error < 1e-3 * 0.5, "{position} at {centre}");
+            }
+        }
+        let (header, _) = written_at(DVec3::new(412_345.5, 5_812_345.25, 123.0));
+        assert!(
+            header.contains("comment origin 412345.5 5812345.25 123, "),
+            "{header}"
         );
     }
 }

@@ -155,7 +155,8 @@ impl SceneBuilder {
             return Err(no_faces(&unusable));
         }
         self.sanitise_textures();
-        self.sanitise_materials(options);
+        let losing = self.limit_reflecting_textures(options.max_reflectance.clamp(0.0, 1.0));
+        self.sanitise_materials(options, losing);
         let frame = self.frame();
         let (positions, corner_of) = self.weld(&frame);
         let vanished = self.drop_vanished_faces(&frame, &corner_of);
@@ -365,15 +366,14 @@ impl SceneBuilder {
         });
     }
 
-    /// Make every texture safe to look up, and those that reflect at most 1.
+    /// Make every texture safe to look up.
     fn sanitise_textures(&mut self) {
         for texture in &mut self.textures {
             for pixel in &mut texture.pixels {
                 *pixel = pixel.map(cured);
             }
         }
-        let textures = &mut self.textures;
-        let mut limited: HashMap<TextureId, TextureId> = HashMap::new();
+        let textures = &self.textures;
         for material in &mut self.materials {
             let usable = |texture: &TextureId| {
                 textures
@@ -382,37 +382,6 @@ impl SceneBuilder {
             };
             material.emission_texture = material.emission_texture.filter(usable);
             material.reflectance_texture = material.reflectance_texture.filter(usable);
-            let Some(original) = material.reflectance_texture else {
-                continue;
-            };
-            let id = *limited.entry(original).or_insert_with(|| {
-                let texture = &textures[original.index()];
-                if texture
-                    .pixels
-                    .iter()
-                    .all(|pixel| pixel.max_element() <= 1.0)
-                {
-                    return original;
-                }
-                // The original may emit elsewhere.
-                let mut copy = texture.clone();
-                for pixel in &mut copy.pixels {
-                    *pixel = pixel.min(Vec3::ONE);
-                }
-                let message = format!(
-                    "texture '{}': reflectance above 1 was clamped to 1",
-                    copy.name
-                );
-                self.warnings.push(Warning {
-                    kind: WarningKind::ValueClamped,
-                    message,
-                    count: 1,
-                    place: None,
-                });
-                textures.push(copy);
-                TextureId(textures.len() as u32 - 1)
-            });
-            material.reflectance_texture = Some(id);
         }
     }
 
@@ -439,14 +408,15 @@ impl SceneBuilder {
         ShelledTriangles { list, shells }
     }
 
-    /// Bring reflectance and emission into their ranges; give the scene a material if it has none.
-    fn sanitise_materials(&mut self, options: &SceneOptions) {
+    /// Bring reflectance and emission into their ranges; give the scene a material if it has none. `clamped` are materials
+    /// that reflect too much with their textures.
+    fn sanitise_materials(&mut self, options: &SceneOptions, mut clamped: Vec<String>) {
         if self.materials.is_empty() {
             self.materials
                 .push(Material::plain("", Vec3::splat(0.5), Vec3::ZERO));
         }
         let max = options.max_reflectance.clamp(0.0, 1.0);
-        let (mut clamped, mut cured) = (Vec::new(), Vec::new());
+        let mut cured = Vec::new();
         for material in &mut self.materials {
             let reflectance = material.reflectance.map(|x| {
                 if x.is_finite() {

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::io::BufRead;
 use std::sync::Arc;
 
-use super::lines::{LogicalLines, Number, decode, split_keyword, words};
+use super::lines::{LogicalLines, Notation, Number, decode, label, split_keyword, words};
 use super::warning::{WarningKind, WarningLog};
 
 /// Faces that share an object name and a material.
@@ -42,6 +42,15 @@ pub(super) struct FaceNote {
     pub(super) corner_count: u32,
 }
 
+/// A number in a notation that cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ForeignNumber {
+    /// How it is written.
+    pub(super) notation: Notation,
+    /// Where it stands in the file.
+    pub(super) line: usize,
+}
+
 /// What was noted beside the text.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
@@ -53,6 +62,8 @@ pub(super) struct Notes {
     pub(super) materials: Vec<Mention>,
     /// What follows `mtllib`, each once.
     pub(super) libraries: Vec<Mention>,
+    /// The first number of a vertex in a notation that cannot be read.
+    pub(super) foreign_number: Option<ForeignNumber>,
     /// Faces that were left out.
     pub(super) skipped_faces: usize,
     /// OBJ statements that were understood.
@@ -156,12 +167,12 @@ impl<R: BufRead> ObjCleaner<R> {
             b"vn" => self.normal_statement(rest, line),
             b"f" | b"fo" => self.face_statement(rest, line),
             b"o" => {
-                self.object = Arc::from(&*decode(rest));
+                self.object = Arc::from(label(&decode(rest)));
                 self.group = Arc::from("");
                 self.segment_is_new = true;
             }
             b"g" => {
-                self.group = Arc::from(&*decode(rest));
+                self.group = Arc::from(label(&decode(rest)));
                 self.segment_is_new = true;
             }
             b"usemtl" => self.material_statement(rest, line),
@@ -210,11 +221,17 @@ impl<R: BufRead> ObjCleaner<R> {
         if let Err(trouble) = self.copy_numbers(b"v", &mut rest, 3) {
             self.clean.extend_from_slice(b"v 0 0 0\n");
             self.bad_positions.push(self.position_count);
-            let message = match trouble {
-                Number::NotFinite => {
+            let message = match trouble.notation() {
+                Some(notation) => {
+                    let first = ForeignNumber { notation, line };
+                    self.notes.foreign_number.get_or_insert(first);
+                    let Notation { name, cure } = notation;
+                    &format!("vertex with {name}; faces that use it are left out; {cure}")
+                }
+                None if trouble == Number::NotFinite => {
                     "vertex that is not a finite number; faces that use it are left out"
                 }
-                _ => "vertex without three numbers; faces that use it are left out",
+                None => "vertex without three numbers; faces that use it are left out",
             };
             self.note(WarningKind::LineSkipped, message, line);
         } else if rest.nth(2).is_some() {
@@ -234,21 +251,31 @@ impl<R: BufRead> ObjCleaner<R> {
             b"0"
         };
         let mut values = words(rest).chain(words(second));
-        if words(rest).next().is_none() || self.copy_numbers(b"vt", &mut values, 2).is_err() {
+        let copied = match words(rest).next() {
+            Some(_) => self.copy_numbers(b"vt", &mut values, 2),
+            None => Err(Number::Malformed),
+        };
+        if let Err(trouble) = copied {
             self.clean.extend_from_slice(b"vt nan nan\n");
-            let message = "texture coordinate that is not a number was ignored";
-            self.note(WarningKind::LineSkipped, message, line);
+            self.note_ignored("texture coordinate", trouble, line);
         }
     }
 
     fn normal_statement(&mut self, rest: &[u8], line: usize) {
         self.normal_count += 1;
         self.end_face();
-        if self.copy_numbers(b"vn", &mut words(rest), 3).is_err() {
+        if let Err(trouble) = self.copy_numbers(b"vn", &mut words(rest), 3) {
             self.clean.extend_from_slice(b"vn nan nan nan\n");
-            let message = "normal that is not a number was ignored";
-            self.note(WarningKind::LineSkipped, message, line);
+            self.note_ignored("normal", trouble, line);
         }
+    }
+
+    fn note_ignored(&mut self, what: &str, trouble: Number, line: usize) {
+        let message = match trouble.notation() {
+            Some(Notation { name, cure }) => &format!("{what} with {name} was ignored; {cure}"),
+            None => &format!("{what} that is not a number was ignored"),
+        };
+        self.note(WarningKind::LineSkipped, message, line);
     }
 
     /// Copy a statement of `count` finite numbers, or nothing if one of them is not.

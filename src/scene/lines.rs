@@ -1,9 +1,10 @@
-//! Logical lines of an OBJ or MTL file, whatever wrote it: any line ending, byte-order mark, continuation, NUL bytes
-//! and bytes that are not UTF-8.
+//! Logical lines of an OBJ or MTL file, whatever wrote it: any line ending, byte-order mark, UTF-16, continuation, NUL
+//! bytes and bytes that are not UTF-8; and what stands in a line: words, numbers, names.
 
 use std::borrow::Cow;
 use std::io::{BufRead, ErrorKind, Result};
 
+use super::encoding::DecodedText;
 use super::warning::{WarningKind, WarningLog};
 
 /// Bytes of the longest line that is read. A face of a million corners needs some 24 MB; a binary file without line
@@ -13,7 +14,7 @@ const MAX_LINE: usize = 64 << 20;
 /// Reads logical lines one after the other.
 #[derive(Debug)]
 pub(super) struct LogicalLines<R> {
-    source: R,
+    source: DecodedText<R>,
     /// The line last read, without its ending.
     pub(super) text: Vec<u8>,
     line_count: usize,
@@ -25,7 +26,7 @@ impl<R: BufRead> LogicalLines<R> {
     /// Start at the beginning of a file.
     pub(super) fn new(source: R) -> Self {
         Self {
-            source,
+            source: DecodedText::new(source),
             text: Vec::new(),
             line_count: 0,
             after_return: false,
@@ -41,8 +42,8 @@ impl<R: BufRead> LogicalLines<R> {
             return Ok(None);
         }
         let first = self.line_count;
-        if first == 1 && self.text.starts_with(b"\xef\xbb\xbf") {
-            self.text.drain(..3);
+        if first == 1 {
+            self.begin(log, file);
         }
         // Comments often end in a Windows path, so they never continue.
         if self.text.trim_ascii_start().first() != Some(&b'#') {
@@ -50,6 +51,17 @@ impl<R: BufRead> LogicalLines<R> {
         }
         self.cure(log, file, first);
         Ok(Some(first))
+    }
+
+    /// What only the first line has.
+    fn begin(&mut self, log: &mut WarningLog, file: &str) {
+        if self.text.starts_with(b"\xef\xbb\xbf") {
+            self.text.drain(..3);
+        }
+        if self.source.is_utf16() {
+            let message = "the file is UTF-16, which many programs cannot read, and was decoded";
+            log.note(WarningKind::Encoding, message, file, 1);
+        }
     }
 
     /// Remove the `\` at the end of the text, if it is one that joins lines.
@@ -156,6 +168,48 @@ pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = &[u8]> {
         .take_while(|word| word[0] != b'#')
 }
 
+/// The names that the rest of a `usemtl`, `newmtl`, `mtllib` or texture statement may mean, from all of it to the
+/// barest: as it stands, without Unicode spaces around it, and without a comment. None is empty unless all is.
+///
+/// Which of them is meant shows in what there is: a name may hold `#`, and end in a space that is not ASCII.
+pub(super) fn spellings(text: &str) -> impl Iterator<Item = &str> {
+    let trimmed = text.trim();
+    let bare = without_comment(trimmed);
+    let is_other = |name: &str, before: &str| !name.is_empty() && name != before;
+    let trimmed_too = is_other(trimmed, text).then_some(trimmed);
+    let bare_too = is_other(bare, trimmed).then_some(bare);
+    [Some(text), trimmed_too, bare_too].into_iter().flatten()
+}
+
+/// A trimmed name up to the first `#` that follows a space.
+fn without_comment(name: &str) -> &str {
+    let mut after_space = true;
+    let comment = name.char_indices().find(|&(_, character)| {
+        let is_comment = after_space && character == '#';
+        after_space = character.is_whitespace();
+        is_comment
+    });
+    comment.map_or(name, |(start, _)| name[..start].trim_end())
+}
+
+/// The name of an object or a group, up to a `#` that stands alone. There is no definition to compare it with, and names
+/// such as `Window #3` are common.
+pub(super) fn label(text: &str) -> &str {
+    let mut name = text.trim();
+    if let Some(start) = name
+        .match_indices('#')
+        .map(|(start, _)| start)
+        .find(|&start| {
+            let is_space = |character: Option<char>| character.is_none_or(char::is_whitespace);
+            is_space(name[..start].chars().next_back())
+                && is_space(name[start + 1..].chars().next())
+        })
+    {
+        name = name[..start].trim_end();
+    }
+    name
+}
+
 /// What a word is as a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
@@ -163,6 +217,10 @@ pub(super) enum Number {
     Finite,
     /// NaN, an infinity, or beyond single precision.
     NotFinite,
+    /// A number but for a comma, as in `0,5`. It may be a decimal comma or stand between thousands or numbers.
+    Comma,
+    /// A number but for the exponent of Fortran, as in `5.0D-1`.
+    FortranExponent,
     /// No number at all.
     Malformed,
 }
@@ -179,9 +237,58 @@ impl Number {
         match parsed {
             Some(value) if value.abs() <= f64::from(f32::MAX) => Self::Finite,
             Some(_) => Self::NotFinite,
-            None => Self::Malformed,
+            None => Self::foreign(word),
         }
     }
+
+    /// Look at a word that is not a number here.
+    fn foreign(word: &[u8]) -> Self {
+        let digits = word.iter().any(u8::is_ascii_digit);
+        let all = |others: &[u8]| {
+            let mut bytes = word.iter();
+            digits && bytes.all(|byte| byte.is_ascii_digit() || others.contains(byte))
+        };
+        if word.contains(&b',') && all(b",.+-eE") {
+            return Self::Comma;
+        }
+        let exponent = |byte: &u8| {
+            if matches!(byte, b'd' | b'D') {
+                b'e'
+            } else {
+                *byte
+            }
+        };
+        let with_e: Vec<u8> = word.iter().map(exponent).collect();
+        let is_number = |text: &str| text.parse::<f64>().is_ok();
+        if all(b".+-dD") && std::str::from_utf8(&with_e).is_ok_and(is_number) {
+            return Self::FortranExponent;
+        }
+        Self::Malformed
+    }
+
+    /// How numbers are written, where it is the notation that cannot be read, and what to do about it.
+    pub(super) fn notation(self) -> Option<Notation> {
+        match self {
+            Self::Comma => Some(Notation {
+                name: "a decimal comma",
+                cure: "export with decimal points",
+            }),
+            Self::FortranExponent => Some(Notation {
+                name: "a D exponent",
+                cure: "export with E exponents",
+            }),
+            Self::Finite | Self::NotFinite | Self::Malformed => None,
+        }
+    }
+}
+
+/// A way to write numbers that is not that of OBJ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Notation {
+    /// What such a number has.
+    pub(super) name: &'static str,
+    /// What to do about it.
+    pub(super) cure: &'static str,
 }
 
 /// Whether a word is digits with a sign and a point at most: nearly all numbers are, and this is quick to see.
@@ -243,6 +350,38 @@ mod tests {
     }
 
     #[test]
+    fn a_name_may_be_meant_without_spaces_and_without_a_comment() {
+        for (text, expected) in [
+            ("lamp", &["lamp"][..]),
+            ("lamp   # 60 W", &["lamp   # 60 W", "lamp"]),
+            ("床　木　", &["床　木　", "床　木"]),
+            (
+                "ランプ\u{a0} # 60 W　",
+                &["ランプ\u{a0} # 60 W　", "ランプ\u{a0} # 60 W", "ランプ"],
+            ),
+            ("lamp#2", &["lamp#2"]),
+            ("# none", &["# none"]),
+            ("\u{3000}", &["\u{3000}"]),
+            ("", &[""]),
+        ] {
+            assert_eq!(spellings(text).collect::<Vec<_>>(), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_label_ends_at_a_hash_that_stands_alone() {
+        for (text, expected) in [
+            ("chair # oak", "chair"),
+            ("chair #", "chair"),
+            ("Window #3", "Window #3"),
+            ("Desk#1 #2\u{3000}", "Desk#1 #2"),
+            ("# none", ""),
+        ] {
+            assert_eq!(label(text), expected, "{text:?}");
+        }
+    }
+
+    #[test]
     fn numbers_are_told_apart() {
         for (word, expected) in [
             ("1", Number::Finite),
@@ -255,7 +394,15 @@ mod tests {
             ("1.#QNAN", Number::Malformed),
             (".", Number::Malformed),
             ("-", Number::Malformed),
-            ("1,5", Number::Malformed),
+            ("1,5", Number::Comma),
+            ("-1.234,5e3", Number::Comma),
+            ("1,", Number::Comma),
+            (",", Number::Malformed),
+            ("a,5", Number::Malformed),
+            ("1.0D+00", Number::FortranExponent),
+            ("-5d-1", Number::FortranExponent),
+            ("1dd2", Number::Malformed),
+            ("d", Number::Malformed),
             ("1.2.3", Number::Malformed),
         ] {
             assert_eq!(Number::of(word.as_bytes()), expected, "{word}");

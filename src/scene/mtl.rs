@@ -1,19 +1,20 @@
-//! Materials of an MTL file, cleaned statement by statement before the parser sees them.
+//! Materials of an MTL file, statement by statement: what cannot be used is skipped and named with its line.
 //!
 //! Used are `Kd`, `Ke`, `map_Kd` and `map_Ke`; `d`, `Tr`, `illum` and `map_d` only to say that nothing is transparent.
 //! `Ka` is never light.
 
 use std::io::BufRead;
 
-use glam::{DVec2, Vec3};
+use glam::Vec3;
 
-use super::lines::{LogicalLines, Number, decode, split_keyword, words};
+use super::lines::{LogicalLines, Notation, Number, decode, split_keyword, words};
+use super::texture_statement::TextureStatement;
 use super::warning::{WarningKind, WarningLog};
 
 /// A material as the file gives it; values are not yet checked.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MtlMaterial {
-    /// `newmtl`.
+    /// What follows `newmtl`, without ASCII spaces around it.
     pub(super) name: String,
     /// Line of `newmtl`.
     pub(super) line: usize,
@@ -22,228 +23,131 @@ pub(super) struct MtlMaterial {
     /// `Ke`.
     pub(super) emissive: Option<Vec3>,
     /// `map_Kd`.
-    pub(super) diffuse_map: Option<TextureReference>,
+    pub(super) diffuse_map: Option<TextureStatement>,
     /// `map_Ke`.
-    pub(super) emissive_map: Option<TextureReference>,
+    pub(super) emissive_map: Option<TextureStatement>,
+    /// `d`: 1 is opaque.
+    pub(super) dissolve: Option<f64>,
+    /// `Tr`: 0 is opaque.
+    pub(super) transparency: Option<f64>,
+    /// Whether there is a `map_d`.
+    pub(super) has_dissolve_map: bool,
+    /// `illum`.
+    pub(super) illumination: Option<u8>,
 }
 
-/// A texture statement without its keyword.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct TextureReference {
-    /// File name.
-    pub(super) name: String,
-    /// `-s`: texture coordinates are multiplied by it …
-    pub(super) scale: DVec2,
-    /// `-o`: … and then moved by it.
-    pub(super) offset: DVec2,
-    /// The first option that changes the picture and is not followed.
-    pub(super) ignored: Option<String>,
+impl MtlMaterial {
+    /// The statement that makes the material transparent for other programs, if one does.
+    pub(super) fn transparent_by(&self) -> Option<String> {
+        // Some exporters write both with the same meaning, so `d` decides where it is given.
+        let dissolve = self.dissolve.map(|dissolve| ("d", dissolve));
+        let transparency = self.transparency.map(|share| ("Tr", 1.0 - share));
+        let share = dissolve.or(transparency).filter(|(_, share)| *share < 1.0);
+        match (share, self.illumination) {
+            (Some((statement, _)), _) => Some(statement.to_owned()),
+            _ if self.has_dissolve_map => Some("map_d".to_owned()),
+            (None, Some(model @ (4 | 6 | 7 | 9))) => Some(format!("illum {model}")),
+            _ => None,
+        }
+    }
 }
 
 /// Read all materials of a file; `file` is its name for messages.
 ///
 /// # Errors
-/// A sentence when the file cannot be read to its end.
+/// Those of the system, where the file cannot be read to its end.
 pub(super) fn read_mtl(
     source: impl BufRead,
     file: &str,
     log: &mut WarningLog,
-) -> Result<Vec<MtlMaterial>, String> {
-    let mut cleaner = MtlCleaner {
-        file,
-        log,
-        clean: String::new(),
-        lines: Vec::new(),
-    };
-    cleaner
-        .read(source)
-        .map_err(|error| format!("it cannot be read ({error})"))?;
-    let MtlCleaner { clean, lines, .. } = cleaner;
-    let parsed = std::panic::catch_unwind(|| tobj::load_mtl_buf(&mut clean.as_bytes()));
-    let Ok(Ok((materials, _))) = parsed else {
-        return Err("it cannot be parsed".to_owned());
-    };
-    Ok(materials
-        .into_iter()
-        .zip(lines)
-        .map(|(material, line)| convert(material, line, file, log))
-        .collect())
-}
-
-fn convert(material: tobj::Material, line: usize, file: &str, log: &mut WarningLog) -> MtlMaterial {
-    let parameter = |name: &str| material.unknown_param.get(name);
-    // Some exporters write both with the same meaning, so `d` decides where it is given.
-    let dissolve = material
-        .dissolve
-        .or_else(|| Some(1.0 - parameter("Tr")?.parse::<f64>().ok()?));
-    if dissolve.is_some_and(|dissolve| dissolve < 1.0)
-        || material.dissolve_texture.is_some()
-        || matches!(material.illumination_model, Some(4 | 6 | 7 | 9))
-    {
-        let message = "transparent materials are treated as opaque";
-        log.note(WarningKind::Unsupported, message, file, line);
-    }
-    let colour = |values: [f64; 3]| Vec3::from_array(values.map(|value| value as f32));
-    MtlMaterial {
-        line,
-        diffuse: material.diffuse.map(colour),
-        emissive: material.emissive.map(colour),
-        diffuse_map: material
-            .diffuse_texture
-            .as_deref()
-            .and_then(texture_reference),
-        emissive_map: parameter("map_Ke").and_then(|text| texture_reference(text)),
-        name: material.name,
-    }
-}
-
-/// Rewrites an MTL file as the few statements that are used, all of them valid.
-struct MtlCleaner<'a> {
-    file: &'a str,
-    log: &'a mut WarningLog,
-    clean: String,
-    /// Line of each `newmtl` kept.
-    lines: Vec<usize>,
-}
-
-impl MtlCleaner<'_> {
-    fn read(&mut self, source: impl BufRead) -> std::io::Result<()> {
-        let mut lines = LogicalLines::new(source);
-        let mut in_material = false;
-        while let Some(line) = lines.advance(self.log, self.file)? {
-            let (keyword, rest) = split_keyword(&lines.text);
-            if keyword == b"newmtl" {
-                in_material = !rest.is_empty();
+) -> std::io::Result<Vec<MtlMaterial>> {
+    let mut lines = LogicalLines::new(source);
+    let mut materials: Vec<MtlMaterial> = Vec::new();
+    let mut in_material = false;
+    while let Some(line) = lines.advance(log, file)? {
+        let (keyword, rest) = split_keyword(&lines.text);
+        let skipped = if keyword.eq_ignore_ascii_case(b"newmtl") {
+            in_material = !rest.is_empty();
+            if in_material {
+                materials.push(MtlMaterial {
+                    name: decode(rest).into_owned(),
+                    line,
+                    ..MtlMaterial::default()
+                });
             }
-            let kept = if in_material {
-                self.statement(keyword, rest, line)
-            } else {
-                // Statements before the first material have nothing to belong to.
-                keyword.is_empty() || keyword[0] == b'#'
-            };
-            if !kept {
-                let shown = decode(keyword).chars().take(20).collect::<String>();
-                let message = format!("skipped a material line that cannot be used ({shown})");
-                self.log
-                    .note(WarningKind::LineSkipped, &message, self.file, line);
+            (!in_material).then_some(Number::Malformed)
+        } else {
+            match materials.last_mut() {
+                Some(material) if in_material => statement(material, keyword, rest).err(),
+                // Statements without a material have nothing to belong to.
+                _ => (!matches!(keyword, [] | [b'#', ..])).then_some(Number::Malformed),
             }
-        }
-        Ok(())
-    }
-
-    /// Copy one statement if it is used; false if it is used but not valid.
-    fn statement(&mut self, keyword: &[u8], rest: &[u8], line: usize) -> bool {
-        let argument = match keyword.to_ascii_lowercase().as_slice() {
-            b"newmtl" => {
-                self.lines.push(line);
-                Some(("newmtl", decode(rest).into_owned()))
-            }
-            b"kd" => colour(rest).map(|text| ("Kd", text)),
-            b"ke" => colour(rest).map(|text| ("Ke", text)),
-            b"d" => last_number(rest).map(|text| ("d", text)),
-            b"tr" => last_number(rest).map(|text| ("Tr", text)),
-            b"illum" => words(rest)
-                .next()
-                .and_then(|word| decode(word).parse::<u8>().ok())
-                .map(|model| ("illum", model.to_string())),
-            b"map_kd" => file_argument(rest).map(|text| ("map_Kd", text)),
-            b"map_ke" | b"map_emissive" => file_argument(rest).map(|text| ("map_Ke", text)),
-            b"map_d" => file_argument(rest).map(|text| ("map_d", text)),
-            _ => return true,
         };
-        if let Some((name, text)) = &argument {
-            self.clean.push_str(name);
-            self.clean.push(' ');
-            self.clean.push_str(text);
-            self.clean.push('\n');
+        if let Some(trouble) = skipped {
+            let shown = decode(keyword).chars().take(20).collect::<String>();
+            let message = match trouble.notation() {
+                Some(Notation { name, cure }) => {
+                    format!("skipped a material line with {name} ({shown}); {cure}")
+                }
+                None => format!("skipped a material line that cannot be used ({shown})"),
+            };
+            log.note(WarningKind::LineSkipped, &message, file, line);
         }
-        argument.is_some()
     }
+    Ok(materials)
+}
+
+/// Take over one statement if it is used; the error is what a word is instead of the number that it should be.
+fn statement(material: &mut MtlMaterial, keyword: &[u8], rest: &[u8]) -> Result<(), Number> {
+    let texture = || TextureStatement::of(&decode(rest)).ok_or(Number::Malformed);
+    match keyword.to_ascii_lowercase().as_slice() {
+        b"kd" => material.diffuse = Some(colour(rest)?),
+        b"ke" => material.emissive = Some(colour(rest)?),
+        b"d" => material.dissolve = Some(last_number(rest)?),
+        b"tr" => material.transparency = Some(last_number(rest)?),
+        b"illum" => material.illumination = Some(illumination(rest).ok_or(Number::Malformed)?),
+        b"map_kd" => material.diffuse_map = Some(texture()?),
+        b"map_ke" | b"map_emissive" => material.emissive_map = Some(texture()?),
+        b"map_d" => {
+            texture()?;
+            material.has_dissolve_map = true;
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
 /// One or three numbers as three; `spectral` and `xyz` are not numbers.
-fn colour(rest: &[u8]) -> Option<String> {
-    let values = words(rest).take(3).map(decode).collect::<Vec<_>>();
-    let numbers = values.iter().all(|value| value.parse::<f64>().is_ok());
-    match values.as_slice() {
-        [grey] if numbers => Some(format!("{grey} {grey} {grey}")),
-        [_, _, _] if numbers => Some(values.join(" ")),
-        _ => None,
+fn colour(rest: &[u8]) -> Result<Vec3, Number> {
+    let mut values = [0.0; 3];
+    let mut count = 0;
+    for (value, word) in values.iter_mut().zip(words(rest)) {
+        *value = number(word)?;
+        count += 1;
     }
+    match count {
+        1 => Ok(Vec3::splat(values[0])),
+        3 => Ok(Vec3::from_array(values)),
+        _ => Err(Number::Malformed),
+    }
+}
+
+/// A number of any size; what is not finite is cured later.
+fn number(word: &[u8]) -> Result<f32, Number> {
+    decode(word).parse().map_err(|_| Number::of(word))
 }
 
 /// The last word if it is a number: `d -halo 0.5` has an option before it.
-fn last_number(rest: &[u8]) -> Option<String> {
-    let word = words(rest).last()?;
-    (Number::of(word) == Number::Finite).then(|| decode(word).into_owned())
-}
-
-fn file_argument(rest: &[u8]) -> Option<String> {
-    let text = decode(rest);
-    // The parser and this program must see the same lines and words.
-    texture_reference(&text).map(|_| text.into_owned())
-}
-
-/// Options and name of a texture statement; nothing if there is no name.
-fn texture_reference(text: &str) -> Option<TextureReference> {
-    let mut reference = TextureReference {
-        name: String::new(),
-        scale: DVec2::ONE,
-        offset: DVec2::ZERO,
-        ignored: None,
-    };
-    let mut rest = text.trim();
-    while rest.starts_with('-') {
-        let (option, after) = next_word(rest);
-        let limit = match option {
-            "-s" | "-o" | "-t" => 3,
-            "-mm" => 2,
-            "-bm" | "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-texres"
-            | "-boost" | "-type" => 1,
-            _ => break,
-        };
-        let numeric = matches!(option, "-s" | "-o" | "-t" | "-mm");
-        let mut values = Vec::new();
-        rest = after;
-        while values.len() < limit {
-            let (word, after) = next_word(rest);
-            if word.is_empty() || numeric && word.parse::<f64>().is_err() {
-                break;
-            }
-            values.push(word);
-            rest = after;
-        }
-        reference.apply(option, &values);
-    }
-    reference.name = rest.trim_matches('"').trim().to_owned();
-    (!reference.name.is_empty()).then_some(reference)
-}
-
-impl TextureReference {
-    fn apply(&mut self, option: &str, values: &[&str]) {
-        let number = |index: usize, default: f64| {
-            values
-                .get(index)
-                .and_then(|word: &&str| word.parse::<f64>().ok())
-                .filter(|value| value.is_finite())
-                .unwrap_or(default)
-        };
-        match option {
-            "-s" => self.scale = DVec2::new(number(0, 1.0), number(1, 1.0)),
-            "-o" => self.offset = DVec2::new(number(0, 0.0), number(1, 0.0)),
-            "-t" | "-mm" | "-clamp" if values.first() != Some(&"off") => {
-                self.ignored.get_or_insert_with(|| option.to_owned());
-            }
-            _ => {}
-        }
+fn last_number(rest: &[u8]) -> Result<f64, Number> {
+    let word = words(rest).last().ok_or(Number::Malformed)?;
+    match Number::of(word) {
+        Number::Finite => decode(word).parse().map_err(|_| Number::Malformed),
+        trouble => Err(trouble),
     }
 }
 
-fn next_word(text: &str) -> (&str, &str) {
-    let text = text.trim_start();
-    let end = text.find(char::is_whitespace).unwrap_or(text.len());
-    let (word, rest) = text.split_at(end);
-    (word, rest.trim_start())
+fn illumination(rest: &[u8]) -> Option<u8> {
+    decode(words(rest).next()?).parse().ok()
 }
 
 #[cfg(test)]
@@ -283,25 +187,43 @@ mod tests {
     }
 
     #[test]
-    fn texture_options_come_before_the_name() {
-        let reference =
-            texture_reference("-s 2 3 1 -o 0.5 -clamp on -bm 1 my tex-ture 2.png").unwrap();
-        assert_eq!(reference.name, "my tex-ture 2.png");
-        assert_eq!(reference.scale, DVec2::new(2.0, 3.0));
-        assert_eq!(reference.offset, DVec2::new(0.5, 0.0));
-        assert_eq!(reference.ignored.as_deref(), Some("-clamp"));
-        assert_eq!(texture_reference("-s 1 1 1"), None);
-        assert_eq!(texture_reference("-odd.png").unwrap().name, "-odd.png");
+    fn numbers_in_other_notations_are_named() {
+        let (materials, warnings) =
+            read(b"newmtl a\nKd 0,5 0,5 0,5\nKe 1.5D+01 0 0\nd 0,5\nKd 0.5 0.5 0.5 # not 0,7\n");
+        assert_eq!(materials[0].diffuse, Some(Vec3::splat(0.5)));
+        assert_eq!(materials[0].emissive, None);
+        let expected = [
+            "x.mtl:2: skipped a material line with a decimal comma (Kd); export with decimal points",
+            "x.mtl:3: skipped a material line with a D exponent (Ke); export with E exponents",
+            "x.mtl:4: skipped a material line with a decimal comma (d); export with decimal points",
+        ];
+        assert_eq!(warnings, expected);
     }
 
     #[test]
-    fn transparency_is_named() {
-        for text in ["d 0.5", "Tr 0.5", "illum 7", "d -halo 0.2", "map_d a.png"] {
-            let (_, warnings) = read(format!("newmtl a\n{text}\n").as_bytes());
-            assert!(warnings[0].contains("treated as opaque"), "{text}");
-        }
-        let (_, warnings) = read(b"newmtl a\nd 1\nTr 1\nKa 1 1 1\nillum 2\n");
+    fn names_keep_their_spaces_that_are_not_ascii() {
+        let text = "newmtl \u{3000}\nKd 1\nNEWMTL ランプ\u{a0}\r\nnewmtl lamp # 60 W \n";
+        let (materials, warnings) = read(text.as_bytes());
+        let names: Vec<&str> = materials.iter().map(|material| &*material.name).collect();
+        assert_eq!(names, ["\u{3000}", "ランプ\u{a0}", "lamp # 60 W"]);
         assert!(warnings.is_empty());
+    }
+
+    #[test]
+    fn the_statement_that_makes_transparent_is_told() {
+        for (text, expected) in [
+            ("d 0.5", Some("d")),
+            ("Tr 0.5", Some("Tr")),
+            ("illum 7", Some("illum 7")),
+            ("d -halo 0.2", Some("d")),
+            ("map_d a.png", Some("map_d")),
+            ("d 0\nillum 4", Some("d")),
+            ("d 1\nTr 1\nKa 1 1 1\nillum 2", None),
+        ] {
+            let (materials, warnings) = read(format!("newmtl a\n{text}\n").as_bytes());
+            assert_eq!(materials[0].transparent_by().as_deref(), expected, "{text}");
+            assert!(warnings.is_empty(), "{text}");
+        }
     }
 
     #[test]

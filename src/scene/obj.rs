@@ -12,12 +12,15 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::ahead::parse_ahead;
 use super::build::{BuildError, Face, SceneBuilder, SceneOptions, Source};
-use super::clean::{FaceNote, MAX_LIBRARIES, Mention, Notes, ObjCleaner};
-use super::locate::{Missing, locate};
-use super::mtl::{MtlMaterial, TextureReference, read_mtl};
+use super::clean::{FaceNote, ForeignNumber, MAX_LIBRARIES, Mention, Notes, ObjCleaner};
+use super::library::{Defined, Library};
+use super::lines::{Notation, spellings};
+use super::locate::{Missing, SceneFolder};
+use super::mtl::{MtlMaterial, read_mtl};
 use super::source;
-use super::texture::linear_from_srgb;
-use super::triangulate::{MAX_CLIPPED_CORNERS, Triangulator};
+use super::texture::{Role, linear_from_srgb};
+use super::texture_statement::{TextureReference, TextureStatement};
+use super::triangulate::{Doubt, MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
 use super::{Material, MaterialId, Scene, Texture, TextureId};
 
@@ -70,6 +73,18 @@ pub enum ReadError {
         /// What was asked for.
         path: PathBuf,
     },
+    /// Numbers in a notation that cannot be read, and nothing else to light.
+    #[error("line {line} has {notation} in a vertex, so no usable faces are left; {cure}: {}", path.display())]
+    ForeignNumbers {
+        /// The first line of them.
+        line: usize,
+        /// How they are written.
+        notation: &'static str,
+        /// What to do about it.
+        cure: &'static str,
+        /// What was asked for.
+        path: PathBuf,
+    },
     /// More than the program can index.
     #[error("there are too many triangles or vertices ({count}, at most {limit}); split the scene: {}", path.display())]
     TooLarge {
@@ -109,7 +124,7 @@ pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError>
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     let mut import = Import {
         options,
-        root: folder_of(path),
+        folder: SceneFolder::new(folder_of(path)),
         builder: SceneBuilder {
             source: Source {
                 name: stem.to_string_lossy().into_owned(),
@@ -190,17 +205,30 @@ struct Slot {
 /// The scene on its way in.
 struct Import<'a> {
     options: &'a SceneOptions,
-    root: PathBuf,
+    folder: SceneFolder,
     builder: SceneBuilder,
     notes: Notes,
-    /// Pictures by path; nothing where reading failed.
-    textures: HashMap<PathBuf, Option<TextureId>>,
+    /// Pictures by path and by what they are for; nothing where reading failed.
+    textures: HashMap<(PathBuf, Role), Option<Loaded>>,
     pixel_budget: usize,
     /// Names of MTL files that are still looked for.
     library_budget: usize,
     /// By index in [`Notes::materials`].
     slots: Vec<Slot>,
     default_slot: Option<Slot>,
+}
+
+impl Transparent {
+    fn add(&mut self, statement: String, defined: &Defined) {
+        if self.names.is_empty() {
+            self.place = (defined.file.clone(), defined.material.line);
+        }
+        let name = defined.material.name.clone();
+        match self.names.iter_mut().find(|(known, _)| *known == statement) {
+            Some((_, names)) => names.push(name),
+            None => self.names.push((statement, vec![name])),
+        }
+    }
 }
 
 /// What the faces of a material can show.
@@ -211,24 +239,62 @@ struct Shown {
     has_texcoords: bool,
 }
 
-/// A material with the file it comes from.
-struct Defined {
-    material: MtlMaterial,
-    file: String,
-    /// Folder of the MTL file, relative to that of the OBJ file.
-    folder: PathBuf,
+impl Shown {
+    fn add(&mut self, other: Self) {
+        self.has_faces |= other.has_faces;
+        self.has_texcoords |= other.has_texcoords;
+    }
+}
+
+/// A texture of the scene.
+#[derive(Clone, Copy, Debug)]
+struct Loaded {
+    id: TextureId,
+    is_transparent: bool,
+}
+
+/// A texture of a material, and how it lies.
+struct Placed {
+    texture: Loaded,
+    scale: DVec2,
+    offset: DVec2,
+}
+
+/// Materials that other programs show transparent.
+#[derive(Default)]
+struct Transparent {
+    /// By what makes them so: their names.
+    names: Vec<(String, Vec<String>)>,
+    /// File and line of the first.
+    place: (String, usize),
 }
 
 impl Import<'_> {
-    /// Make a material of each name that `usemtl` mentions.
+    /// Make a material of each one that `usemtl` mentions.
     fn materials(&mut self, models: &[tobj::Model]) {
         let library = self.read_libraries();
-        let mut unknown = Vec::new();
         let shown = self.shown(models);
         let mentions = std::mem::take(&mut self.notes.materials);
-        for (mention, shown) in mentions.into_iter().zip(shown) {
-            let slot = match library.get(&mention.name) {
-                Some(defined) => self.define(defined, shown),
+        let found: Vec<Option<usize>> = mentions
+            .iter()
+            .map(|mention| library.find(&mention.name))
+            .collect();
+        // A material may be mentioned by several names.
+        let mut shown_by: HashMap<usize, Shown> = HashMap::new();
+        for (number, shown) in found.iter().zip(shown) {
+            if let Some(number) = number {
+                shown_by.entry(*number).or_default().add(shown);
+            }
+        }
+        let mut slot_of: HashMap<usize, Slot> = HashMap::new();
+        let mut transparent = Transparent::default();
+        let mut unknown = Vec::new();
+        for (mention, number) in mentions.into_iter().zip(found) {
+            let slot = match number {
+                Some(number) => *slot_of.entry(number).or_insert_with(|| {
+                    let shown = shown_by[&number];
+                    self.define(library.get(number), shown, &mut transparent)
+                }),
                 None => {
                     let grey = Material::plain(&mention.name, DEFAULT_REFLECTANCE, Vec3::ZERO);
                     unknown.push(mention);
@@ -241,6 +307,7 @@ impl Import<'_> {
             self.slots.push(slot);
         }
         self.warn_of_unknown(&unknown);
+        self.warn_of_transparent(&transparent);
     }
 
     /// What the faces of each material that is mentioned can show.
@@ -260,19 +327,11 @@ impl Import<'_> {
     }
 
     fn warn_of_unknown(&mut self, unknown: &[Mention]) {
-        const LISTED: usize = 8;
         let Some(first) = unknown.first() else {
             return;
         };
-        let names = unknown
-            .iter()
-            .take(LISTED)
-            .map(|mention| format!("'{}'", shortened(&mention.name)));
-        let mut listed = names.collect::<Vec<_>>().join(", ");
-        if unknown.len() > LISTED {
-            listed += &format!(" and {} more", unknown.len() - LISTED);
-        }
-        let message = format!("no material file defines {listed}; grey is used instead");
+        let names = listed(unknown.iter().map(|mention| &*mention.name), MOST_LISTED);
+        let message = format!("no material file defines {names}; grey is used instead");
         let count = unknown.iter().map(|mention| mention.count).sum();
         let file = &self.builder.source.file;
         let kind = WarningKind::MaterialMissing;
@@ -281,9 +340,28 @@ impl Import<'_> {
             .note_times(kind, &message, count, file, first.line);
     }
 
+    /// Say once what is done about transparency: many programs write `illum 4` into every material, or `d 0` into opaque
+    /// ones.
+    fn warn_of_transparent(&mut self, transparent: &Transparent) {
+        if transparent.names.is_empty() {
+            return;
+        }
+        let mut most = MOST_LISTED;
+        let groups = transparent.names.iter().map(|(statement, names)| {
+            let listed = listed(names.iter().map(|name| &**name), most);
+            most = most.saturating_sub(names.len());
+            format!("{listed} ({statement})")
+        });
+        let groups = groups.collect::<Vec<_>>().join(", ");
+        let message = format!("transparency is not computed; treated as opaque: {groups}");
+        let (file, line) = &transparent.place;
+        let kind = WarningKind::Unsupported;
+        self.notes.log.note(kind, &message, file, *line);
+    }
+
     /// Read every MTL file that is mentioned; later definitions of a name replace earlier ones.
-    fn read_libraries(&mut self) -> HashMap<String, Defined> {
-        let mut library = HashMap::new();
+    fn read_libraries(&mut self) -> Library {
+        let mut library = Library::default();
         let mut read = Vec::new();
         for mention in std::mem::take(&mut self.notes.libraries) {
             for path in self.library_paths(&mention) {
@@ -299,32 +377,30 @@ impl Import<'_> {
     /// The files that one `mtllib` means: its whole text as one name with spaces, else a list of names.
     fn library_paths(&mut self, mention: &Mention) -> Vec<PathBuf> {
         let here = Path::new("");
-        if let Ok(path) = locate(&self.root, here, &mention.name) {
+        let names: Vec<&str> = spellings(&mention.name).collect();
+        if let Ok((_, path)) = self.folder.locate(here, &names) {
             return vec![path];
         }
-        let mut words: Vec<&str> = mention
-            .name
-            .split_whitespace()
-            .take(self.library_budget)
-            .collect();
+        let whole = names[names.len() - 1];
+        let mut words: Vec<&str> = whole.split_whitespace().take(self.library_budget).collect();
         self.library_budget -= words.len();
-        let all = words
-            .iter()
-            .map(|word| locate(&self.root, here, word))
-            .collect::<Vec<_>>();
+        let mut all = Vec::new();
+        for word in &words {
+            all.push(self.folder.locate(here, &[word]));
+        }
         if all.iter().all(Result::is_err) {
             // One missing name with spaces is likelier than several missing ones.
-            words = vec![&mention.name];
+            words = vec![whole];
         }
         let mut found = Vec::new();
         for (word, path) in words.into_iter().zip(all) {
             let why = match path {
-                Ok(path) => {
+                Ok((_, path)) => {
                     found.push(path);
                     continue;
                 }
                 Err(Missing::Absent) => "was not found beside the OBJ file",
-                Err(Missing::Outside) => "lies outside the folder of the OBJ file and was not read",
+                Err(missing) => missing_because(missing),
             };
             let message = format!("material file '{}' {why}", shortened(word));
             let file = &self.builder.source.file;
@@ -336,28 +412,30 @@ impl Import<'_> {
         found
     }
 
-    fn read_library(&mut self, path: &Path, library: &mut HashMap<String, Defined>) {
+    fn read_library(&mut self, path: &Path, library: &mut Library) {
         let file = path
             .file_name()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        self.builder.source.files.push(self.root.join(path));
+        let file_path = self.folder.path_of(path);
+        self.builder.source.files.push(file_path);
         let log = &mut self.notes.log;
-        let materials = File::open(self.root.join(path))
-            .map_err(|error| format!("it cannot be opened ({error})"))
+        let materials = File::open(self.folder.path_of(path))
             .and_then(|source| read_mtl(BufReader::new(source.take(MAX_MTL_BYTES)), &file, log));
         match materials {
-            Ok(materials) => library.extend(materials.into_iter().map(|material| {
-                let defined = Defined {
-                    file: file.clone(),
-                    folder: path.parent().unwrap_or(Path::new("")).to_owned(),
-                    material,
-                };
-                (defined.material.name.clone(), defined)
-            })),
-            Err(reason) => {
-                let message = format!("material file '{file}' was left out: {reason}");
+            Ok(materials) => {
+                for material in materials {
+                    library.add(Defined {
+                        material,
+                        file: file.clone(),
+                        folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+                    });
+                }
+            }
+            Err(error) => {
+                let message =
+                    format!("material file '{file}' was left out: it cannot be read ({error})");
                 log.note(WarningKind::MaterialMissing, &message, "", 0);
             }
         }
@@ -365,17 +443,22 @@ impl Import<'_> {
 
     /// Turn a material of an MTL file into one of the scene. Pictures that no face shows are not read, but where a missing
     /// colour depends on whether there is one.
-    fn define(&mut self, defined: &Defined, shown: Shown) -> Slot {
+    fn define(&mut self, defined: &Defined, shown: Shown, transparent: &mut Transparent) -> Slot {
         let MtlMaterial {
-            diffuse,
-            emissive,
+            name,
             diffuse_map,
             emissive_map,
             ..
         } = &defined.material;
-        let mut texture = |map: &Option<TextureReference>, color: &Option<Vec3>| {
+        // Black beside a picture would hide it: exporters write it where the picture is all of the colour.
+        let color_beside = |map: &Option<TextureStatement>, color: Option<Vec3>| {
+            color.filter(|color| map.is_none() || *color != Vec3::ZERO)
+        };
+        let diffuse = color_beside(diffuse_map, defined.material.diffuse);
+        let emissive = color_beside(emissive_map, defined.material.emissive);
+        let mut texture = |map: &Option<TextureStatement>, color: Option<Vec3>, role| {
             if shown.has_texcoords || (shown.has_faces && color.is_none()) {
-                return self.texture(map.as_ref(), defined);
+                return self.texture(map.as_ref()?, defined, role);
             }
             if let Some(map) = map {
                 self.builder.spared.unused_textures += 1;
@@ -383,13 +466,15 @@ impl Import<'_> {
             }
             None
         };
-        let reflectance_texture = texture(diffuse_map, diffuse);
-        let emission_texture = texture(emissive_map, emissive);
-        // A texture without a colour stands for itself.
-        let bare = |texture: Option<TextureId>, otherwise: Vec3, most: f32| {
-            texture.map_or(otherwise, |_| Vec3::splat(most))
+        let reflecting = texture(diffuse_map, diffuse, Role::Reflects);
+        let emitting = texture(emissive_map, emissive, Role::Emits);
+        let statement = match &reflecting {
+            Some(placed) if placed.texture.is_transparent => Some("alpha of map_Kd".to_owned()),
+            _ => defined.material.transparent_by(),
         };
-        let most = self.options.max_reflectance.clamp(0.0, 1.0);
+        if let Some(statement) = statement.filter(|_| shown.has_faces) {
+            transparent.add(statement, defined);
+        }
         let linear = |colour: Vec3| {
             if self.options.mtl_color_is_srgb {
                 colour.map(linear_from_srgb)
@@ -397,17 +482,20 @@ impl Import<'_> {
                 colour
             }
         };
-        let material = Material {
-            name: defined.material.name.clone(),
-            reflectance: diffuse.map_or_else(
-                || bare(reflectance_texture, DEFAULT_REFLECTANCE, most),
-                linear,
-            ),
-            emission: emissive.map_or_else(|| bare(emission_texture, Vec3::ZERO, 1.0), linear),
-            reflectance_texture,
-            emission_texture,
+        // A texture without a colour stands for itself.
+        let color = |given: Option<Vec3>, texture: &Option<Placed>, otherwise: Vec3| match texture {
+            Some(_) => given.map_or(Vec3::ONE, linear),
+            None => given.map_or(otherwise, linear),
         };
-        let mapping = self.mapping(&material, defined);
+        let id_of = |texture: &Option<Placed>| texture.as_ref().map(|placed| placed.texture.id);
+        let material = Material {
+            name: name.clone(),
+            reflectance: color(diffuse, &reflecting, DEFAULT_REFLECTANCE),
+            emission: color(emissive, &emitting, Vec3::ZERO),
+            reflectance_texture: id_of(&reflecting),
+            emission_texture: id_of(&emitting),
+        };
+        let mapping = self.mapping(reflecting, emitting, defined);
         Slot {
             id: self.builder.push_material(material),
             mapping,
@@ -415,18 +503,20 @@ impl Import<'_> {
     }
 
     /// How the material's textures lie; both share the coordinates of a face.
-    fn mapping(&mut self, material: &Material, defined: &Defined) -> Option<(DVec2, DVec2)> {
-        let of = |texture: Option<TextureId>, map: &Option<TextureReference>| {
-            texture.and(map.as_ref()).map(|map| (map.scale, map.offset))
-        };
-        let diffuse = of(material.reflectance_texture, &defined.material.diffuse_map);
-        let emissive = of(material.emission_texture, &defined.material.emissive_map);
-        if diffuse.is_some() && emissive.is_some() && diffuse != emissive {
+    fn mapping(
+        &mut self,
+        reflecting: Option<Placed>,
+        emitting: Option<Placed>,
+        defined: &Defined,
+    ) -> Option<(DVec2, DVec2)> {
+        let of = |placed: Placed| (placed.scale, placed.offset);
+        let (reflecting, emitting) = (reflecting.map(of), emitting.map(of));
+        if reflecting.is_some() && emitting.is_some() && reflecting != emitting {
             let message =
                 "map_Ke with other -s or -o than map_Kd: those of map_Kd are used for both";
             self.note_defined(WarningKind::Unsupported, message, defined);
         }
-        diffuse.or(emissive)
+        reflecting.or(emitting)
     }
 
     fn note_defined(&mut self, kind: WarningKind, message: &str, defined: &Defined) {
@@ -434,54 +524,77 @@ impl Import<'_> {
         self.notes.log.note(kind, message, &defined.file, line);
     }
 
-    /// Read a picture once; a missing or broken one is a warning.
+    /// Read a picture once for each role; a missing or broken one is a warning.
     fn texture(
         &mut self,
-        reference: Option<&TextureReference>,
+        statement: &TextureStatement,
         defined: &Defined,
-    ) -> Option<TextureId> {
-        let reference = reference?;
-        if let Some(option) = &reference.ignored {
+        role: Role,
+    ) -> Option<Placed> {
+        let mut readings = statement.readings();
+        let names: Vec<&str> = readings.iter().map(|reading| &*reading.name).collect();
+        let located = self.folder.locate(&defined.folder, &names);
+        // What is nowhere is named without all that may surround a name.
+        let meant = located
+            .as_ref()
+            .map_or(readings.len() - 1, |(number, _)| *number);
+        let reading = readings.swap_remove(meant);
+        if let Some(option) = &reading.ignored {
             let message = format!("texture option {option} is not followed");
             self.note_defined(WarningKind::Unsupported, &message, defined);
         }
-        let why = match locate(&self.root, &defined.folder, &reference.name) {
-            Ok(path) => match self.load(&path, &reference.name) {
-                Ok(id) => return Some(id),
+        let why = match located {
+            Ok((_, path)) => match self.load(&path, &reading.name, role) {
+                Ok(texture) => {
+                    let TextureReference { scale, offset, .. } = reading;
+                    return Some(Placed {
+                        texture,
+                        scale,
+                        offset,
+                    });
+                }
                 Err(reason) => format!("cannot be used: {reason}"),
             },
-            Err(Missing::Absent) => "was not found".to_owned(),
-            Err(Missing::Outside) => {
-                "lies outside the folder of the OBJ file and was not read".to_owned()
-            }
+            Err(missing) => missing_because(missing).to_owned(),
         };
-        let name = shortened(&reference.name);
+        let name = shortened(&reading.name);
         let message = format!("texture '{name}' {why}; the plain colour is used");
         self.note_defined(WarningKind::TextureMissing, &message, defined);
         None
     }
 
-    fn load(&mut self, path: &Path, name: &str) -> Result<TextureId, String> {
-        if let Some(known) = self.textures.get(path) {
+    fn load(&mut self, path: &Path, name: &str, role: Role) -> Result<Loaded, String> {
+        let key = |role| (path.to_owned(), role);
+        if let Some(known) = self.textures.get(&key(role)) {
             return known.ok_or_else(|| "see above".to_owned());
         }
-        let file = self.root.join(path);
-        let read = Texture::read(&file, name).map(|texture| {
-            let texture = texture.reduced_to(self.pixel_budget / 4);
+        let file = self.folder.path_of(path);
+        let read = Texture::read(&file, name, role).map(|picture| {
+            let texture = picture.texture.reduced_to(self.pixel_budget / 4);
             self.pixel_budget = self.pixel_budget.saturating_sub(texture.pixels.len());
             self.builder.textures.push(texture);
-            TextureId(self.builder.textures.len() as u32 - 1)
+            Loaded {
+                id: TextureId(self.builder.textures.len() as u32 - 1),
+                is_transparent: picture.is_transparent,
+            }
         });
         self.builder.source.files.push(file);
-        self.textures
-            .insert(path.to_owned(), read.as_ref().ok().copied());
+        let loaded = read.as_ref().ok().copied();
+        self.textures.insert(key(role), loaded);
+        // Only what is hidden looks different in another role.
+        if loaded.is_some_and(|loaded| !loaded.is_transparent) {
+            self.textures.insert(key(role.other()), loaded);
+        }
         read
     }
 
     /// A picture that is not read belongs to the scene, too.
-    fn note_unread(&mut self, reference: &TextureReference, defined: &Defined) {
-        if let Ok(path) = locate(&self.root, &defined.folder, &reference.name) {
-            self.builder.source.files.push(self.root.join(path));
+    fn note_unread(&mut self, statement: &TextureStatement, defined: &Defined) {
+        let readings = statement.readings();
+        let names: Vec<&str> = readings.iter().map(|reading| &*reading.name).collect();
+        if let Ok((_, path)) = self.folder.locate(&defined.folder, &names) {
+            let file = self.folder.path_of(&path);
+            self.builder.source.files.push(file);
         }
     }
 
@@ -544,26 +657,33 @@ impl Import<'_> {
             } else {
                 polygon.clear();
                 polygon.extend((0..count).map(|corner| corners.position(corner)));
-                let (triangles, too_many) = triangulator.cut(&polygon);
+                let (triangles, doubt) = triangulator.cut(&polygon);
                 for &triangle in triangles.as_chunks::<3>().0 {
                     self.push_face(&corners, triangle.map(|corner| corner as usize), base, line);
                 }
-                if too_many {
-                    self.warn_of_fan(line);
+                if let Some(doubt) = doubt {
+                    self.warn_of_doubt(doubt, line);
                 }
             }
             start += count.max(1);
         }
     }
 
-    fn warn_of_fan(&mut self, line: u32) {
-        let message = format!(
-            "a face with more than {MAX_CLIPPED_CORNERS} corners that is not convex was cut as a fan and may overlap itself; export it triangulated"
-        );
+    fn warn_of_doubt(&mut self, doubt: Doubt, line: u32) {
+        let (kind, message) = match doubt {
+            Doubt::TooManyCorners => (
+                WarningKind::Unsupported,
+                &*format!(
+                    "a face with more than {MAX_CLIPPED_CORNERS} corners that is not convex was cut as a fan and may overlap itself; export it triangulated"
+                ),
+            ),
+            Doubt::CrossesItself => (
+                WarningKind::Orientation,
+                "the edges of a face cross each other, so it is unclear what it covers; put its corners in order",
+            ),
+        };
         let file = &self.builder.source.file;
-        self.notes
-            .log
-            .note(WarningKind::Unsupported, &message, file, line as usize);
+        self.notes.log.note(kind, message, file, line as usize);
     }
 
     fn push_face(&mut self, corners: &Corners, which: [usize; 3], base: usize, line: u32) {
@@ -584,6 +704,7 @@ impl Import<'_> {
     /// Build the scene, with what was noted while reading before what the builder adds.
     fn finish(mut self, path: &Path) -> Result<Scene, ReadError> {
         let skipped = self.notes.skipped_faces;
+        let foreign_number = self.notes.foreign_number;
         let (file, log) = (self.builder.source.file.clone(), self.notes.log);
         self.builder.warnings = log.into_warnings();
         let first = self
@@ -595,8 +716,19 @@ impl Import<'_> {
         let path = path.to_owned();
         self.builder
             .finish(self.options)
-            .map_err(|error| match error {
-                BuildError::NoFaces { detail } => ReadError::NoFaces {
+            .map_err(|error| match (error, foreign_number) {
+                (BuildError::NoFaces { .. }, Some(ForeignNumber { notation, line }))
+                    if skipped > 0 =>
+                {
+                    let Notation { name, cure } = notation;
+                    ReadError::ForeignNumbers {
+                        line,
+                        notation: name,
+                        cure,
+                        path,
+                    }
+                }
+                (BuildError::NoFaces { detail }, _) => ReadError::NoFaces {
                     detail: match first {
                         Some(first) if skipped > 0 => format!(" ({first})"),
                         _ if detail.is_empty() => format!(" (no face is defined in {file})"),
@@ -604,7 +736,9 @@ impl Import<'_> {
                     },
                     path,
                 },
-                BuildError::TooLarge { count, limit } => ReadError::TooLarge { count, limit, path },
+                (BuildError::TooLarge { count, limit }, _) => {
+                    ReadError::TooLarge { count, limit, path }
+                }
             })
     }
 }
@@ -616,6 +750,32 @@ const DEFAULT_REFLECTANCE: Vec3 = Vec3::splat(0.5);
 /// many periods. Fewer, and the coordinates of neighbours are torn apart where nothing asks for it; many more, and the
 /// digits are gone.
 const NEAR_PERIODS: f64 = 256.0;
+
+/// Why a file is not taken, behind its name.
+fn missing_because(missing: Missing) -> &'static str {
+    match missing {
+        Missing::Absent => "was not found",
+        Missing::Outside => "lies outside the folder of the OBJ file and was not read",
+        Missing::Ambiguous => "fits several files that differ in letter case, so none was read",
+    }
+}
+
+/// Names in one message. Fewer would hide which are meant, more would hide the message.
+const MOST_LISTED: usize = 8;
+
+/// Names in quotes, at most so many of them, and how many more there are.
+fn listed<'a>(names: impl ExactSizeIterator<Item = &'a str>, most: usize) -> String {
+    let more = names.len().saturating_sub(most);
+    let quoted = names
+        .take(most)
+        .map(|name| format!("'{}'", shortened(name)));
+    let listed = quoted.collect::<Vec<_>>().join(", ");
+    match (more, listed.is_empty()) {
+        (0, _) => listed,
+        (_, true) => format!("{more} more"),
+        (_, false) => format!("{listed} and {more} more"),
+    }
+}
 
 /// A name short enough for a message.
 fn shortened(name: &str) -> String {

@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader, Read, Take};
 use std::path::Path;
 use std::time::SystemTime;
 
+use super::encoding::DecodedText;
 use super::lines::split_keyword;
 use super::obj::ReadError;
 
@@ -69,17 +70,17 @@ pub(super) fn open(path: &Path) -> Result<(BufReader<Take<File>>, Watch), ReadEr
     if head.is_empty() {
         return Err(ReadError::Empty { path: path_buf() });
     }
-    if looks_binary(head) {
+    let mut text = Vec::with_capacity(head.len());
+    let decoded = DecodedText::new(head).read_to_end(&mut text);
+    decoded.map_err(unreadable)?;
+    if looks_binary(&text) {
         return Err(ReadError::NotObj { path: path_buf() });
     }
     Ok((reader, watch))
 }
 
-/// Whether the beginning of a file holds no OBJ statement but bytes that text does not have, or is UTF-16.
+/// Whether the beginning of a file holds no OBJ statement but bytes that text does not have.
 fn looks_binary(head: &[u8]) -> bool {
-    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return true;
-    }
     let control = |byte: &u8| *byte < 32 && !byte.is_ascii_whitespace();
     let statement = |line: &[u8]| {
         let (keyword, rest) = split_keyword(line);

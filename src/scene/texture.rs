@@ -1,9 +1,10 @@
 //! Textures: linear RGB pixels, repeated, looked up bilinearly; and their reading from picture files.
 
+use std::ops::{AddAssign, Mul};
 use std::path::Path;
 
-use glam::{Vec2, Vec3};
-use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel};
+use glam::{DVec3, Vec2, Vec3};
+use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel, Primitive, Rgba};
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,15 +48,16 @@ const MAX_SIDE: u32 = 16_384;
 const MAX_DECODED_BYTES: u64 = 1 << 30;
 
 impl Texture {
-    /// Read a picture file: 8 and 16 bits a channel are sRGB, floats are linear. Transparency is ignored.
+    /// Read a picture file: 8 and 16 bits a channel are sRGB, floats are linear.
     ///
     /// # Errors
     /// A clause that says why there is no picture.
-    pub(super) fn read(path: &Path, name: &str) -> Result<Self, String> {
+    pub(super) fn read(path: &Path, name: &str, role: Role) -> Result<Picture, String> {
         let decoded = std::panic::catch_unwind(|| decode(path));
         match decoded {
             Ok(Ok(picture)) if picture.width() > 0 && picture.height() > 0 => {
-                Ok(Self::from_picture(picture, name))
+                Self::from_picture(picture, name, role)
+                    .ok_or_else(|| "all of it is transparent".to_owned())
             }
             Ok(Ok(_)) => Err("it has no pixels".to_owned()),
             Ok(Err(error)) => Err(error.to_string()),
@@ -64,36 +66,43 @@ impl Texture {
     }
 
     /// Linear pixels of a picture, averaged down on the way where it is large: a picture of a few hundred kilobytes
-    /// may hold pixels for gigabytes.
-    fn from_picture(picture: DynamicImage, name: &str) -> Self {
+    /// may hold pixels for gigabytes. Nothing where no pixel shows what it reflects.
+    fn from_picture(picture: DynamicImage, name: &str, role: Role) -> Option<Picture> {
         let table: Vec<f32> = (0..=255_u8)
             .map(|x| linear_from_srgb(f32::from(x) / 255.0))
             .collect();
         let byte = |x: u8| table[usize::from(x)];
         let word = |x: u16| linear_from_srgb(f32::from(x) / 65_535.0);
-        match picture {
+        let texture = match picture {
             DynamicImage::ImageLuma8(pixels) => {
-                averaged(&pixels, name, |pixel| Vec3::splat(byte(pixel.0[0])))
+                averaged(&pixels, |pixel| Vec3::splat(byte(pixel.0[0]))).into_texture(name)
             }
-            DynamicImage::ImageRgba8(pixels) => {
-                averaged(&pixels, name, |pixel| color_of(pixel.0, byte))
+            DynamicImage::ImageLumaA8(_) | DynamicImage::ImageRgba8(_) => {
+                let share = |alpha: u8| f32::from(alpha) / 255.0;
+                return covered(&picture.into_rgba8(), name, role, byte, share);
             }
-            DynamicImage::ImageRgb16(pixels) => {
-                averaged(&pixels, name, |pixel| color_of(pixel.0, word))
+            DynamicImage::ImageLumaA16(_) | DynamicImage::ImageRgba16(_) => {
+                let share = |alpha: u16| f32::from(alpha) / 65_535.0;
+                return covered(&picture.into_rgba16(), name, role, word, share);
             }
-            DynamicImage::ImageLuma16(_)
-            | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgba16(_) => {
-                averaged(&picture.into_rgb16(), name, |pixel| color_of(pixel.0, word))
+            DynamicImage::ImageRgba32F(pixels) => {
+                // What is no number hides nothing.
+                let share = |alpha: f32| if alpha < 1.0 { alpha.max(0.0) } else { 1.0 };
+                return covered(&pixels, name, role, cured, share);
             }
-            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-                averaged(&picture.into_rgb32f(), name, |pixel| {
-                    color_of(pixel.0, cured)
-                })
+            DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_) => {
+                averaged(&picture.into_rgb16(), |pixel| color_of(pixel.0, word)).into_texture(name)
+            }
+            DynamicImage::ImageRgb32F(pixels) => {
+                averaged(&pixels, |pixel| color_of(pixel.0, cured)).into_texture(name)
             }
             // Takes no copy where it is of this kind already.
-            _ => averaged(&picture.into_rgb8(), name, |pixel| color_of(pixel.0, byte)),
-        }
+            _ => averaged(&picture.into_rgb8(), |pixel| color_of(pixel.0, byte)).into_texture(name),
+        };
+        Some(Picture {
+            texture,
+            is_transparent: false,
+        })
     }
 
     /// The picture with sides halved until it has at most so many pixels, but at least one.
@@ -140,12 +149,97 @@ fn color_of<T: Copy, const N: usize>(channels: [T; N], linear: impl Fn(T) -> f32
     Vec3::new(red, green, blue)
 }
 
-/// Means of blocks of pixels, of the smallest power of two that leaves at most [`MAX_PIXELS`].
-fn averaged<P: Pixel>(
-    picture: &ImageBuffer<P, Vec<P::Subpixel>>,
+/// What a picture is for, which decides what its transparent pixels stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Role {
+    /// It reflects: hidden pixels have the mean colour of the others, so that none is too bright or dark by what nobody
+    /// was to see.
+    Reflects,
+    /// It emits: hidden pixels are black.
+    Emits,
+}
+
+impl Role {
+    /// The other one.
+    pub(super) fn other(self) -> Self {
+        match self {
+            Self::Reflects => Self::Emits,
+            Self::Emits => Self::Reflects,
+        }
+    }
+}
+
+/// A picture as it is read.
+pub(super) struct Picture {
+    /// Its colours.
+    pub(super) texture: Texture,
+    /// Whether any pixel is transparent by its alpha, in full or in part.
+    pub(super) is_transparent: bool,
+}
+
+/// Values of pixels or of blocks of them, row by row.
+struct Grid<T> {
+    width: u32,
+    height: u32,
+    values: Vec<T>,
+}
+
+impl Grid<Vec3> {
+    fn into_texture(self, name: &str) -> Texture {
+        Texture {
+            name: name.to_owned(),
+            width: self.width,
+            height: self.height,
+            pixels: self.values,
+        }
+    }
+}
+
+/// A picture with alpha: how much of each pixel is seen. Nothing where it reflects and no pixel is seen at all.
+fn covered<T: Primitive>(
+    picture: &ImageBuffer<Rgba<T>, Vec<T>>,
     name: &str,
-    linear: impl Fn(&P) -> Vec3,
-) -> Texture {
+    role: Role,
+    linear: impl Fn(T) -> f32,
+    share: impl Fn(T) -> f32,
+) -> Option<Picture>
+where
+    Rgba<T>: Pixel<Subpixel = T>,
+{
+    let share_of = |pixel: &Rgba<T>| share(pixel.0[3]);
+    let is_transparent = picture.pixels().any(|pixel| share_of(pixel) < 1.0);
+    let weight = |pixel: &Rgba<T>| match role {
+        Role::Reflects => share_of(pixel),
+        Role::Emits if share_of(pixel) > 0.0 => 1.0,
+        Role::Emits => 0.0,
+    };
+    let mut grid = averaged(picture, |pixel| color_of(pixel.0, &linear) * weight(pixel));
+    if is_transparent && role == Role::Reflects {
+        let seen = averaged(picture, weight);
+        let sum_of_colors: DVec3 = grid.values.iter().map(|color| color.as_dvec3()).sum();
+        let sum_of_shares: f64 = seen.values.iter().copied().map(f64::from).sum();
+        if sum_of_shares <= 0.0 {
+            return None;
+        }
+        let mean = (sum_of_colors / sum_of_shares).as_vec3();
+        for (color, seen) in grid.values.iter_mut().zip(seen.values) {
+            *color = if seen > 0.0 { *color / seen } else { mean };
+        }
+    }
+    Some(Picture {
+        texture: grid.into_texture(name),
+        is_transparent,
+    })
+}
+
+/// Means of blocks of pixels, of the smallest power of two that leaves at most [`MAX_PIXELS`].
+fn averaged<P: Pixel, T>(
+    picture: &ImageBuffer<P, Vec<P::Subpixel>>,
+    value: impl Fn(&P) -> T,
+) -> Grid<T>
+where
+    T: Copy + Default + AddAssign + Mul<f32, Output = T>,
+{
     let sides = |block: u32| {
         (
             picture.width().div_ceil(block),
@@ -159,7 +253,7 @@ fn averaged<P: Pixel>(
         block *= 2;
     }
     let (width, height) = sides(block);
-    let mut pixels = vec![Vec3::ZERO; width as usize * height as usize];
+    let mut values = vec![T::default(); width as usize * height as usize];
     for (y, row) in (0..).zip(picture.rows()) {
         let start = (y / block) as usize * width as usize;
         let above = y / block * block;
@@ -168,14 +262,13 @@ fn averaged<P: Pixel>(
             let left = x / block * block;
             let block_width = (picture.width() - left).min(block);
             let share = 1.0 / (block_width * block_height) as f32;
-            pixels[start + (x / block) as usize] += linear(pixel) * share;
+            values[start + (x / block) as usize] += value(pixel) * share;
         }
     }
-    Texture {
-        name: name.to_owned(),
+    Grid {
         width,
         height,
-        pixels,
+        values,
     }
 }
 
@@ -303,13 +396,64 @@ mod tests {
         let picture = image::GrayImage::from_fn(4097, 4097, |x, y| {
             image::Luma([if x == 4096 || y == 0 { 255 } else { 0 }])
         });
-        let texture = Texture::from_picture(picture.into(), "");
+        let texture = Texture::from_picture(picture.into(), "", Role::Reflects);
+        let texture = texture.unwrap().texture;
         assert_eq!((texture.width, texture.height), (2049, 2049));
         assert!(texture.is_consistent());
         assert_eq!(texture.pixels[0], Vec3::splat(0.5));
         assert_eq!(texture.pixels[2048], Vec3::ONE);
         assert_eq!(texture.pixels[2049], Vec3::ZERO);
         assert_eq!(texture.pixels[2049 * 2049 - 1], Vec3::ONE);
+    }
+
+    /// Red, half transparent blue, hidden white and hidden black.
+    const LEAF: [[u8; 4]; 4] = [
+        [255, 0, 0, 255],
+        [0, 0, 255, 127],
+        [255, 255, 255, 0],
+        [0, 0, 0, 0],
+    ];
+
+    fn leaf() -> image::RgbaImage {
+        image::RgbaImage::from_fn(4, 1, |x, _| Rgba(LEAF[x as usize]))
+    }
+
+    #[test]
+    fn what_is_hidden_has_the_mean_colour_of_what_is_seen() {
+        let picture = DynamicImage::from(leaf());
+        for picture in [
+            picture.clone(),
+            DynamicImage::from(picture.to_rgba16()),
+            // Floats are linear already, and 0 and 1 are the same in both.
+            DynamicImage::from(picture.to_rgba32f()),
+        ] {
+            let read = Texture::from_picture(picture, "", Role::Reflects).unwrap();
+            assert!(read.is_transparent);
+            let half = 127.0 / 255.0;
+            let mean = Vec3::new(1.0, 0.0, half) / (1.0 + half);
+            let expected = [Vec3::X, Vec3::Z, mean, mean];
+            for (pixel, expected) in read.texture.pixels.iter().zip(expected) {
+                assert!(pixel.abs_diff_eq(expected, 1e-5), "{pixel} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_hidden_emits_nothing() {
+        let read = Texture::from_picture(leaf().into(), "", Role::Emits).unwrap();
+        let expected = [Vec3::X, Vec3::Z, Vec3::ZERO, Vec3::ZERO];
+        assert_eq!(read.texture.pixels, expected);
+    }
+
+    #[test]
+    fn alpha_that_hides_nothing_changes_nothing() {
+        let grey = image::GrayAlphaImage::from_pixel(2, 2, image::LumaA([188, 255]));
+        let read = Texture::from_picture(grey.into(), "", Role::Reflects).unwrap();
+        assert!(!read.is_transparent);
+        let expected = Vec3::splat(linear_from_srgb(188.0 / 255.0));
+        assert_eq!(read.texture.pixels, [expected; 4]);
+        let nothing = image::RgbaImage::from_pixel(2, 2, Rgba([255, 255, 255, 0]));
+        assert!(Texture::from_picture(nothing.into(), "", Role::Reflects).is_none());
     }
 
     #[test]

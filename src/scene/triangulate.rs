@@ -12,32 +12,52 @@ pub(super) struct Triangulator {
     plane: Vec<[f64; 2]>,
     ears: Option<earcut::Earcut<f64>>,
     triangles: Vec<u32>,
+    /// Edges by their first corners, in the order of their least x.
+    edges: Vec<u32>,
 }
+
+/// Why the triangles of a polygon may not be what was meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Doubt {
+    /// It is not convex and has too many corners to be cut well.
+    TooManyCorners,
+    /// Its edges cross each other, as those of a bow tie.
+    CrossesItself,
+}
+
+/// How far both of two edges must reach beyond each other to cross, as a share of the polygon's extent. Smaller, and
+/// corners that only touch an edge cross it by the rounding of the file's digits; larger, and crossings of thin parts are
+/// missed.
+const CROSSING_DEPTH: f64 = 1e-5;
 
 impl Triangulator {
     /// Cut a polygon; the result indexes its corners, keeps their winding, and has no triangle without area unless it
-    /// is the only one. Also returns whether the polygon had too many corners to be cut well.
-    pub(super) fn cut(&mut self, polygon: &[DVec3]) -> (&[u32], bool) {
+    /// is the only one.
+    pub(super) fn cut(&mut self, polygon: &[DVec3]) -> (&[u32], Option<Doubt>) {
         self.triangles.clear();
         let count = polygon.len();
         self.project(polygon);
         let convex = self.is_convex();
-        let too_many = !convex && count > MAX_CLIPPED_CORNERS;
-        if !convex && !too_many {
+        let doubt = if convex {
+            None
+        } else if count > MAX_CLIPPED_CORNERS {
+            Some(Doubt::TooManyCorners)
+        } else {
             self.clip();
-        }
+            self.crosses_itself().then_some(Doubt::CrossesItself)
+        };
         if self.triangles.is_empty() {
             let fan = (2..count as u32).flat_map(|last| [0, last - 1, last]);
             self.triangles.extend(fan);
         }
         self.drop_slivers(polygon);
-        (&self.triangles, too_many)
+        (&self.triangles, doubt)
     }
 
     /// Fill [`Self::plane`] such that the polygon runs counter-clockwise.
     fn project(&mut self, polygon: &[DVec3]) {
         let origin = polygon.first().copied().unwrap_or_default();
-        let normal = newell_normal(polygon, origin);
+        let normal = normal_of(polygon, origin);
         let size = normal.abs();
         let flat = |point: DVec3| {
             if size.x >= size.y && size.x >= size.z {
@@ -85,6 +105,32 @@ impl Triangulator {
         descents + usize::from(was_right != first_right) <= 2
     }
 
+    /// Whether edges of [`Self::plane`] cross each other.
+    fn crosses_itself(&mut self) -> bool {
+        let count = self.plane.len();
+        let point = |index: usize| DVec2::from_array(self.plane[index % count]);
+        let edge = |first: u32| [point(first as usize), point(first as usize + 1)];
+        let (min, max) = (0..count)
+            .map(point)
+            .fold((DVec2::MAX, DVec2::MIN), |(min, max), at| {
+                (min.min(at), max.max(at))
+            });
+        let depth = CROSSING_DEPTH * (max - min).max_element();
+        let edges = &mut self.edges;
+        edges.clear();
+        edges.extend(0..count as u32);
+        let least = |first: u32| edge(first)[0].x.min(edge(first)[1].x);
+        edges.sort_unstable_by(|&one, &other| least(one).total_cmp(&least(other)));
+        edges.iter().enumerate().any(|(place, &one)| {
+            let [a, b] = edge(one);
+            edges[place + 1..]
+                .iter()
+                .map(|&other| edge(other))
+                .take_while(|[c, d]| c.x.min(d.x) < a.x.max(b.x))
+                .any(|[c, d]| cross_deeply([a, b], [c, d], depth))
+        })
+    }
+
     /// Clip ears of [`Self::plane`] into [`Self::triangles`], wound as the polygon is.
     fn clip(&mut self) {
         let ears = self.ears.get_or_insert_with(earcut::Earcut::new);
@@ -114,6 +160,37 @@ impl Triangulator {
             }
         }
         self.triangles.truncate(kept.max(3));
+    }
+}
+
+/// Whether each of two edges has its ends on both sides of the other's line, at least so far away from it.
+fn cross_deeply([a, b]: [DVec2; 2], [c, d]: [DVec2; 2], depth: f64) -> bool {
+    if c.y.max(d.y) < a.y.min(b.y) || c.y.min(d.y) > a.y.max(b.y) {
+        return false;
+    }
+    let parts = |from: DVec2, to: DVec2, points: [DVec2; 2]| {
+        let along = to - from;
+        let [one, other] = points.map(|point| along.perp_dot(point - from));
+        let far = depth * along.length();
+        one.min(other) < -far && one.max(other) > far
+    };
+    parts(a, b, [c, d]) && parts(c, d, [a, b])
+}
+
+/// A vector across a polygon: twice its area vector, or what is across its widest corner where the parts of the area
+/// cancel each other, as in a bow tie.
+fn normal_of(polygon: &[DVec3], origin: DVec3) -> DVec3 {
+    let normal = newell_normal(polygon, origin);
+    let count = polygon.len();
+    let corner = |index: usize| {
+        let [a, b, c] = [0, 1, 2].map(|next| polygon[(index + next) % count]);
+        (b - a).cross(c - b)
+    };
+    let is_wider = |a: &DVec3, b: &DVec3| a.length_squared().total_cmp(&b.length_squared());
+    match (0..count).map(corner).max_by(is_wider) {
+        // Rounding leaves about 1e-16 of it.
+        Some(widest) if normal.length() < 1e-9 * widest.length() => widest,
+        _ => normal,
     }
 }
 
@@ -165,9 +242,9 @@ mod tests {
             for count in [8, 10_000] {
                 let polygon = star(count, right, up);
                 let mut triangulator = Triangulator::default();
-                let (triangles, too_many) = triangulator.cut(&polygon);
+                let (triangles, doubt) = triangulator.cut(&polygon);
                 let normal = right.cross(up);
-                assert!(!too_many);
+                assert_eq!(doubt, None);
                 for t in triangles.chunks_exact(3) {
                     let [a, b, c] = [0, 1, 2].map(|corner| polygon[t[corner] as usize]);
                     assert!((b - a).cross(c - a).dot(normal) > 0.0, "{right} {up}");
@@ -185,6 +262,75 @@ mod tests {
         let polygon = corners.map(|[x, y]| DVec3::new(x, y, 0.0));
         let mut triangulator = Triangulator::default();
         assert_eq!(triangulator.cut(&polygon).0, [0, 2, 3, 0, 3, 4]);
+    }
+
+    #[test]
+    fn polygons_that_cross_themselves_are_told() {
+        // Named, corners in the plane, and whether edges cross.
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let cases: [(&str, Vec<[f64; 2]>, bool); 8] = [
+            ("square", square.to_vec(), false),
+            ("bow tie", [0, 2, 1, 3].map(|k| square[k]).to_vec(), true),
+            (
+                "bow tie of unequal wings",
+                vec![[0.0, 0.0], [3.0, 0.0], [1.0, 1.0], [2.0, 1.0]],
+                true,
+            ),
+            (
+                "pentagram",
+                (0..5)
+                    .map(|k| (f64::from(k) * 0.8 * std::f64::consts::PI).sin_cos().into())
+                    .collect(),
+                true,
+            ),
+            (
+                "arrow",
+                vec![[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.5, 1.0]],
+                false,
+            ),
+            (
+                "hole behind a bridge",
+                vec![
+                    [0.0, 0.0],
+                    [9.0, 0.0],
+                    [9.0, 9.0],
+                    [0.0, 9.0],
+                    [0.0, 0.0],
+                    [3.0, 3.0],
+                    [3.0, 6.0],
+                    [6.0, 6.0],
+                    [6.0, 3.0],
+                    [3.0, 3.0],
+                ],
+                false,
+            ),
+            (
+                "corner on another edge but for rounding",
+                vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, -1e-6], [0.0, 4.0]],
+                false,
+            ),
+            (
+                "corner beyond another edge",
+                vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, -0.1], [0.0, 4.0]],
+                true,
+            ),
+        ];
+        for (name, corners, crosses) in cases {
+            for turned in 0..3 {
+                let polygon: Vec<DVec3> = corners
+                    .iter()
+                    .map(|&[x, y]| {
+                        let mut place = [x, y, 0.5];
+                        place.rotate_right(turned);
+                        DVec3::from_array(place)
+                    })
+                    .collect();
+                let mut triangulator = Triangulator::default();
+                let (_, doubt) = triangulator.cut(&polygon);
+                let expected = crosses.then_some(Doubt::CrossesItself);
+                assert_eq!(doubt, expected, "{name}, turned {turned} times");
+            }
+        }
     }
 
     #[test]

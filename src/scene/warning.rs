@@ -15,7 +15,7 @@ pub enum WarningKind {
     TextureMissing,
     /// A value was brought into its range, such as a reflectance above the clamp.
     ValueClamped,
-    /// Bytes that are not UTF-8 were replaced.
+    /// The file is not UTF-8: it was decoded, or bytes were replaced.
     Encoding,
     /// A feature of the file that vecrad does not use (transparency, NURBS, …).
     Unsupported,

@@ -1,0 +1,110 @@
+//! Rooms far from the origin, as surveyors place them: the light in them is that of the same room at the origin.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{fmt::Write as _, fs, sync::Arc};
+
+use glam::{DMat3, DVec3, Vec3};
+use vecrad::{
+    scene::{SceneOptions, read_obj},
+    solver::{Cancel, SolveSettings, Solver},
+};
+
+/// A room of 4 × 4 × 3 with a lamp under its ceiling and a box on its floor, turned and moved, as an OBJ file.
+fn room(turned: DMat3, origin: DVec3) -> String {
+    let mut text = String::from("mtllib a.mtl\n");
+    let mut cuboid = |low: DVec3, high: DVec3, is_inward: bool| {
+        for corner in 0..8 {
+            let pick = |bit: usize, axis: usize| {
+                let end = if corner & bit == 0 { low } else { high };
+                end[axis]
+            };
+            let at = turned * DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)) + origin;
+            writeln!(text, "v {:.7} {:.7} {:.7}", at.x, at.y, at.z).unwrap();
+        }
+        for mut face in [
+            [1, 3, 4, 2],
+            [5, 6, 8, 7],
+            [1, 2, 6, 5],
+            [3, 7, 8, 4],
+            [1, 5, 7, 3],
+            [2, 4, 8, 6],
+        ] {
+            if is_inward {
+                face.reverse();
+            }
+            let [a, b, c, d] = face.map(|corner| corner - 9);
+            writeln!(text, "f {a} {b} {c} {d}").unwrap();
+        }
+    };
+    cuboid(DVec3::ZERO, DVec3::new(4.0, 4.0, 3.0), true);
+    cuboid(DVec3::new(1.0, 1.2, 0.0), DVec3::new(1.5, 2.0, 0.8), false);
+    text += "usemtl lamp\n";
+    for [x, y] in [[1.5, 1.5], [1.5, 2.5], [2.5, 2.5], [2.5, 1.5]] {
+        let at = turned * DVec3::new(x, y, 2.9) + origin;
+        writeln!(text, "v {:.7} {:.7} {:.7}", at.x, at.y, at.z).unwrap();
+    }
+    text + "f -4 -3 -2 -1\n"
+}
+
+/// Irradiance at the vertices, and where these are from the middle of the room.
+fn lit(turned: DMat3, origin: DVec3) -> Vec<(Vec3, Vec3)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.obj");
+    fs::write(&path, room(turned, origin)).unwrap();
+    fs::write(folder.path().join("a.mtl"), "newmtl lamp\nKd 0\nKe 10\n").unwrap();
+    let scene = Arc::new(read_obj(&path, &SceneOptions::default()).unwrap());
+    let settings = SolveSettings {
+        epsilon: 0.2,
+        max_steps: 1,
+        ..SolveSettings::draft()
+    };
+    let mut solver = Solver::new(scene, settings, None, &Cancel::default()).unwrap();
+    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    let snapshot = solver.snapshot();
+    let positions = snapshot.mesh.positions.iter().copied();
+    let irradiance = snapshot.light.irradiance.iter().copied();
+    positions.zip(irradiance).collect()
+}
+
+/// Root mean square difference of irradiance as a share of its root mean square.
+fn difference(found: &[(Vec3, Vec3)], expected: &[(Vec3, Vec3)]) -> f32 {
+    let squares = |vectors: &mut dyn Iterator<Item = Vec3>| -> f32 {
+        vectors.map(Vec3::length_squared).sum()
+    };
+    let pairs = found.iter().zip(expected);
+    let difference = squares(&mut pairs.map(|(found, expected)| found.1 - expected.1));
+    (difference / squares(&mut expected.iter().map(|(_, irradiance)| *irradiance))).sqrt()
+}
+
+#[test]
+fn light_does_not_depend_on_where_the_room_lies() {
+    // Sides parallel to the axes and not.
+    let tilted = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 2.0) / 3.0, 0.7);
+    for (turned, origins) in [
+        (
+            DMat3::IDENTITY,
+            &[DVec3::new(412_345.678, 5_812_345.432, 123.4)][..],
+        ),
+        (
+            tilted,
+            &[
+                DVec3::new(4_075_539.8, 931_735.2, 4_801_629.6),
+                DVec3::new(-1e9, 1e9 + 0.5, 1e9),
+            ],
+        ),
+    ] {
+        let expected = lit(turned, DVec3::ZERO);
+        for &origin in origins {
+            let found = lit(turned, origin);
+            assert_eq!(found.len(), expected.len(), "{origin}");
+            for (found, expected) in found.iter().zip(&expected) {
+                // In frame units, of which the room is 100 long.
+                assert!(found.0.abs_diff_eq(expected.0, 1e-3), "{origin}");
+            }
+            // Doubles are 1e-7 apart at 1e9, so some shadow rays meet something else: 2.3e-5 there, 7e-6 before.
+            let difference = difference(&found, &expected);
+            assert!(difference < 1e-4, "{origin}: {difference}");
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! Files as other systems, other programs and hands write them: encodings, notations, names, paths, habits. What is meant is
+//! read, and what cannot be is named once.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{fs, path::Path};
+
+use glam::Vec3;
+use tempfile::TempDir;
+use vecrad::scene::{ReadError, Scene, SceneOptions, WarningKind, read_obj};
+
+/// A square with texture coordinates.
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+
+/// Brown, as sRGB bytes and as reflectance.
+const BROWN: [u8; 3] = [188, 137, 99];
+
+fn brown() -> Vec3 {
+    let linear = |code: u8| ((f32::from(code) / 255.0 + 0.055) / 1.055).powf(2.4);
+    Vec3::from_array(BROWN.map(linear))
+}
+
+/// A folder with these text files and brown pictures.
+fn folder(files: &[(&str, &str)], pictures: &[&str]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    for name in pictures {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let picture = image::RgbImage::from_pixel(2, 2, image::Rgb(BROWN));
+        picture.save(path).unwrap();
+    }
+    folder
+}
+
+fn try_read(folder: &Path) -> Result<Scene, ReadError> {
+    read_obj(&folder.join("scene.obj"), &SceneOptions::default())
+}
+
+fn read(folder: &TempDir) -> Scene {
+    try_read(folder.path()).unwrap()
+}
+
+/// What is said but that there is no light.
+fn said(scene: &Scene) -> Vec<String> {
+    let warnings = scene.warnings.iter();
+    let others = warnings.filter(|warning| warning.kind != WarningKind::NoEmitter);
+    others.map(ToString::to_string).collect()
+}
+
+fn assert_near(found: Vec3, expected: Vec3, context: &str) {
+    assert!(
+        found.abs_diff_eq(expected, 1e-4),
+        "{context}: {found} for {expected}"
+    );
+}
+
+/// A square of material `m` that an MTL file of this text defines.
+fn textured(mtl: &str, pictures: &[&str]) -> (TempDir, Scene) {
+    let obj = format!("mtllib a.mtl\n{SQUARE}usemtl m\nf 1/1 2/2 3/3 4/4\n");
+    let folder = folder(&[("scene.obj", &obj), ("a.mtl", mtl)], pictures);
+    let scene = read(&folder);
+    (folder, scene)
+}
+
+#[test]
+fn utf16_is_read_and_told_once() {
+    let obj = format!("mtllib a.mtl\r\n{SQUARE}usemtl 床\r\nf 1 2 3 4\r\n");
+    let mtl = "newmtl 床\r\nKd 0.25 0.5 0.75\r\n";
+    let encoded = |text: &str, mark: &str, bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        let text = format!("{mark}{text}");
+        text.encode_utf16().flat_map(bytes).collect()
+    };
+    for (mark, bytes) in [
+        ("\u{feff}", u16::to_le_bytes as fn(u16) -> [u8; 2]),
+        ("\u{feff}", u16::to_be_bytes),
+        ("", u16::to_le_bytes),
+    ] {
+        let folder = folder(&[], &[]);
+        fs::write(folder.path().join("scene.obj"), encoded(&obj, mark, bytes)).unwrap();
+        fs::write(folder.path().join("a.mtl"), encoded(mtl, mark, bytes)).unwrap();
+        let scene = read(&folder);
+        assert_eq!(scene.triangles.len(), 2);
+        assert_eq!(scene.materials[0].name, "床");
+        assert_near(
+            scene.surfaces[0].reflectance,
+            Vec3::new(0.25, 0.5, 0.75),
+            mark,
+        );
+        let expected = "scene.obj:1: the file is UTF-16, which many programs cannot read, and was decoded (2 times)";
+        assert_eq!(said(&scene), [expected]);
+    }
+}
+
+#[test]
+fn numbers_in_other_notations_are_named_with_their_first_line() {
+    let comma = "# a\nv 0,000 0,000 0\nv 1,5 0 0\nv 0 1 0\nf 1 2 3\n";
+    let fortran = "v 0 0 0\nv 1.0D+00 0 0\nv 0 1.0d0 0\nf 1 2 3\n";
+    for (text, expected) in [
+        (
+            comma,
+            "line 2 has a decimal comma in a vertex, so no usable faces are left; export with decimal points: ",
+        ),
+        (
+            fortran,
+            "line 2 has a D exponent in a vertex, so no usable faces are left; export with E exponents: ",
+        ),
+    ] {
+        let folder = folder(&[("scene.obj", text)], &[]);
+        let error = try_read(folder.path()).unwrap_err().to_string();
+        assert!(
+            error.starts_with(expected) && error.ends_with("scene.obj"),
+            "{error}"
+        );
+    }
+    // Where other faces remain, it is a warning.
+    let text = format!("{SQUARE}v 1,5 0 0\nv 2,5 0 0\nf 1 2 3 4\nf 1 2 5\nf 1 2 6\n");
+    let folder = folder(&[("scene.obj", &text)], &[]);
+    let expected = [
+        "scene.obj:9: vertex with a decimal comma; faces that use it are left out; export with decimal points (2 times)",
+        "scene.obj:12: skipped a face: a corner is not a finite number (2 times)",
+    ];
+    assert_eq!(said(&read(&folder)), expected);
+}
+
+#[test]
+fn names_match_whatever_space_or_comment_ends_them() {
+    for (library, defined, used) in [
+        ("a.mtl", "床　木　", "床　木　"),
+        ("a.mtl", "lamp\u{a0}", "lamp"),
+        ("a.mtl", "lamp", "lamp\u{2003}"),
+        ("a.mtl", "\u{3000}", "\u{3000}"),
+        ("a.mtl # materials", "lamp   # 60 W", "lamp"),
+        ("a.mtl\u{3000}", "lamp", "lamp # 60 W"),
+        ("\"a.mtl\"", "lamp #2", "lamp #2"),
+        ("none.mtl a.mtl # two", "lamp\t# 60 W", "lamp # warm"),
+    ] {
+        let obj = format!("mtllib {library}\n{SQUARE}usemtl {used}\nf 1 2 3 4\n");
+        let mtl = format!("newmtl other\nKd 0 0 0\nnewmtl {defined}\nKd 0.1 0.2 0.3\n");
+        let folder = folder(&[("scene.obj", &obj), ("a.mtl", &mtl)], &[]);
+        let scene = read(&folder);
+        let expected = Vec3::new(0.1, 0.2, 0.3);
+        assert_near(scene.surfaces[0].reflectance, expected, used);
+        let missing = usize::from(library.starts_with("none"));
+        assert_eq!(said(&scene).len(), missing, "{:?}", said(&scene));
+    }
+}
+
+#[test]
+fn a_material_of_several_spellings_is_one() {
+    let obj = format!("mtllib a.mtl\n{SQUARE}usemtl a # one\nf 1 2 3\nusemtl a # two\nf 1 3 4\n");
+    let files = [
+        ("scene.obj", &*obj),
+        ("a.mtl", "newmtl a\nKd 0.1 0.1 0.1\n"),
+    ];
+    let scene = read(&folder(&files, &[]));
+    assert_eq!(scene.materials.len(), 1);
+    assert_eq!(scene.triangles[0].material, scene.triangles[1].material);
+}
+
+#[test]
+fn objects_lose_comments_but_keep_numbers() {
+    let faces = "f 1 2 3\n";
+    let obj = format!("{SQUARE}o chair # oak\n{faces}o Window #3\nf 1 3 4\n");
+    let scene = read(&folder(&[("scene.obj", &obj)], &[]));
+    let names = scene.objects.iter().map(|object| &*object.name);
+    assert_eq!(names.collect::<Vec<_>>(), ["chair", "Window #3"]);
+}
+
+#[test]
+fn textures_are_found_by_what_their_names_mean() {
+    let files = [
+        "textures/wood/floor.png",
+        "my floor.png",
+        "wood #2.png",
+        "holz/Bodenbela\u{308}ge.png",
+    ];
+    for name in [
+        "Textures/Wood/Floor.PNG",
+        "C:\\Projects\\house\\textures\\wood\\floor.png",
+        "/home/me/house/Textures/wood/floor.png",
+        "\\\\server\\share\\Textures\\wood\\floor.png",
+        "my floor.png -s 2 2 1",
+        "-s 2 2 1 \"my floor.png\" -clamp off # oak",
+        "-colorspace sRGB my floor.png",
+        "my floor.png\t# oak",
+        "wood #2.png",
+        "-o 0.5 wood #2.png -bm 1",
+        "holz/Bodenbel\u{e4}ge.png",
+        "D:/HOLZ/BODENBEL\u{c4}GE.PNG\u{3000}",
+    ] {
+        let (_folder, scene) = textured(&format!("newmtl m\nKd 1 1 1\nmap_Kd {name}\n"), &files);
+        let is_told = name.contains("colorspace");
+        assert_eq!(
+            said(&scene).len(),
+            usize::from(is_told),
+            "{:?}",
+            said(&scene)
+        );
+        assert_near(scene.surfaces[0].reflectance, brown(), name);
+    }
+}
+
+#[test]
+fn a_texture_that_is_nowhere_is_named_without_its_options() {
+    let mtl = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd none.png -s 2 2 1 # oak\n";
+    let (_folder, scene) = textured(mtl, &[]);
+    let expected = "a.mtl:1: texture 'none.png' was not found; the plain colour is used";
+    assert_eq!(said(&scene), [expected]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_name_that_fits_several_files_finds_none() {
+    let mtl = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd FLOOR.png\n";
+    let (_folder, scene) = textured(mtl, &["floor.png", "Floor.png"]);
+    let expected = "a.mtl:1: texture 'FLOOR.png' fits several files that differ in letter case, so none was read; the plain colour is used";
+    assert_eq!(said(&scene), [expected]);
+}
+
+#[test]
+fn black_beside_a_picture_means_the_picture_alone() {
+    for colors in ["Kd 0 0 0\nKe 0 0 0", "Kd 0\nKe 0", "", "Kd 1 1 1\nKe 1 1 1"] {
+        let mtl = format!("newmtl m\n{colors}\nmap_Kd floor.png\nmap_Ke floor.png\n");
+        let (_folder, scene) = textured(&mtl, &["floor.png"]);
+        assert_near(scene.surfaces[0].reflectance, brown(), colors);
+        assert_near(scene.surfaces[0].emission, brown(), colors);
+        assert!(said(&scene).is_empty(), "{:?}", said(&scene));
+    }
+    let (_folder, scene) = textured("newmtl m\nKd 0 0 0\nKe 0 0 0\n", &[]);
+    assert_eq!(scene.surfaces[0].reflectance, Vec3::ZERO);
+    assert_eq!(scene.surfaces[0].emission, Vec3::ZERO);
+}
+
+#[test]
+fn transparency_is_told_once_and_for_which_materials() {
+    let materials = [
+        ("Glass", "d 0.3"),
+        ("Wall", "illum 4\nd 1"),
+        ("Floor", "illum 4\nTf 1 1 1"),
+        ("Pane", "Tr 0.9"),
+        ("Unused", "d 0.1"),
+        ("Plain", "illum 2\nd 1\nTr 0"),
+    ];
+    let mut obj = format!("mtllib a.mtl\n{SQUARE}");
+    let mut mtl = String::new();
+    for (number, (name, statements)) in (5..).step_by(3).zip(materials) {
+        mtl += &format!("newmtl {name}\nKd 0.5\n{statements}\n");
+        if name != "Unused" {
+            obj += &format!("v 0 0 {number}\nv 1 0 {number}\nv 0 1 {number}\n");
+            obj += &format!("usemtl {name}\nf -3 -2 -1\n");
+        }
+    }
+    let scene = read(&folder(&[("scene.obj", &obj), ("a.mtl", &mtl)], &[]));
+    let expected = "a.mtl:1: transparency is not computed; treated as opaque: 'Glass' (d), 'Wall', 'Floor' (illum 4), 'Pane' (Tr)";
+    assert_eq!(said(&scene), [expected]);
+}
+
+#[test]
+fn alpha_of_a_picture_counts_as_transparency_and_hidden_colours_do_not() {
+    let folder = folder(
+        &[
+            (
+                "a.mtl",
+                "newmtl Leaf\nKd 1 1 1\nmap_Kd leaf.png\nmap_Ke leaf.png\n",
+            ),
+            (
+                "scene.obj",
+                &format!("mtllib a.mtl\n{SQUARE}usemtl Leaf\nf 1/1 2/2 3/3 4/4\n"),
+            ),
+        ],
+        &[],
+    );
+    // A brown column among hidden white ones.
+    let leaf = image::RgbaImage::from_fn(8, 8, |x, _| match x {
+        3 => image::Rgba([BROWN[0], BROWN[1], BROWN[2], 255]),
+        _ => image::Rgba([255, 255, 255, 0]),
+    });
+    leaf.save(folder.path().join("leaf.png")).unwrap();
+    let scene = read(&folder);
+    let expected =
+        "a.mtl:1: transparency is not computed; treated as opaque: 'Leaf' (alpha of map_Kd)";
+    assert_eq!(said(&scene), [expected]);
+    for surface in &scene.surfaces {
+        assert_near(surface.reflectance, brown(), "reflectance");
+    }
+    // One column of eight emits; triangles are half of the square each.
+    let emission: Vec3 = scene.surfaces.iter().map(|s| s.emission * 0.5).sum();
+    assert!(emission.abs_diff_eq(brown() / 8.0, 0.01), "{emission}");
+}
+
+#[test]
+fn white_beside_a_brown_picture_is_no_clamped_reflectance() {
+    let (_folder, scene) = textured("newmtl m\nKd 1 1 1\nmap_Kd floor.png\n", &["floor.png"]);
+    assert!(said(&scene).is_empty(), "{:?}", said(&scene));
+    assert_near(scene.surfaces[0].reflectance, brown(), "as it is");
+    let (_folder, scene) = textured("newmtl m\nKd 1 1 1\n", &[]);
+    assert_eq!(said(&scene).len(), 1);
+    assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.98));
+}
+
+#[test]
+fn a_face_that_crosses_itself_is_named_with_its_line() {
+    let obj = format!("{SQUARE}f 1 2 3 4\nf 1/1 3/3 2/2 4/4\n");
+    let scene = read(&folder(&[("scene.obj", &obj)], &[]));
+    let said = said(&scene);
+    let crossing: Vec<_> = said.iter().filter(|said| said.contains("cross")).collect();
+    let expected = "scene.obj:10: the edges of a face cross each other, so it is unclear what it covers; put its corners in order";
+    assert_eq!(crossing, [expected]);
+}
