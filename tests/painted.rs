@@ -270,7 +270,10 @@ fn paths_see_lamps_where_they_are_painted() {
     println!("{chi} {sum} {} {right}", variance.sqrt());
     assert!(chi < 1.5, "{chi}: errors beyond their noise");
     // Four standard errors, and what the blurred rims of the lamps change.
-    assert!(sum.abs() < 4.0 * variance.sqrt() + 1e-3 * right, "{sum} of {right}");
+    assert!(
+        sum.abs() < 4.0 * variance.sqrt() + 1e-3 * right,
+        "{sum} of {right}"
+    );
 }
 
 const FLOOR: f64 = 4.0;

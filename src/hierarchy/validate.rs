@@ -63,7 +63,8 @@ impl Hierarchy {
                 continue;
             }
             let count = f32::from(element.child_count);
-            let mean = |of: &dyn Fn(usize) -> Vec3| element.children().map(of).sum::<Vec3>() / count;
+            let mean =
+                |of: &dyn Fn(usize) -> Vec3| element.children().map(of).sum::<Vec3>() / count;
             for (own, mean) in [
                 (
                     self.reflectance_of(index),

@@ -6,8 +6,8 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::crossings::cut_crossings;
-use super::sidedness::{self, Shells};
 use super::means::TextureAverages;
+use super::sidedness::{self, Shells};
 use super::texture::{MAX_SAMPLES, cured};
 use super::{
     Appearance, Frame, Material, MaterialId, Object, Scene, SizeClasses, Spared, Surface, Texture,

@@ -173,12 +173,19 @@ mod tests {
     fn a_part_of_a_part_is_looked_at_closely() {
         let scene = scene();
         // The right half of the base.
-        let right = [Vec3::new(0.45, 0.55, 0.0), Vec3::Y, Vec3::new(0.4, 0.6, 0.0)];
+        let right = [
+            Vec3::new(0.45, 0.55, 0.0),
+            Vec3::Y,
+            Vec3::new(0.4, 0.6, 0.0),
+        ];
         for quarter in scene.texture_quarters(TriangleId(0), right) {
-            assert_eq!(quarter, TextureMeans {
-                reflectance: Vec3::ZERO,
-                emission: Vec3::ZERO,
-            });
+            assert_eq!(
+                quarter,
+                TextureMeans {
+                    reflectance: Vec3::ZERO,
+                    emission: Vec3::ZERO,
+                }
+            );
         }
     }
 }

@@ -323,7 +323,9 @@ impl Emitter {
         let patch = hierarchy.patch_of(element);
         let at = &mesh.elements[element];
         Self {
-            vertices: at.vertices.map(|vertex| mesh.vertices[vertex as usize].point),
+            vertices: at
+                .vertices
+                .map(|vertex| mesh.vertices[vertex as usize].point),
             corners: mesh.corners(element),
             normal: patch.normal,
             area: at.area_vector.length(),

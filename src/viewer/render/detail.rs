@@ -147,7 +147,8 @@ impl DetailSet {
             let appearance = appearances.get(index).copied();
             let appearance = appearance.unwrap_or_else(|| Appearance::of(material));
             let colors = [appearance.reflectance, appearance.emission];
-            let (mut views, mut factors) = ([self.white.clone(), self.white.clone()], [[0.0; 4]; 2]);
+            let (mut views, mut factors) =
+                ([self.white.clone(), self.white.clone()], [[0.0; 4]; 2]);
             for (kind, texture) in textures.into_iter().enumerate() {
                 let Some(texture) = texture.map(TextureId::index) else {
                     continue;
@@ -157,8 +158,13 @@ impl DetailSet {
                 let factor = (colors[kind] * uploaded.scale).extend(1.0);
                 (views[kind], factors[kind]) = (uploaded.view.clone(), factor.to_array());
             }
-            self.textured
-                .push(bind_group(gpu, &self.layout, sampler, [&views[0], &views[1]], factors));
+            self.textured.push(bind_group(
+                gpu,
+                &self.layout,
+                sampler,
+                [&views[0], &views[1]],
+                factors,
+            ));
             self.group_of[index] = self.textured.len();
         }
     }
