@@ -251,7 +251,8 @@ mod tests {
         let parts: Vec<usize> = lamps
             .flat_map(|patch| hierarchy.emitting_parts(patch))
             .collect();
-        let whole = hierarchy.area as f32 / 2.0;
+        let patches = hierarchy.patches.iter();
+        let whole = patches.map(|patch| patch.area).sum::<f32>() / 2.0;
         let area = |part: &usize| hierarchy.mesh.elements[*part].area_vector.length() / whole;
         let power = |part: &usize| area(part) * hierarchy.emission_of(*part).x / 2.0;
         (
