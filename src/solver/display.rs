@@ -167,7 +167,7 @@ impl Solver {
     /// Largest radiosity by channel: no irradiance can be larger.
     fn brightest(&self) -> Vec4 {
         let sampled = |leaf: usize| match self.is_sampled(leaf) {
-            true => (self.hierarchy.patch_of(leaf).emission * PI).extend(0.0),
+            true => (self.hierarchy.emission_of(leaf) * PI).extend(0.0),
             false => Vec4::ZERO,
         };
         let mesh = &self.hierarchy.mesh;
