@@ -381,9 +381,12 @@ impl Hierarchy {
     /// The part of the scene's area that an element, or a point on it that stands for so much area, has for errors of what
     /// it receives, 0…1. What is huge beside all that counts is as large as that.
     pub fn share_of_area(&self, element: usize, area: f32) -> f32 {
-        let weight = self
-            .importance
-            .weight(self.mesh.elements[element].patch as usize);
+        let patch = self.mesh.elements[element].patch as usize;
+        let weight = match self.emission_of(element) == Vec3::ZERO {
+            // Of a painted lamp, too.
+            true => 1.0,
+            false => self.importance.weight(patch),
+        };
         let share = f64::from(area * weight) / self.importance.area.max(f64::MIN_POSITIVE);
         share.min(1.0) as f32
     }
