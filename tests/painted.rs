@@ -85,7 +85,7 @@ fn errors(
         errors.push(f64::from(error));
         sum += f64::from(right.max_element());
     }
-    assert!(errors.len() > 100, "{} vertices", errors.len());
+    assert!(errors.len() > 15, "{} vertices", errors.len());
     errors.sort_unstable_by(f64::total_cmp);
     let high = errors[errors.len() * 19 / 20];
     [
@@ -185,19 +185,20 @@ fn is_told(point: DVec3) -> bool {
 
 #[test]
 fn light_comes_from_where_lamps_are_painted() {
-    for (has_speck, direct, most) in [
-        (false, Direct::Sampled, [0.9, 0.9]),
-        (false, Direct::Linked, [0.9, 0.9]),
-        (true, Direct::Sampled, [0.9, 0.9]),
-        (true, Direct::Linked, [0.9, 0.9]),
-        (true, Direct::Auto, [0.9, 0.9]),
+    // Measured: at most 0.0096 and 0.018.
+    let most = [0.0145, 0.027];
+    for (has_speck, direct) in [
+        (false, Direct::Sampled),
+        (false, Direct::Linked),
+        (true, Direct::Sampled),
+        (true, Direct::Linked),
+        (true, Direct::Auto),
     ] {
         let scene = painted_room(has_speck);
         let shown = solver(&scene, direct).snapshot();
         let right =
             |point: DVec3| is_told(point).then(|| on_floor(point, CEILING, Vec3::splat(4.0)));
         let found = errors(&scene, &shown, Vec3::Z, right);
-        println!("{direct:?} {has_speck} {found:?}");
         assert!(
             found[0] < most[0] && found[1] < most[1],
             "{direct:?}, speck {has_speck}: mean and high errors {found:?}"
@@ -223,9 +224,9 @@ fn painted_lamps_are_dimmed_and_coloured_with_their_material() {
         solver.finish_relighting(&Cancel::default()).unwrap();
         let right = |point: DVec3| is_told(point).then(|| on_floor(point, painted, Vec3::ZERO));
         let found = errors(&scene, &solver.snapshot(), Vec3::Z, right);
-        println!("{direct:?} {found:?}");
         assert!(
-            found[0] < 0.03 && found[1] < 0.15,
+            // Measured: 0.0081 and 0.0145.
+            found[0] < 0.012 && found[1] < 0.022,
             "{direct:?}: mean and high errors {found:?}"
         );
         let off: Vec<Appearance> = wished
@@ -270,7 +271,6 @@ fn paths_see_lamps_where_they_are_painted() {
     }
     assert!(count > 400, "{count}");
     let chi = squares / f64::from(count);
-    println!("{chi} {sum} {} {right}", variance.sqrt());
     assert!(chi < 1.3, "{chi}: errors beyond their noise");
     // Four standard errors, and what the blurred rims of the lamps change.
     assert!(
@@ -280,15 +280,16 @@ fn paths_see_lamps_where_they_are_painted() {
 }
 
 const FLOOR: f64 = 4.0;
+/// In the plane of the wall above it, so that it lights the floor and not the wall.
 const LAMP: [DVec3; 4] = [
-    DVec3::new(1.5, 1.0, 3.0),
-    DVec3::new(2.5, 1.0, 3.0),
-    DVec3::new(2.5, 2.0, 3.0),
-    DVec3::new(1.5, 2.0, 3.0),
+    DVec3::new(1.5, 4.0, 3.2),
+    DVec3::new(2.5, 4.0, 3.2),
+    DVec3::new(2.5, 4.0, 4.0),
+    DVec3::new(1.5, 4.0, 4.0),
 ];
 const LAMP_RADIANCE: f64 = 20.0;
 
-/// A black wall at y = 4 over a floor of two triangles that a picture colours, under a lamp.
+/// A black wall at y = 4 beside a floor of two triangles that a picture colours, and a lamp above the wall.
 fn painted_floor(picture: Texture, has_speck: bool) -> Arc<Scene> {
     let mut builder = SceneBuilder::default();
     builder.textures.push(picture);
@@ -302,16 +303,16 @@ fn painted_floor(picture: Texture, has_speck: bool) -> Arc<Scene> {
     let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * FLOOR);
     quad(&mut builder, floor, [DVec3::ZERO, x, y]);
     // Looks along −y.
-    quad(&mut builder, black, [y, x, z]);
+    quad(&mut builder, black, [y, x, z * 0.75]);
     let [corner, u, _, v] = LAMP;
-    quad(&mut builder, lamp, [corner, v - corner, u - corner]);
+    quad(&mut builder, lamp, [corner, u - corner, v - corner]);
     if has_speck {
         speck(&mut builder, DVec3::new(0.05, 0.05, 2.0));
     }
     finish(builder)
 }
 
-/// Irradiance of the wall: of the lamp, and by a sum over small squares of the floor.
+/// Irradiance of the wall, by a sum over small squares of the floor.
 struct Wall {
     cells: usize,
     /// Radiosity of each square.
@@ -348,8 +349,7 @@ impl Wall {
                 radiosity * (-separation.y) * point.z / (PI * squared * squared)
             })
             .sum();
-        let lamp = point_to_polygon(point, DVec3::NEG_Y, &LAMP).abs() * PI * LAMP_RADIANCE;
-        reflected * step * step + lamp
+        reflected * step * step
     }
 }
 
@@ -360,14 +360,13 @@ fn assert_wall(
     cases: &[(bool, Direct, [f64; 2])],
 ) -> [f64; 2] {
     let wall = Wall::new(reflectance);
-    // Far enough from the floor for the sum, and within the lamp's half-space.
+    // Far enough from the floor for the sum.
     let is_told = |point: DVec3| (point.y - FLOOR).abs() < 1e-3 && (0.25..2.9).contains(&point.z);
     let right = |point: DVec3| is_told(point).then(|| Vec3::splat(wall.irradiance(point) as f32));
     for &(has_speck, direct, most) in cases {
         let scene = painted_floor(picture.clone(), has_speck);
         let shown = solver(&scene, direct).snapshot();
         let found = errors(&scene, &shown, Vec3::NEG_Y, right);
-        println!("{direct:?} {has_speck} {found:?}");
         assert!(
             found[0] < most[0] && found[1] < most[1],
             "{direct:?}, speck {has_speck}: mean and high errors {found:?}"
@@ -376,11 +375,11 @@ fn assert_wall(
     [0.5, 3.5].map(|x| wall.irradiance(DVec3::new(x, FLOOR, 0.5)))
 }
 
-const CASES: [(bool, Direct, [f64; 2]); 4] = [
-    (false, Direct::Sampled, [0.9, 0.9]),
-    (false, Direct::Linked, [0.9, 0.9]),
-    (true, Direct::Sampled, [0.9, 0.9]),
-    (true, Direct::Linked, [0.9, 0.9]),
+/// Measured: 0.048 and 0.109, 0.0064 and 0.016, 0.016 and 0.033.
+const CASES: [(bool, Direct, [f64; 2]); 3] = [
+    (false, Direct::Sampled, [0.07, 0.16]),
+    (false, Direct::Linked, [0.0096, 0.024]),
+    (true, Direct::Sampled, [0.024, 0.049]),
 ];
 
 #[test]
@@ -390,7 +389,7 @@ fn the_bright_half_of_a_floor_lights_the_wall_beside_it() {
         half((f64::from(column) + 0.5) / 256.0) as f32
     });
     let sides = assert_wall(&picture, |x, _| 0.9 * half(x / FLOOR), &CASES);
-    assert!(sides[1] > 1.2 * sides[0], "the halves differ: {sides:?}");
+    assert!(sides[1] > 2.0 * sides[0], "the halves differ: {sides:?}");
 }
 
 #[test]
@@ -406,5 +405,5 @@ fn a_floor_of_tiles_reflects_their_mean_in_each_half() {
         tile(x, y) as f32
     });
     let sides = assert_wall(&picture, |x, y| 0.9 * tile(x / FLOOR, y / FLOOR), &CASES);
-    assert!(sides[0] > 1.1 * sides[1], "the halves differ: {sides:?}");
+    assert!(sides[0] > 1.5 * sides[1], "the halves differ: {sides:?}");
 }

@@ -23,7 +23,7 @@ const TOLERANCE: f32 = 0.02;
 const CHANGE: f32 = 4.0;
 
 /// Elements that may be made. Fewer, and many painted lamps are coarse; more, and it takes longer to sample them than all
-/// else. One lamp takes a hundred or two, whatever the picture.
+/// else. One lamp takes ten to a hundred, whatever the picture.
 const MOST_MADE: usize = 4096;
 
 /// Elements whose errors could add to no more than this share of the tolerance are not looked at. Larger leaves errors
@@ -264,13 +264,17 @@ mod tests {
 
     #[test]
     fn black_parts_of_a_lamp_shine_not_and_bright_ones_are_whole() {
-        let mut solver = lamp(|column, row| if column < 16 && row >= 48 { 1.0 } else { 0.0 });
+        let mut solver = lamp(|column, row| match (column, row) {
+            (16..32, 32..48) => 1.0,
+            _ => 0.0,
+        });
         solver.hierarchy.validate().expect("it is valid");
         let leaves = solver.textured_leaves();
         assert!(solver.misplaced(&leaves).is_empty(), "all are right");
         let (area, power, count) = shining(&solver);
         assert!((power - 1.0 / 16.0).abs() < 1e-3, "{power}");
-        assert!(area < 0.1, "{area}");
+        // With the rim over which the picture is blurred.
+        assert!(area < 0.2, "{area}");
         assert!(count < 200, "{count}");
     }
 
@@ -293,7 +297,7 @@ mod tests {
             assert!(solver.misplaced(&leaves).is_empty(), "{name}");
             let (area, _, count) = shining(&solver);
             assert!(
-                area > 0.99 && (10..1000).contains(&count),
+                area > 0.99 && (4..200).contains(&count),
                 "{name}: {area} {count}"
             );
         }
