@@ -6,6 +6,7 @@
 //! strews flat clusters over whole walls.
 
 mod build;
+mod colors;
 mod directional;
 mod edge_leaves;
 mod facing;
@@ -25,6 +26,7 @@ pub use tables::{Tables, luminance};
 use glam::Vec3;
 
 use crate::scene::{Scene, TriangleId};
+use colors::ElementColors;
 
 /// Tasks that work over the patches is shared into, where there are as many. Fewer, and threads wait for the last one; more,
 /// and what each works out for itself of the clusters above adds up.
@@ -84,9 +86,9 @@ pub struct Patch {
     pub normal: Vec3,
     /// Area, above 0 unless it underflows.
     pub area: f32,
-    /// Mean reflectance.
+    /// Mean reflectance; that of an element is told by [`Hierarchy::reflectance_of`].
     pub reflectance: Vec3,
-    /// Mean emitted radiance.
+    /// Mean emitted radiance; that of an element is told by [`Hierarchy::emission_of`].
     pub emission: Vec3,
 }
 
@@ -157,6 +159,8 @@ pub struct Hierarchy {
     pub subtrees: Subtrees,
     /// The patches on the front and on the back of each triangle; `u32::MAX` for a back that is not lit.
     sides: Vec<[u32; 2]>,
+    /// Where elements differ from their patch.
+    colors: ElementColors,
 }
 
 impl Hierarchy {
@@ -199,6 +203,7 @@ impl Hierarchy {
             mesh,
             importance,
             sides,
+            colors: ElementColors::default(),
         })
     }
 
@@ -376,9 +381,12 @@ impl Hierarchy {
     /// The part of the scene's area that an element, or a point on it that stands for so much area, has for errors of what
     /// it receives, 0…1. What is huge beside all that counts is as large as that.
     pub fn share_of_area(&self, element: usize, area: f32) -> f32 {
-        let weight = self
-            .importance
-            .weight(self.mesh.elements[element].patch as usize);
+        let patch = self.mesh.elements[element].patch as usize;
+        let weight = match self.emission_of(element) == Vec3::ZERO {
+            // Of a painted lamp, too.
+            true => 1.0,
+            false => self.importance.weight(patch),
+        };
         let share = f64::from(area * weight) / self.importance.area.max(f64::MIN_POSITIVE);
         share.min(1.0) as f32
     }
@@ -408,6 +416,7 @@ impl Hierarchy {
             + size_of_val(self.sides.as_slice())
             + size_of_val(self.weighted_areas.as_slice())
             + self.importance.memory_bytes()
+            + self.colors.memory_bytes()
             + self.mesh.memory_bytes()
     }
 }

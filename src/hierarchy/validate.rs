@@ -1,5 +1,7 @@
 //! Checks that a hierarchy keeps its promises; for tests, after every build and division.
 
+use glam::Vec3;
+
 use super::{Hierarchy, NodeId};
 
 impl Hierarchy {
@@ -10,6 +12,7 @@ impl Hierarchy {
     pub fn validate(&self) -> Result<(), String> {
         self.validate_clusters()?;
         self.validate_elements()?;
+        self.validate_colors()?;
         self.validate_balance()
     }
 
@@ -48,6 +51,35 @@ impl Hierarchy {
                     "cluster {index}: area {} but children have {area}",
                     cluster.area
                 ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Parents have the mean colours of their children, which have equal areas.
+    fn validate_colors(&self) -> Result<(), String> {
+        for (index, element) in self.mesh.elements.iter().enumerate() {
+            if element.is_leaf() {
+                continue;
+            }
+            let count = f32::from(element.child_count);
+            let mean =
+                |of: &dyn Fn(usize) -> Vec3| element.children().map(of).sum::<Vec3>() / count;
+            for (own, mean) in [
+                (
+                    self.reflectance_of(index),
+                    mean(&|child| self.reflectance_of(child)),
+                ),
+                (
+                    self.emission_of(index),
+                    mean(&|child| self.emission_of(child)),
+                ),
+            ] {
+                if (own - mean).abs().cmpgt(1e-5 * own + 1e-7).any() {
+                    return Err(format!(
+                        "element {index}: colour {own} but its children have {mean}"
+                    ));
+                }
             }
         }
         Ok(())

@@ -1,17 +1,17 @@
 //! From raw faces in world coordinates to a [`Scene`] that keeps its promises.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
+use std::{collections::HashMap, path::PathBuf, sync::Arc};
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::crossings::cut_crossings;
+use super::means::TextureAverages;
 use super::sidedness::{self, Shells};
-use super::texture::{TextureAverage, cured};
+use super::texture::{MAX_SAMPLES, cured};
 use super::{
-    Frame, Material, MaterialId, Object, Scene, SizeClasses, Spared, Surface, Texture, TextureId,
-    Triangle, TriangleId, Warning, WarningKind,
+    Appearance, Frame, Material, MaterialId, Object, Scene, SizeClasses, Spared, Surface, Texture,
+    TextureId, Triangle, TriangleId, Warning, WarningKind,
 };
 
 /// Which sides of a triangle reflect and emit.
@@ -166,7 +166,8 @@ impl SceneBuilder {
         self.drop_doubled_faces(&corner_of);
         self.spare_textures();
         let triangles = self.triangles(&corner_of, &positions, options);
-        let surfaces = self.surfaces(&frame, options);
+        let averages = TextureAverages::new(&self.textures, &self.materials);
+        let surfaces = self.surfaces(&frame, &averages, options);
         let mut scene = Scene {
             name: self.source.name,
             files: self.source.files,
@@ -182,6 +183,7 @@ impl SceneBuilder {
             warnings: self.warnings,
             spared: self.spared,
             max_reflectance: options.max_reflectance.clamp(0.0, 1.0),
+            averages: Arc::new(averages),
         };
         mark_solids(&mut scene, &triangles.shells);
         warn_of_orientation(&mut scene, &triangles.shells, options.sides);
@@ -545,42 +547,27 @@ impl SceneBuilder {
     }
 
     /// Area vectors from the file's own digits, and the means of reflectance and emission.
-    fn surfaces(&self, frame: &Frame, options: &SceneOptions) -> Vec<Surface> {
-        let max = Vec3::splat(options.max_reflectance.clamp(0.0, 1.0));
-        let averages = self.texture_averages();
-        let mean = |texture: Option<TextureId>, face: &Face| match (texture, face.texcoords) {
-            (Some(texture), Some(uv)) => averages
-                .get(&texture)
-                .map_or(Vec3::ONE, |average| average.over(uv)),
-            _ => Vec3::ONE,
-        };
+    fn surfaces(
+        &self,
+        frame: &Frame,
+        averages: &TextureAverages,
+        options: &SceneOptions,
+    ) -> Vec<Surface> {
+        let max = options.max_reflectance.clamp(0.0, 1.0);
         self.faces
             .par_iter()
             .map(|face| {
                 let corners = face.corners.map(|corner| self.positions[corner as usize]);
                 let material = &self.materials[face.material.index()];
-                let reflectance = material.reflectance * mean(material.reflectance_texture, face);
+                let means = averages.over(&self.textures, material, face.texcoords, MAX_SAMPLES);
+                let shown = means.times(&Appearance::of(material), max);
                 Surface {
                     area_vector: area_vector(corners, frame),
-                    reflectance: reflectance.clamp(Vec3::ZERO, max),
-                    emission: material.emission * mean(material.emission_texture, face),
+                    reflectance: shown.reflectance,
+                    emission: shown.emission,
                 }
             })
             .collect()
-    }
-
-    /// The textures in use, ready for means over triangles.
-    fn texture_averages(&self) -> HashMap<TextureId, TextureAverage<'_>> {
-        let mut averages = HashMap::new();
-        for material in &self.materials {
-            let textures = [material.reflectance_texture, material.emission_texture];
-            for texture in textures.into_iter().flatten() {
-                averages
-                    .entry(texture)
-                    .or_insert_with(|| TextureAverage::new(&self.textures[texture.index()]));
-            }
-        }
-        averages
     }
 }
 

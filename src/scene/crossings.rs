@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
-use super::{Scene, SizeClasses, Surface, Triangle, TriangleId};
+use super::{Appearance, Scene, SizeClasses, Surface, Triangle, TriangleId};
 
 /// Faces are cut whose longest edge, squared, is more than this part of the scene's area. Smaller cuts what elements resolve
 /// anyway, larger leaves furniture whole.
@@ -32,7 +32,7 @@ const SAME_PLACE: f64 = 5e-5;
 /// And relative to the distance from the origin: what single precision tells apart.
 const SAME_PLACE_RELATIVE: f64 = 5e-7;
 
-/// Cut the faces of a scene. Parts keep what their face has.
+/// Cut the faces of a scene. Parts keep what their face has; their textures are averaged anew.
 pub(super) fn cut_crossings(scene: &mut Scene) {
     let lines = lines(scene);
     if lines.is_empty() {
@@ -499,6 +499,7 @@ fn replace(scene: &mut Scene, parts: &[Parts]) {
     first.push(count);
     let old = std::mem::take(&mut scene.triangles);
     let surfaces = std::mem::take(&mut scene.surfaces);
+    let mut cut = Vec::new();
     for ((triangle, surface), parts) in old.iter().zip(&surfaces).zip(parts) {
         if parts.0.is_empty() {
             scene.triangles.push(*triangle);
@@ -511,6 +512,7 @@ fn replace(scene: &mut Scene, parts: &[Parts]) {
         let whole: f64 = parts.0.iter().map(share).sum();
         for part in &parts.0 {
             let corners = part.map(|(point, _)| point);
+            cut.push(TriangleId(scene.triangles.len() as u32));
             scene.triangles.push(Triangle {
                 corners,
                 ..*triangle
@@ -528,6 +530,14 @@ fn replace(scene: &mut Scene, parts: &[Parts]) {
     scene.normals = spread(&scene.normals, parts, |[a, b, c]: [Vec3; 3], at| {
         (a.as_dvec3() * at.x + b.as_dvec3() * at.y + c.as_dvec3() * at.z).as_vec3()
     });
+    cut.retain(|&part| scene.is_textured(part));
+    for part in cut {
+        let appearance = Appearance::of(scene.material(part));
+        let means = scene.texture_means(part);
+        let shown = means.times(&appearance, scene.max_reflectance);
+        let surface = &mut scene.surfaces[part.index()];
+        (surface.reflectance, surface.emission) = (shown.reflectance, shown.emission);
+    }
     for object in &mut scene.objects {
         object.start = TriangleId(first[object.start.index()]);
         object.end = TriangleId(first[object.end.index()]);

@@ -17,6 +17,7 @@ mod library;
 mod limited;
 mod lines;
 mod locate;
+mod means;
 mod mtl;
 mod obj;
 mod relight;
@@ -34,6 +35,7 @@ mod write;
 pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use frame::Frame;
+pub use means::TextureMeans;
 pub use obj::{ReadError, read_obj};
 pub use relight::{Appearance, Awakened};
 pub use size_classes::SizeClasses;
@@ -43,9 +45,11 @@ pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use glam::{Vec2, Vec3};
+
+use means::TextureAverages;
 
 /// Index of a [`Material`] in [`Scene::materials`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -177,6 +181,8 @@ pub struct Scene {
     pub spared: Spared,
     /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
     pub max_reflectance: f32,
+    /// The textures, ready for means.
+    averages: Arc<TextureAverages>,
 }
 
 impl Scene {

@@ -3,10 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{
-    Material, MaterialId, Scene, Surface, TextureId,
-    texture::{TextureAverage, cured},
-};
+use super::{Material, MaterialId, Scene, Surface, TriangleId, texture::cured};
 
 /// How a material reflects and emits, without its name and its textures. Linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,8 +120,6 @@ impl Scene {
             .zip(&self.materials)
             .map(|(appearance, material)| *appearance != Appearance::of(material))
             .collect();
-        let averages = self.averages_of(&changed);
-        let most = Vec3::splat(self.max_reflectance);
         self.surfaces
             .par_iter()
             .zip(&self.triangles)
@@ -135,36 +130,15 @@ impl Scene {
                 if !changed[of] {
                     return *surface;
                 }
-                let mean = |texture: Option<TextureId>| -> Vec3 {
-                    let average = texture.and_then(|texture| averages[texture.index()].as_ref());
-                    match (average, self.texcoords.get(index)) {
-                        (Some(average), Some(uv)) => average.over(*uv),
-                        _ => Vec3::ONE,
-                    }
-                };
-                let (material, appearance) = (&self.materials[of], &allowed[of]);
-                let reflectance = appearance.reflectance * mean(material.reflectance_texture);
+                let means = self.texture_means(TriangleId(index as u32));
+                let shown = means.times(&allowed[of], self.max_reflectance);
                 Surface {
-                    reflectance: reflectance.clamp(Vec3::ZERO, most),
-                    emission: appearance.emission * mean(material.emission_texture),
+                    reflectance: shown.reflectance,
+                    emission: shown.emission,
                     ..*surface
                 }
             })
             .collect()
-    }
-
-    /// Textures of the materials that are `changed`, ready for means over triangles.
-    fn averages_of(&self, changed: &[bool]) -> Vec<Option<TextureAverage<'_>>> {
-        let mut averages: Vec<Option<TextureAverage<'_>>> =
-            self.textures.iter().map(|_| None).collect();
-        for (material, _) in self.materials.iter().zip(changed).filter(|(_, is)| **is) {
-            let textures = [material.reflectance_texture, material.emission_texture];
-            for texture in textures.into_iter().flatten().map(TextureId::index) {
-                averages[texture]
-                    .get_or_insert_with(|| TextureAverage::new(&self.textures[texture]));
-            }
-        }
-        averages
     }
 
     /// The scene with materials that look so.
@@ -186,7 +160,7 @@ mod tests {
     use glam::{DVec3, Vec2};
 
     use super::*;
-    use crate::scene::{Face, SceneBuilder, SceneOptions, Texture};
+    use crate::scene::{Face, SceneBuilder, SceneOptions, Texture, TextureId};
 
     /// A triangle under a grey texture, and one without.
     fn scene() -> Scene {

@@ -300,51 +300,51 @@ pub(super) fn linear_from_srgb(encoded: f32) -> f32 {
     }
 }
 
-/// Samples of a triangle at most; at this many the mean of a halved texture is good to about a percent.
-const MAX_SAMPLES: f32 = 256.0;
+/// Samples of a triangle at most, its parts together; at this many the mean of a halved texture is good to about a percent.
+pub(super) const MAX_SAMPLES: f32 = 256.0;
 
 /// Samples of a triangle at least, however small it is on the picture.
 const MIN_SAMPLES: f32 = 4.0;
 
-/// A texture with its halved copies, for means over triangles.
+/// Halved copies of a texture, for means over triangles.
 #[derive(Debug)]
-pub(super) struct TextureAverage<'a> {
-    full: &'a Texture,
-    /// Each half the size of the one before, down to one pixel.
+pub(super) struct TextureAverage {
+    /// Each half the size of the one before, the first of the texture itself; down to one pixel.
     halved: Vec<Texture>,
 }
 
-impl<'a> TextureAverage<'a> {
+impl TextureAverage {
     /// Halve a texture down to one pixel.
-    pub(super) fn new(full: &'a Texture) -> Self {
+    pub(super) fn new(full: &Texture) -> Self {
         let mut halved: Vec<Texture> = Vec::new();
         while let last = halved.last().unwrap_or(full)
             && last.pixels.len() > 1
         {
             halved.push(last.halved());
         }
-        Self { full, halved }
+        Self { halved }
     }
 
-    /// Mean over a triangle of texture coordinates. The copy is chosen such that there is about one sample a pixel, so
-    /// that a small bright spot in a large picture is not missed.
-    pub(super) fn over(&self, uv: [Vec2; 3]) -> Vec3 {
-        let size = Vec2::new(self.full.width as f32, self.full.height as f32);
+    /// Mean of the texture over a triangle of texture coordinates. The copy is chosen such that there is about one sample
+    /// a pixel, so that a small bright spot in a large picture is not missed; `most_samples` is at least 4.
+    pub(super) fn over(&self, full: &Texture, uv: [Vec2; 3], most_samples: f32) -> Vec3 {
+        let size = Vec2::new(full.width as f32, full.height as f32);
         let [a, b, c] = uv.map(|uv| uv * size);
         let area = 0.5 * (b - a).perp_dot(c - a).abs();
         let length = (b - a).length().max((c - b).length()).max((a - c).length());
         // Two samples a pixel, in a needle two a pixel of its length.
         let mut wanted = 2.0 * area.max(length);
-        let mut texture = self.full;
+        let mut texture = full;
         for halved in &self.halved {
             // Written so that an overflow ends at the smallest copy.
-            if wanted <= MAX_SAMPLES {
+            if wanted <= most_samples {
                 break;
             }
             wanted *= if area > length { 0.25 } else { 0.5 };
             texture = halved;
         }
-        let count = wanted.clamp(MIN_SAMPLES, MAX_SAMPLES).ceil() as u32;
+        // Coordinates that are not numbers give the least.
+        let count = wanted.max(MIN_SAMPLES).min(most_samples).ceil() as u32;
         let sum: Vec3 = (0..count)
             .map(|index| {
                 let [x, y, z] = barycentric_sample(index);

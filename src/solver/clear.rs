@@ -74,7 +74,8 @@ impl Solver {
     }
 
     /// By how much the radiosity of each leaf varies over it (half the range of its corners, luminance), as direct light is
-    /// now and linked light was when it was last gathered. Of leaves divided since, the parts vary by half.
+    /// now and linked light was when it was last gathered, and by its textures. Of leaves divided since, the parts vary by
+    /// half.
     pub(super) fn radiosity_spreads(&self) -> Vec<f32> {
         let range = |corners: [f32; 3]| {
             let [least, most] =
@@ -100,8 +101,8 @@ impl Solver {
                         .map(|vertex| luminance(field.corner(vertex))),
                 )
             });
-            let reflectance = luminance(hierarchy.patch_of(index).reflectance.extend(0.0));
-            0.5 * reflectance * (linked[index] + direct)
+            let reflectance = luminance(hierarchy.reflectance_of(index).extend(0.0));
+            0.5 * reflectance * (linked[index] + direct) + self.texture_spread(index)
         };
         let all = (0..elements.len()).into_par_iter();
         all.map(|index| {

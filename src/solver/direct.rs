@@ -29,16 +29,18 @@ const LEAST_SAMPLED_SHARE: f64 = 512.0;
 /// Places of random streams per frame unit: single precision tells 2^17 of them apart at the rim of the frame.
 const PLACES: f32 = 16_384.0;
 
-/// An emitting patch.
+/// An emitting patch, or a part of one whose texture varies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Emitter {
-    /// Indices into [`Scene::positions`], as the side that emits is wound.
+    /// Indices into the points of the mesh, as the side that emits is wound.
     pub vertices: [u32; 3],
     pub corners: [Vec3; 3],
     pub normal: Vec3,
     pub area: f32,
     pub triangle: TriangleId,
     pub material: MaterialId,
+    /// By what the material's texture multiplies its emission here, in the mean.
+    pub texture: Vec3,
     pub radiosity: Vec4,
 }
 
@@ -84,25 +86,10 @@ impl Lights {
                 is_seen && patch.emission != Vec3::ZERO && power(patch) >= least
             })
             .collect();
-        let sampled = hierarchy
-            .patches
-            .iter()
-            .zip(&is_sampled)
-            .filter(|(_, is_sampled)| **is_sampled);
+        let sampled = (0..is_sampled.len()).filter(|&patch| is_sampled[patch]);
         let emitters: Vec<Emitter> = sampled
-            .map(|(patch, _)| {
-                let [a, b, c] = scene.triangles[patch.triangle.index()].corners;
-                let vertices = if patch.is_back { [a, c, b] } else { [a, b, c] };
-                Emitter {
-                    vertices,
-                    corners: vertices.map(|vertex| scene.positions[vertex as usize]),
-                    normal: patch.normal,
-                    area: patch.area,
-                    triangle: patch.triangle,
-                    material: scene.triangles[patch.triangle.index()].material,
-                    radiosity: (patch.emission * PI).extend(0.0),
-                }
-            })
+            .flat_map(|patch| hierarchy.emitting_parts(patch))
+            .map(|part| Emitter::new(scene, hierarchy, part))
             .collect();
         Self::of(&emitters, is_sampled)
     }
@@ -117,13 +104,14 @@ impl Lights {
         }
     }
 
-    /// The emitters whose triangles `emission` knows, with that emitted radiance.
-    pub(super) fn repainted(&self, emission: impl Fn(TriangleId) -> Option<Vec3>) -> Self {
+    /// The emitters whose materials `emission` knows, with that emitted radiance times their texture.
+    pub(super) fn repainted(&self, emission: impl Fn(MaterialId) -> Option<Vec3>) -> Self {
         let emitters: Vec<Emitter> = self
             .emitters
             .iter()
             .filter_map(|emitter| {
-                let radiosity = (emission(emitter.triangle)? * PI).extend(0.0);
+                let emission = emission(emitter.material)? * emitter.texture;
+                let radiosity = (emission * PI).extend(0.0);
                 Some(Emitter {
                     radiosity,
                     ..*emitter
@@ -329,6 +317,25 @@ fn brightest(emitters: &[Emitter]) -> Vec4 {
 }
 
 impl Emitter {
+    /// The emitter that is an element.
+    fn new(scene: &Scene, hierarchy: &Hierarchy, element: usize) -> Self {
+        let mesh = &hierarchy.mesh;
+        let patch = hierarchy.patch_of(element);
+        let at = &mesh.elements[element];
+        Self {
+            vertices: at
+                .vertices
+                .map(|vertex| mesh.vertices[vertex as usize].point),
+            corners: mesh.corners(element),
+            normal: patch.normal,
+            area: at.area_vector.length(),
+            triangle: patch.triangle,
+            material: scene.triangles[patch.triangle.index()].material,
+            texture: hierarchy.texture_means_of(scene, element).emission,
+            radiosity: (hierarchy.emission_of(element) * PI).extend(0.0),
+        }
+    }
+
     /// A point of the emitter for a point of the unit square, and the light that it stands for at a receiver, up to a
     /// factor. Of an emitter that is `seen` under a large angle all directions are as likely; elsewhere all points are.
     fn aim(

@@ -124,27 +124,30 @@ impl Solver {
         Some(display)
     }
 
-    /// Give the vertices of a display mesh the colours of the patches about them.
+    /// Give the vertices of a display mesh the colours of the elements about them.
     pub(super) fn color(&self, display: &mut DisplayMesh) {
         let count = display.positions.len();
         let base = self.hierarchy.clusters.len() as u32;
         let mut sums = vec![(Vec3::ZERO, Vec3::ZERO, 0.0f32); count];
         for (vertices, element) in display.indices.iter().zip(&display.element_of) {
-            let patch = self.hierarchy.patch_of((element - base) as usize);
+            let element = (element - base) as usize;
+            let shown = [
+                self.hierarchy.reflectance_of(element),
+                self.hierarchy.emission_of(element),
+            ];
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
             let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
             for &vertex in vertices {
                 let (reflectance, emission, weights) = &mut sums[display.own_vertex(vertex)];
-                *reflectance += patch.reflectance * weight;
-                *emission += patch.emission * weight;
+                *reflectance += shown[0] * weight;
+                *emission += shown[1] * weight;
                 *weights += weight;
             }
         }
         repeat(&mut sums, display.own_vertex_count(), &display.repeated);
         let mean = |sum: Vec3, weight: f32| if weight > 0.0 { sum / weight } else { sum };
         let means = sums.iter();
-        let appearances = self.appearances().iter();
-        display.texture_factors = appearances.map(|looks| looks.reflectance).collect();
+        display.appearances = self.appearances().to_vec();
         display.reflectance = means.clone().map(|&(sum, _, by)| mean(sum, by)).collect();
         display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
     }
@@ -164,7 +167,7 @@ impl Solver {
     /// Largest radiosity by channel: no irradiance can be larger.
     fn brightest(&self) -> Vec4 {
         let sampled = |leaf: usize| match self.is_sampled(leaf) {
-            true => (self.hierarchy.patch_of(leaf).emission * PI).extend(0.0),
+            true => (self.hierarchy.emission_of(leaf) * PI).extend(0.0),
             false => Vec4::ZERO,
         };
         let mesh = &self.hierarchy.mesh;

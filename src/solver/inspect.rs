@@ -197,7 +197,7 @@ impl Solver {
             Kind::Cluster(index) => self.snapshot.clusters[index].power,
             Kind::Element(index) => {
                 let emission = if self.is_sampled(index) {
-                    self.hierarchy.patch_of(index).emission * PI
+                    self.hierarchy.emission_of(index) * PI
                 } else {
                     Vec3::ZERO
                 };

@@ -173,7 +173,7 @@ impl Solver {
         let mut image = gather::gather(self.kernel(), &self.links, holders, push, cancel)?;
         let returned = |image: &[Vec4]| {
             self.leaf_sum(|leaf| {
-                self.hierarchy.patch_of(leaf).reflectance.extend(0.0) * (image[leaf] + direct[leaf])
+                self.hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])
             })
         };
         let returned_unscaled = returned(&image);
@@ -242,10 +242,7 @@ impl Solver {
     /// No more power than this can be under way: what is emitted, if everything reflected as the brightest surface does.
     pub(super) fn most_power(&self) -> f64 {
         let patches = &self.hierarchy.patches;
-        let brightest = patches
-            .par_iter()
-            .map(|patch| patch.reflectance.max_element())
-            .reduce(|| 0.0, f32::max);
+        let brightest = self.hierarchy.largest_reflectance();
         let emitted = ordered_sum(patches.len(), |index| {
             patches[index].emission.as_dvec3() * f64::from(patches[index].area)
         });

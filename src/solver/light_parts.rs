@@ -82,9 +82,8 @@ impl LightParts {
         let factors = self.factors(appearances)?;
         let mixed = self.mixed(&factors);
         (field.vertices, field.centres) = (mixed.vertices, mixed.centres);
-        let surfaces = shooting.scene.surfaces_under(appearances);
-        let emission = |triangle: crate::scene::TriangleId| surfaces[triangle.index()].emission;
-        field.lights = field.lights.repainted(|triangle| Some(emission(triangle)));
+        let emission = |material: MaterialId| appearances[material.index()].emission;
+        field.lights = field.lights.repainted(|material| Some(emission(material)));
         Some(shot)
     }
 
@@ -137,14 +136,11 @@ impl LightParts {
             }
             (materials.into_iter().map(|one| vec![one]).collect(), white)
         };
-        let surfaces = shooting.scene.surfaces_under(&shot_as);
         let (mut parts, mut ray_count) = (Vec::new(), 0);
         for group in groups {
-            let lights = field.lights.repainted(|triangle| {
-                let material = shooting.scene.triangles[triangle.index()].material;
-                group
-                    .contains(&material)
-                    .then(|| surfaces[triangle.index()].emission)
+            let lights = field.lights.repainted(|material| {
+                let is_member = group.contains(&material);
+                is_member.then(|| shot_as[material.index()].emission)
             });
             let (samples, shot) = shoot_known(field, &lights, shooting)?;
             ray_count += shot;

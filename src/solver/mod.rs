@@ -32,6 +32,7 @@ mod seams;
 mod settings;
 mod smooth;
 mod snapshot;
+mod textures;
 
 use std::sync::{
     Arc,
@@ -184,12 +185,11 @@ impl Solver {
         );
         let hierarchy = hierarchy?;
         cancel.proceed()?;
-        let lights = Lights::new(&scene, &hierarchy, settings.direct);
         let mut solver = Self {
             closures: Closures::default(),
             power: Tables::default(),
             links: LinkStore::default(),
-            direct: (!lights.is_empty()).then(|| DirectField::new(lights)),
+            direct: None,
             linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
             gathered: Vec::new(),
@@ -206,6 +206,10 @@ impl Solver {
             rays,
             hierarchy,
         };
+        solver.divide_by_textures();
+        let lights = Lights::new(&solver.scene, &solver.hierarchy, solver.settings.direct);
+        solver.direct = (!lights.is_empty()).then(|| DirectField::new(lights));
+        cancel.proceed()?;
         solver.first_light(cancel)?;
         solver.pull();
         solver.show(cancel)?;
@@ -378,12 +382,11 @@ impl Solver {
         if self.hierarchy.mesh.elements[element].is_buried() {
             return Vec4::ZERO;
         }
-        let patch = self.hierarchy.patch_of(element);
-        let reflected = patch.reflectance * irradiance.truncate();
+        let reflected = self.hierarchy.reflectance_of(element) * irradiance.truncate();
         let emitted = if self.is_sampled(element) {
             Vec3::ZERO
         } else {
-            patch.emission * std::f32::consts::PI
+            self.hierarchy.emission_of(element) * std::f32::consts::PI
         };
         (reflected + emitted).extend(1.0)
     }
@@ -462,8 +465,10 @@ impl Solver {
         }
     }
 
-    /// Elements inherit the linked irradiance of the one that was divided.
+    /// Elements inherit the linked irradiance of the one that was divided, and have colours of their own.
     fn extend_to_new_elements(&mut self) {
+        self.hierarchy
+            .color_new_elements(&self.scene, &self.relighting.appearances);
         for index in self.linked.len()..self.hierarchy.mesh.elements.len() {
             let parent = self.hierarchy.mesh.elements[index].parent;
             self.linked.push(self.linked[parent as usize]);

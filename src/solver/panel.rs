@@ -259,6 +259,7 @@ mod tests {
                     area: 0.5 / (n * n) as f32,
                     triangle: TriangleId(emitters.len() as u32),
                     material: MaterialId(0),
+                    texture: Vec3::ONE,
                     radiosity: Vec4::ONE,
                 });
             }

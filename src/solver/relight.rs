@@ -53,7 +53,7 @@ struct Solved {
 /// What relighting remembers.
 pub(super) struct Relighting {
     /// How materials look, by material.
-    appearances: Vec<Appearance>,
+    pub(super) appearances: Vec<Appearance>,
     /// Direct light in parts, from the first relighting after a step on.
     parts: Option<LightParts>,
     /// The light that others are scaled from.
@@ -202,17 +202,8 @@ impl Solver {
 
     /// Give the patches the colours that their materials have now.
     fn paint(&mut self, appearances: Vec<Appearance>) {
-        let surfaces = self.scene.surfaces_under(&appearances);
+        self.hierarchy.paint(&self.scene, &appearances);
         self.relighting.appearances = appearances;
-        self.hierarchy
-            .patches
-            .par_iter_mut()
-            .with_min_len(4096)
-            .for_each(|patch| {
-                let surface = &surfaces[patch.triangle.index()];
-                patch.reflectance = surface.reflectance;
-                patch.emission = surface.emission;
-            });
     }
 
     /// Multiply the light that was solved last.

@@ -29,9 +29,9 @@ impl Solver {
             self.linked[leaf] + self.direct_of(leaf)
         });
         let sent = gather::area_sum(&self.hierarchy, |leaf| {
-            let patch = self.hierarchy.patch_of(leaf);
-            let emitted = (patch.emission * std::f32::consts::PI).extend(0.0);
-            patch.reflectance.extend(0.0) * (self.linked[leaf] + self.direct_of(leaf)) + emitted
+            let reflectance = self.hierarchy.reflectance_of(leaf).extend(0.0);
+            let emitted = (self.hierarchy.emission_of(leaf) * std::f32::consts::PI).extend(0.0);
+            reflectance * (self.linked[leaf] + self.direct_of(leaf)) + emitted
         });
         let sum = sent.element_sum();
         if sum > 0.0 {

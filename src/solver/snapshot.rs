@@ -8,6 +8,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use super::LeftOut;
+use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -18,12 +19,12 @@ pub struct DisplayMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, or empty where the scene has no textures.
     pub texcoords: Vec<glam::Vec2>,
-    /// Reflectance at the vertex, mean of its elements (textures averaged).
+    /// Reflectance at the vertex, mean of the elements about it (textures averaged over each).
     pub reflectance: Vec<Vec3>,
-    /// Emitted radiance at the vertex.
+    /// Emitted radiance at the vertex, likewise.
     pub emission: Vec<Vec3>,
-    /// Reflectance by which each material multiplies its texture, or empty where that is as the scene says.
-    pub texture_factors: Vec<Vec3>,
+    /// What each material multiplies its textures by, or empty where that is as the scene says.
+    pub appearances: Vec<Appearance>,
     /// Triangles, counter-clockwise from the lit side.
     pub indices: Vec<[u32; 3]>,
     /// The scene's triangle under each display triangle.

@@ -143,7 +143,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             Some(link) if receiver.is_leaf() => InView::known(link.form_factor),
             _ => InView::between(hierarchy, from, to),
         };
-        let reflected = luminance(hierarchy.patch_of(to).reflectance.extend(0.0));
+        let reflected = luminance(hierarchy.reflectance_of(to).extend(0.0));
         let mean = luminance(self.judge.kernel.tables.elements[from]);
         let of_source = self.unevenness(from) * (seen.mean + seen.change);
         let of_receiver = reflected * mean * seen.change;

@@ -7,7 +7,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::Gpu;
 use crate::{
-    scene::{Scene, Texture, TriangleId},
+    scene::{Appearance, Scene, Texture, TextureId, TriangleId},
     solver::DisplayMesh,
 };
 
@@ -27,18 +27,28 @@ pub(super) struct DetailSet {
     /// One that looks along the slant, and one that does not.
     slanted: wgpu::Sampler,
     upright: wgpu::Sampler,
+    /// Stands for textures that materials do not have.
+    white: wgpu::TextureView,
     plain: wgpu::BindGroup,
     scene: Option<Arc<Scene>>,
     /// Whether its textures are sampled along the slant.
     is_tame: bool,
     /// Its textures, those that were needed.
-    views: Vec<Option<wgpu::TextureView>>,
-    /// What each material multiplies its texture by; empty where that is as the scene says.
-    factors: Vec<Vec3>,
+    views: Vec<Option<Uploaded>>,
+    /// What each material multiplies its textures by; empty where that is as the scene says.
+    appearances: Vec<Appearance>,
     /// Number of the group of each material.
     group_of: Vec<usize>,
     /// Groups from 1 on.
     textured: Vec<wgpu::BindGroup>,
+}
+
+/// A texture on the adapter.
+#[derive(Clone)]
+struct Uploaded {
+    view: wgpu::TextureView,
+    /// What it must be multiplied by: its brightest channel, where that is above 1.
+    scale: f32,
 }
 
 /// Whether textures can be sampled by their slant: where they repeat without end over a sliver, software that does never
@@ -80,19 +90,20 @@ impl DetailSet {
             height: 1,
             pixels: vec![Vec3::ONE],
         };
-        let view = upload(gpu, &white);
+        let white = upload(gpu, &white).view;
         let upright = sampler(1);
-        let plain = bind_group(gpu, &layout, &upright, &view, [1.0, 1.0, 1.0, 0.0]);
+        let plain = bind_group(gpu, &layout, &upright, [&white, &white], [[0.0; 4]; 2]);
         Self {
             layout,
             // Floors are seen at a slant.
             slanted: sampler(16),
             upright,
+            white,
             plain,
             scene: None,
             is_tame: true,
             views: Vec::new(),
-            factors: Vec::new(),
+            appearances: Vec::new(),
             group_of: Vec::new(),
             textured: Vec::new(),
         }
@@ -111,17 +122,17 @@ impl DetailSet {
         }
     }
 
-    /// Upload the textures of another scene, and take other factors over.
-    pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>, factors: &[Vec3]) {
+    /// Upload the textures of another scene, and take other appearances of materials over.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>, appearances: &[Appearance]) {
         let is_held = |held: &Arc<Scene>| Arc::ptr_eq(held, scene);
         if !self.scene.as_ref().is_some_and(is_held) {
             self.scene = Some(scene.clone());
             self.is_tame = is_tame(scene);
             self.views = vec![None; scene.textures.len()];
-        } else if self.factors == factors {
+        } else if self.appearances == appearances {
             return;
         }
-        self.factors = factors.to_vec();
+        self.appearances = appearances.to_vec();
         self.textured.clear();
         self.group_of = vec![0; scene.materials.len()];
         let sampler = match self.is_tame {
@@ -129,17 +140,32 @@ impl DetailSet {
             false => &self.upright,
         };
         for (index, material) in scene.materials.iter().enumerate() {
-            let Some(texture) = material.reflectance_texture else {
+            let textures = [material.reflectance_texture, material.emission_texture];
+            if textures == [None, None] {
                 continue;
-            };
-            let group = &mut self.group_of[index];
-            let view = self.views[texture.index()]
-                .get_or_insert_with(|| upload(gpu, &scene.textures[texture.index()]));
-            let factor = factors.get(index).unwrap_or(&material.reflectance);
-            let [r, g, b] = factor.to_array();
-            self.textured
-                .push(bind_group(gpu, &self.layout, sampler, view, [r, g, b, 1.0]));
-            *group = self.textured.len();
+            }
+            let appearance = appearances.get(index).copied();
+            let appearance = appearance.unwrap_or_else(|| Appearance::of(material));
+            let colors = [appearance.reflectance, appearance.emission];
+            let (mut views, mut factors) =
+                ([self.white.clone(), self.white.clone()], [[0.0; 4]; 2]);
+            for (kind, texture) in textures.into_iter().enumerate() {
+                let Some(texture) = texture.map(TextureId::index) else {
+                    continue;
+                };
+                let uploaded = self.views[texture]
+                    .get_or_insert_with(|| upload(gpu, &scene.textures[texture]));
+                let factor = (colors[kind] * uploaded.scale).extend(1.0);
+                (views[kind], factors[kind]) = (uploaded.view.clone(), factor.to_array());
+            }
+            self.textured.push(bind_group(
+                gpu,
+                &self.layout,
+                sampler,
+                [&views[0], &views[1]],
+                factors,
+            ));
+            self.group_of[index] = self.textured.len();
         }
     }
 
@@ -179,6 +205,11 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         ty,
         count: None,
     };
+    let texture = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("detail"),
         entries: &[
@@ -190,16 +221,10 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
                     min_binding_size: None,
                 },
             ),
+            entry(1, texture),
+            entry(2, texture),
             entry(
-                1,
-                wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-            ),
-            entry(
-                2,
+                3,
                 wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             ),
         ],
@@ -210,12 +235,12 @@ fn bind_group(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
     sampler: &wgpu::Sampler,
-    view: &wgpu::TextureView,
-    factor: [f32; 4],
+    [reflectance, emission]: [&wgpu::TextureView; 2],
+    factors: [[f32; 4]; 2],
 ) -> wgpu::BindGroup {
     let uniform = gpu.buffer(
         "detail",
-        bytemuck::cast_slice(&factor),
+        bytemuck::cast_slice(&factors),
         wgpu::BufferUsages::UNIFORM,
     );
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -228,10 +253,14 @@ fn bind_group(
             },
             wgpu::BindGroupEntry {
                 binding: 1,
-                resource: wgpu::BindingResource::TextureView(view),
+                resource: wgpu::BindingResource::TextureView(reflectance),
             },
             wgpu::BindGroupEntry {
                 binding: 2,
+                resource: wgpu::BindingResource::TextureView(emission),
+            },
+            wgpu::BindGroupEntry {
+                binding: 3,
                 resource: wgpu::BindingResource::Sampler(sampler),
             },
         ],
@@ -239,7 +268,9 @@ fn bind_group(
 }
 
 /// A texture with all its smaller levels, sRGB-encoded.
-fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
+fn upload(gpu: &Gpu, texture: &Texture) -> Uploaded {
+    let channels = texture.pixels.iter().map(|pixel| pixel.max_element());
+    let scale = channels.fold(1.0, f32::max);
     let mut level = (texture.width, texture.height, texture.pixels.clone());
     while level.0.max(level.1) > MAX_SIDE.min(gpu.max_picture_side()) {
         level = halved(&level);
@@ -249,7 +280,7 @@ fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
     let mut bytes = Vec::new();
     for index in 0..level_count {
         bytes.extend(level.2.iter().flat_map(|pixel| {
-            let [r, g, b] = pixel.to_array().map(srgb_byte);
+            let [r, g, b] = (pixel / scale).to_array().map(srgb_byte);
             [r, g, b, 255]
         }));
         if index + 1 < level_count {
@@ -275,7 +306,10 @@ fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
         wgpu::util::TextureDataOrder::LayerMajor,
         &bytes,
     );
-    made.create_view(&wgpu::TextureViewDescriptor::default())
+    Uploaded {
+        view: made.create_view(&wgpu::TextureViewDescriptor::default()),
+        scale,
+    }
 }
 
 /// A picture of half the size, at least 1 × 1; an odd last row or column counts for its neighbour, too.

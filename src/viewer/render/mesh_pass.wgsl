@@ -2,13 +2,15 @@
 // colour (0).
 
 struct Detail {
-    // rgb: reflectance that multiplies the texture; w: 1 where there is a texture.
-    factor: vec4<f32>,
+    // rgb: what multiplies the texture; w: 1 where there is a texture.
+    reflectance: vec4<f32>,
+    emission: vec4<f32>,
 };
 
 @group(1) @binding(0) var<uniform> detail: Detail;
-@group(1) @binding(1) var detail_texture: texture_2d<f32>;
-@group(1) @binding(2) var detail_sampler: sampler;
+@group(1) @binding(1) var reflectance_texture: texture_2d<f32>;
+@group(1) @binding(2) var emission_texture: texture_2d<f32>;
+@group(1) @binding(3) var detail_sampler: sampler;
 
 struct Surface {
     @builtin(position) clip: vec4<f32>,
@@ -80,12 +82,18 @@ fn exposed(radiance: vec3<f32>) -> vec4<f32> {
 
 @fragment
 fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
-    let texel = textureSample(detail_texture, detail_sampler, vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y));
+    let place = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
+    let reflecting = textureSample(reflectance_texture, detail_sampler, place);
+    let emitting = textureSample(emission_texture, detail_sampler, place);
     var reflectance = surface.reflectance;
-    if (detail.factor.w * view.display.w > 0.5) {
-        reflectance = detail.factor.rgb * texel.rgb;
+    if (detail.reflectance.w * view.display.w > 0.5) {
+        reflectance = detail.reflectance.rgb * reflecting.rgb;
     }
-    let radiance = surface.emission + reflectance * surface.light / PI;
+    var emission = surface.emission;
+    if (detail.emission.w * view.display.w > 0.5) {
+        emission = detail.emission.rgb * emitting.rgb;
+    }
+    let radiance = emission + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
     switch u32(view.display.x) {
         case 1u: { return exposed(surface.light / PI); }

@@ -61,7 +61,7 @@ impl Uploads {
     pub fn renew(&mut self, gpu: &Gpu, source: &Source<'_>) -> Result<(), RenderError> {
         self.boxes.prepare(gpu, "boxes", source.boxes);
         self.details
-            .prepare(gpu, source.scene, &source.mesh.texture_factors);
+            .prepare(gpu, source.scene, &source.mesh.appearances);
         let is_current = |held: &MeshBuffers| Arc::ptr_eq(&held.source, source.mesh);
         if !self.mesh.as_ref().is_some_and(is_current) {
             // Nobody holds on to the old mesh here: two large ones may not fit.

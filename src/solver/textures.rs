@@ -1,0 +1,321 @@
+//! Elements divided by what textures show, before any light: a painted lamp, a floor that is half dark.
+//!
+//! An element sends the mean of its textures from all of itself, so light leaves from the wrong place: at most half of
+//! its mean deviation is moved, by about its radius. A receiver at the distance `d` gets light wrong by the share
+//! `4 · moved / d` of what is moved ([`CHANGE`]). For a receiver as far away as what sends is large, these errors are
+//! summed over all elements, as those of independent ones, and the largest are divided until the sum is small. So a
+//! fine pattern is left alone, whose light leaves evenly, and so is what sends little.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::Solver;
+use crate::{hierarchy::Hierarchy, scene::Appearance, transport::luminance};
+
+/// Error of the light that leaves, relative to all of it. Larger shows lamps in wrong places, smaller divides more finely
+/// than links tell apart.
+const TOLERANCE: f32 = 0.02;
+
+/// Relative change of a form factor per distance moved over the distance between: of the two cosines one, and of the
+/// squared distance two.
+const CHANGE: f32 = 4.0;
+
+/// Elements that may be made. Fewer, and many painted lamps are coarse; more, and it takes longer to sample them than all
+/// else. One lamp takes ten to a hundred, whatever the picture.
+const MOST_MADE: usize = 4096;
+
+/// Elements whose errors could add to no more than this share of the tolerance are not looked at. Larger leaves errors
+/// unknown, smaller takes time where there are many small textured faces.
+const UNSEEN_SHARE: f32 = 0.1;
+
+/// Light of one kind that all elements send: emission, or reflection of even light.
+#[derive(Clone, Copy, Default)]
+struct Sent {
+    /// Luminance times area.
+    power: f64,
+    /// Square of the luminance times area.
+    squares: f64,
+}
+
+impl Sent {
+    fn add(self, luminance: f32, area: f32) -> Self {
+        let (luminance, area) = (f64::from(luminance), f64::from(area));
+        Self {
+            power: self.power + luminance * area,
+            squares: self.squares + luminance * luminance * area,
+        }
+    }
+
+    /// Error for light of this deviation from its mean, on an element of this area and radius; 0 where nothing is sent.
+    fn error(self, deviation: f32, area: f32, radius: f32) -> f32 {
+        // Root of the area that would send as much if it did so evenly.
+        let size = self.power / self.squares.sqrt();
+        let moved = 0.5 * f64::from(deviation) * f64::from(area) * f64::from(radius);
+        let error = f64::from(CHANGE) * moved / (size * self.power);
+        if error.is_finite() { error as f32 } else { 0.0 }
+    }
+}
+
+impl Solver {
+    /// Divide elements by their textures until the light that leaves is right to [`TOLERANCE`].
+    pub(super) fn divide_by_textures(&mut self) {
+        let most = self.hierarchy.mesh.elements.len() + MOST_MADE;
+        let most_elements = self.most_elements().min(most as u64);
+        loop {
+            let leaves = self.textured_leaves();
+            let mut wanted = self.misplaced(&leaves);
+            while !self.hierarchy.mesh.fits(&wanted, most_elements) {
+                // The first ones err most.
+                wanted.truncate(wanted.len() / 2);
+            }
+            if wanted.is_empty() || !self.hierarchy.mesh.divide(&wanted) {
+                return;
+            }
+            self.extend_to_new_elements();
+        }
+    }
+
+    /// By how much the radiosity of a leaf varies over it since its textures do (luminance).
+    pub(super) fn texture_spread(&self, leaf: usize) -> f32 {
+        let Some(deviation) = self.deviation_of(leaf) else {
+            return 0.0;
+        };
+        let irradiance = self.linked[leaf] + self.direct_of(leaf);
+        let reflected = deviation.reflectance * irradiance.truncate();
+        let emitted = match self.is_sampled(leaf) {
+            true => Vec3::ZERO,
+            false => deviation.emission * PI,
+        };
+        luminance((reflected + emitted).extend(0.0))
+    }
+
+    /// Mean deviation of reflectance and emission within an element, as far as it is known.
+    fn deviation_of(&self, element: usize) -> Option<Appearance> {
+        let deviation = self.hierarchy.texture_deviation_of(element)?;
+        let triangle = self.hierarchy.patch_of(element).triangle;
+        let material = self.scene.triangles[triangle.index()].material;
+        Some(deviation.times(&self.appearances()[material.index()], 1.0))
+    }
+
+    /// Leaves that textures may divide.
+    fn textured_leaves(&self) -> Vec<usize> {
+        let (hierarchy, min_area) = (&self.hierarchy, self.min_area());
+        if self.scene.texcoords.is_empty() {
+            return Vec::new();
+        }
+        let leaves = hierarchy.mesh.held_leaves().filter(|&leaf| {
+            let area = hierarchy.mesh.elements[leaf].area_vector.length();
+            area * 0.25 >= min_area && self.scene.is_textured(hierarchy.patch_of(leaf).triangle)
+        });
+        leaves.collect()
+    }
+
+    /// Those of some textured leaves that must be divided, the one that errs most first.
+    fn misplaced(&mut self, leaves: &[usize]) -> Vec<u32> {
+        if leaves.is_empty() {
+            return Vec::new();
+        }
+        let sent = sent(&self.hierarchy);
+        let unseen = UNSEEN_SHARE * TOLERANCE / (leaves.len() as f32).sqrt();
+        // No deviation is larger than twice the mean.
+        let may_err = |&leaf: &usize| {
+            let most = shown_by(&self.hierarchy, leaf).map(|mean| 2.0 * mean);
+            self.hierarchy.texture_deviation_of(leaf).is_none()
+                && error_of(&self.hierarchy, sent, leaf, most) > unseen
+        };
+        let unknown: Vec<usize> = leaves.iter().copied().filter(may_err).collect();
+        self.hierarchy
+            .look_at_textures(&self.scene, &self.relighting.appearances, &unknown);
+        let mut errors: Vec<(f32, usize)> = leaves
+            .par_iter()
+            .filter_map(|&leaf| {
+                let deviation = self.deviation_of(leaf)?;
+                let deviations = [deviation.reflectance, deviation.emission];
+                let of_leaf = error_of(&self.hierarchy, sent, leaf, deviations);
+                (of_leaf > 0.0).then_some((of_leaf, leaf))
+            })
+            .collect();
+        errors.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut rest: f64 = errors
+            .iter()
+            .map(|(error, _)| f64::from(*error).powi(2))
+            .sum();
+        let is_wanted = |&(error, _): &(f32, usize)| {
+            let is_wrong = rest > f64::from(TOLERANCE).powi(2);
+            rest -= f64::from(error).powi(2);
+            is_wrong
+        };
+        let wanted = errors.iter().copied().take_while(is_wanted);
+        wanted.map(|(_, leaf)| leaf as u32).collect()
+    }
+}
+
+/// Mean reflectance and emission of an element.
+fn shown_by(hierarchy: &Hierarchy, element: usize) -> [Vec3; 2] {
+    [
+        hierarchy.reflectance_of(element),
+        hierarchy.emission_of(element),
+    ]
+}
+
+/// What all leaves reflect and emit.
+fn sent(hierarchy: &Hierarchy) -> [Sent; 2] {
+    let leaves = hierarchy.mesh.held_leaves();
+    leaves.fold([Sent::default(); 2], |sent, leaf| {
+        let area = hierarchy.mesh.elements[leaf].area_vector.length();
+        let [reflected, emitted] = shown_by(hierarchy, leaf);
+        let add = |sent: Sent, color: Vec3| sent.add(luminance(color.extend(0.0)), area);
+        [add(sent[0], reflected), add(sent[1], emitted)]
+    })
+}
+
+/// Error of an element whose reflectance and emission deviate so from their means.
+fn error_of(hierarchy: &Hierarchy, sent: [Sent; 2], element: usize, deviations: [Vec3; 2]) -> f32 {
+    let element = &hierarchy.mesh.elements[element];
+    let area = element.area_vector.length();
+    let errors = [0, 1].map(|kind| {
+        let deviation = luminance(deviations[kind].extend(0.0));
+        sent[kind].error(deviation, area, element.radius)
+    });
+    errors[0].hypot(errors[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DVec3, Vec2};
+
+    use super::*;
+    use crate::{
+        scene::{
+            Face, Material, MaterialId, SceneBuilder, SceneOptions, Sides, Texture, TextureId,
+        },
+        solver::{Cancel, SolveSettings},
+    };
+
+    const SIDE: usize = 64;
+
+    /// A square lamp with a picture in it, by column and row, that looks at a black square.
+    fn lamp(picture: impl Fn(usize, usize) -> f32) -> Solver {
+        let mut builder = SceneBuilder::default();
+        builder.textures.push(Texture {
+            name: String::new(),
+            width: SIDE as u32,
+            height: SIDE as u32,
+            pixels: (0..SIDE * SIDE)
+                .map(|index| Vec3::splat(picture(index % SIDE, index / SIDE)))
+                .collect(),
+        });
+        builder.push_material(Material {
+            emission_texture: Some(TextureId(0)),
+            ..Material::plain("lamp", Vec3::ZERO, Vec3::splat(2.0))
+        });
+        builder.push_material(Material::plain("wall", Vec3::ZERO, Vec3::ZERO));
+        let places = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+        for (material, height) in [(0, 0.0), (1, 1.0)] {
+            let points = places.map(|place| {
+                builder.push_position(DVec3::new(place.x.into(), place.y.into(), height))
+            });
+            for corners in [[0, 1, 2], [0, 2, 3]] {
+                let [a, b, c] = if material == 0 {
+                    corners
+                } else {
+                    [corners[0], corners[2], corners[1]]
+                };
+                builder.faces.push(Face {
+                    corners: [points[a], points[b], points[c]],
+                    texcoords: Some([places[a], places[b], places[c]]),
+                    normals: None,
+                    material: MaterialId(material),
+                    line: 0,
+                });
+            }
+        }
+        let options = SceneOptions {
+            sides: Sides::One,
+            ..SceneOptions::default()
+        };
+        let scene = Arc::new(builder.finish(&options).expect("four faces"));
+        let settings = SolveSettings::draft();
+        Solver::new(scene, settings, None, &Cancel::default()).expect("nobody cancels")
+    }
+
+    /// Area and power of what shines, relative to a lamp that is white all over, and the number of its parts.
+    fn shining(solver: &Solver) -> (f32, f32, usize) {
+        let hierarchy = &solver.hierarchy;
+        let lamps = (0..hierarchy.patches.len())
+            .filter(|&patch| hierarchy.patches[patch].emission != Vec3::ZERO);
+        let parts: Vec<usize> = lamps
+            .flat_map(|patch| hierarchy.emitting_parts(patch))
+            .collect();
+        let patches = hierarchy.patches.iter();
+        let whole = patches.map(|patch| patch.area).sum::<f32>() / 2.0;
+        let area = |part: &usize| hierarchy.mesh.elements[*part].area_vector.length() / whole;
+        let power = |part: &usize| area(part) * hierarchy.emission_of(*part).x / 2.0;
+        (
+            parts.iter().map(area).sum(),
+            parts.iter().map(power).sum(),
+            parts.len(),
+        )
+    }
+
+    #[test]
+    fn black_parts_of_a_lamp_shine_not_and_bright_ones_are_whole() {
+        let mut solver = lamp(|column, row| match (column, row) {
+            (16..32, 32..48) => 1.0,
+            _ => 0.0,
+        });
+        solver.hierarchy.validate().expect("it is valid");
+        let leaves = solver.textured_leaves();
+        assert!(solver.misplaced(&leaves).is_empty(), "all are right");
+        let (area, power, count) = shining(&solver);
+        assert!((power - 1.0 / 16.0).abs() < 1e-3, "{power}");
+        // With the rim over which the picture is blurred.
+        assert!(area < 0.2, "{area}");
+        assert!(count < 200, "{count}");
+    }
+
+    #[test]
+    fn gradients_and_pictures_are_divided_until_they_are_right() {
+        // The second is like a photograph: as rough at every size.
+        let rough = |column: usize, row: usize| {
+            let waves = (0..6).map(|octave| {
+                let (x, y) = (column >> octave, row >> octave);
+                ((x * 31 + y * 17 + octave) * 2_654_435_761 % 1000) as f32 / 6000.0
+            });
+            waves.sum::<f32>()
+        };
+        for (name, mut solver) in [
+            ("gradient", lamp(|column, _| column as f32 / SIDE as f32)),
+            ("picture", lamp(rough)),
+        ] {
+            solver.hierarchy.validate().expect("it is valid");
+            let leaves = solver.textured_leaves();
+            assert!(solver.misplaced(&leaves).is_empty(), "{name}");
+            let (area, _, count) = shining(&solver);
+            assert!(
+                area > 0.99 && (4..200).contains(&count),
+                "{name}: {area} {count}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_fine_pattern_is_left_alone() {
+        let fine = lamp(|column, row| {
+            if (column + row).is_multiple_of(2) {
+                1.0
+            } else {
+                0.0
+            }
+        });
+        let plain = lamp(|_, _| 0.5);
+        let count = |solver: &Solver| solver.hierarchy.mesh.elements.len();
+        assert_eq!(count(&fine), count(&plain));
+        let (_, power, _) = shining(&fine);
+        assert!((power - 0.5).abs() < 0.02, "{power}");
+    }
+}
