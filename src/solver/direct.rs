@@ -15,9 +15,7 @@ use super::{
     panel::panels,
 };
 use crate::{
-    geometry::{
-        Random, RayTree, SphericalTriangle, low_discrepancy_2d, triangle_point,
-    },
+    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_2d, triangle_point},
     hierarchy::Hierarchy,
     scene::{MaterialId, Scene, TriangleId},
     transport::luminance,
@@ -183,14 +181,7 @@ impl Lights {
             .with_min_len(16)
             .for_each_init(Vec::new, |cut, (light, receiver)| {
                 if !cancel.is_cancelled() {
-                    self.shoot_at(
-                        rays,
-                        receiver,
-                        light.tried..wanted(light),
-                        seed,
-                        cut,
-                        light,
-                    );
+                    self.shoot_at(rays, receiver, light.tried..wanted(light), seed, cut, light);
                 }
             });
     }
@@ -496,12 +487,17 @@ impl DirectLight {
         fraction * (1.0 - fraction) / shot
     }
 
-    /// Standard error of the luminance as far as so few rays can tell, with half a hit and half a miss more: so that it is
+    /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
     /// above 0 where all agree.
-    pub(super) fn doubt(&self) -> f32 {
+    pub(super) fn fraction_doubt(&self) -> f32 {
         let shot = self.shot as f32 + 1.0;
         let fraction = (self.visible as f32 + 0.5) / shot;
-        luminance(self.exact) * (fraction * (1.0 - fraction) / shot).sqrt()
+        (fraction * (1.0 - fraction) / shot).sqrt()
+    }
+
+    /// As [`Self::fraction_doubt`] for the luminance.
+    pub(super) fn doubt(&self) -> f32 {
+        luminance(self.exact) * self.fraction_doubt()
     }
 
     /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.

@@ -431,7 +431,10 @@ fn split(items: &mut [Item], depth: u32) -> usize {
         return items.len() / 2;
     }
     let all = before.iter().chain(&behind);
-    items.iter_mut().zip(all).for_each(|(item, new)| *item = *new);
+    items
+        .iter_mut()
+        .zip(all)
+        .for_each(|(item, new)| *item = *new);
     before.len()
 }
 
@@ -474,12 +477,16 @@ mod tests {
             let (u, v) = normal.any_orthonormal_pair();
             let (u, v) = (u * (edge * 0.5), v * (edge * 0.5));
             let corner = |a: f32, b: f32| centre + u * a + v * b;
-            let [a, b, c, d] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-                .map(|(x, y)| corner(x, y));
+            let [a, b, c, d] =
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| corner(x, y));
             let first = 4 * self.0.len() as u32;
             for corners in [[0, 1, 2], [0, 2, 3]] {
                 let places = corners.map(|corner| [a, b, c, d][corner]);
-                self.face(corners.map(|corner| first + corner as u32), places, radiosity);
+                self.face(
+                    corners.map(|corner| first + corner as u32),
+                    places,
+                    radiosity,
+                );
             }
         }
 
@@ -596,8 +603,7 @@ mod tests {
                 let found = tree.unoccluded(receiver, &mut cut);
                 sizes += cut.len();
                 let parts = tree.emitters.iter().map(|emitter| {
-                    let part =
-                        point_irradiance(receiver.point, receiver.normal, emitter.corners);
+                    let part = point_irradiance(receiver.point, receiver.normal, emitter.corners);
                     (emitter.radiosity * part).as_dvec4()
                 });
                 let exact = parts.sum::<glam::DVec4>().as_vec4();
@@ -608,8 +614,14 @@ mod tests {
             }
             let (count, size) = (receivers.len(), sizes / receivers.len());
             let typical = (squares / count as f32).sqrt();
-            println!("{name}: {} emitters, cut {size}, {typical} {worst}", lamps.0.len());
-            assert!(typical < 1.5e-3 && worst < 5e-3, "{name}: {typical} {worst}");
+            println!(
+                "{name}: {} emitters, cut {size}, {typical} {worst}",
+                lamps.0.len()
+            );
+            assert!(
+                typical < 1.5e-3 && worst < 5e-3,
+                "{name}: {typical} {worst}"
+            );
         }
     }
 
@@ -641,8 +653,11 @@ mod tests {
                         continue;
                     };
                     let node_of = &tree.nodes[node as usize];
-                    let light = |emitter: usize| tree.exact(emitter, &receiver).map_or(0.0, luminance);
-                    let all: f32 = (node_of.start..node_of.end).map(|at| light(at as usize)).sum();
+                    let light =
+                        |emitter: usize| tree.exact(emitter, &receiver).map_or(0.0, luminance);
+                    let all: f32 = (node_of.start..node_of.end)
+                        .map(|at| light(at as usize))
+                        .sum();
                     const COUNT: u32 = 2000;
                     let places = (0..COUNT).map(|place| (place as f32 + 0.5) / COUNT as f32);
                     let mean = places

@@ -24,6 +24,11 @@ const NEAREST: f32 = 1.5;
 /// tolerance; larger, and cuts have more nodes than they need.
 const TRUNCATION: f32 = 8.0;
 
+/// A point is told from one in the plane of the emitters if it lies this far before it, frame units: at the rim of the frame
+/// single precision resolves less than half of it, and shadow rays begin ten times as far off. Smaller, and points beside many
+/// lamps in one ceiling look at each of them; larger, and surfaces just before an emitter stay dark.
+const RESOLUTION: f32 = 1e-5;
+
 /// Moments of the light of some emitters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Multipole {
@@ -120,8 +125,7 @@ impl Multipole {
             merged.directional.merge(&part.directional);
             for a in 0..3 {
                 for b in 0..3 {
-                    merged.first[a][b] +=
-                        part.first[a][b] + part.directional.linear[a] * shift[b];
+                    merged.first[a][b] += part.first[a][b] + part.directional.linear[a] * shift[b];
                 }
             }
         }
@@ -148,7 +152,7 @@ impl Multipole {
         } else {
             along * cos + across * sin
         } + slack;
-        if most <= 0.0 {
+        if most <= RESOLUTION {
             return None;
         }
         let least = if self.angle < FRAC_PI_2 {
@@ -198,10 +202,9 @@ impl Multipole {
         }
         let over = 1.0 / sight.squared;
         let (of_y, of_normal) = (self.second * y, self.second * normal);
-        let factor = height
-            - 4.0 * normal.dot(of_y) * over
-            - 2.0 * height * trace(&self.second) * over
-            + 12.0 * height * y.dot(of_y) * over * over;
+        let factor =
+            height - 4.0 * normal.dot(of_y) * over - 2.0 * height * trace(&self.second) * over
+                + 12.0 * height * y.dot(of_y) * over * over;
         let towards = y * factor + of_normal - of_y * (4.0 * height * over);
         let sideways = normal - y * (4.0 * height * over);
         let mut sum = Vec4::ZERO;

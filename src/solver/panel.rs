@@ -51,7 +51,6 @@ pub(super) struct Panel {
 }
 
 impl Panel {
-
     /// Irradiance of the whole panel for radiosity 1; `None` where its emitters are better looked at one by one.
     pub(super) fn irradiance(&self, receiver: &Receiver) -> Option<f32> {
         if self.emitters.len() == 1 {
