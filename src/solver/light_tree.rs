@@ -297,7 +297,12 @@ impl LightTree {
         let own = until[chosen] - chosen.checked_sub(1).map_or(0.0, |before| until[before]);
         let emitter = &self.emitters[emitters.start + chosen];
         let power = luminance(emitter.radiosity) * emitter.area;
-        (emitters.start + chosen, power * sum / (own * chance))
+        let per_chance = if own > 0.0 {
+            power * sum / (own * chance)
+        } else {
+            0.0
+        };
+        (emitters.start + chosen, per_chance)
     }
 
     /// The emitter that holds a place of the area of a node, given from 0 to 1.
