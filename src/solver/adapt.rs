@@ -389,7 +389,8 @@ impl DirectField {
         );
         cancel.proceed()?;
         let noisy = |index: usize, light: &DirectLight| {
-            limits.is_noisy(light, share_root(hierarchy, unknown[index]), mean)
+            let corners = self.tally_of_corners(hierarchy, unknown[index]);
+            limits.is_noisy(light, corners, share_root(hierarchy, unknown[index]), mean)
         };
         self.double(rays, &receivers, noisy, limits.seed, &mut lights, cancel)?;
         let mut ray_count = 0;

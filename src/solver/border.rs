@@ -31,10 +31,16 @@ impl Limits {
         self.is_seen(error / NOISE_SHARE, beside, weight)
     }
 
-    /// Whether the noise of the rays of a point can be seen.
-    pub(super) fn is_grainy(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
+    /// Whether the noise of the rays of a point can be seen, by its standard error.
+    pub(super) fn is_grainy(
+        &self,
+        light: &DirectLight,
+        error: f32,
+        weight: f32,
+        mean: f32,
+    ) -> bool {
         let beside = mean.max(luminance(light.irradiance()));
-        self.is_noise_seen(light.error(), beside, weight)
+        self.is_noise_seen(error, beside, weight)
     }
 
     /// Whether the rays of a point are too few where those of its neighbours had another outcome: though all of them
@@ -155,7 +161,7 @@ mod tests {
     #[test]
     fn what_gets_no_light_has_no_noise_to_be_seen() {
         let limits = limits(1e-3);
-        assert!(!limits.is_grainy(&DirectLight::default(), 1.0, 1.0));
+        assert!(!limits.is_grainy(&DirectLight::default(), 0.0, 1.0, 1.0));
         assert!(!limits.is_doubtful(&DirectLight::default(), 1.0, 1.0));
     }
 }

@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::{
     Cancel,
     adapt::{DirectField, Limits, vertex_share_roots},
-    direct::{DirectLight, Receiver},
+    direct::{DirectLight, Receiver, Tally},
     reconstruct::INSET,
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy};
@@ -29,20 +29,28 @@ impl Limits {
         MOST_SAMPLES * self.shadow_samples
     }
 
-    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root.
-    pub(super) fn is_noisy(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
+    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root, by
+    /// what the rays of its neighbours found.
+    pub(super) fn is_noisy(
+        &self,
+        light: &DirectLight,
+        neighbours: Tally,
+        weight: f32,
+        mean: f32,
+    ) -> bool {
+        let error = light.error_among(neighbours);
         light.tried < self.most_samples()
-            && (light.error() * weight > NOISE_SHARE * self.tolerance * mean
-                || self.is_grainy(light, weight, mean))
+            && (error * weight > NOISE_SHARE * self.tolerance * mean
+                || self.is_grainy(light, error, weight, mean))
     }
 }
 
 impl DirectField {
     /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.
     ///
-    /// A share of the rays comes first. Where they agree with those of all vertices of the same elements there is no
-    /// shadow border, and they are enough. (To trust a vertex's own rays alone would be biased: where a twentieth of
-    /// the light arrives, most vertices would see none.)
+    /// A share of the rays comes first. Where those of all other vertices of the same elements agree there is no shadow
+    /// border, and they are enough, unless the vertex itself differs beyond chance. (To count its own rays, too, would be
+    /// biased: where a hundredth of the light arrives, only what few vertices saw would be thinned by more rays.)
     pub(super) fn cover(
         &mut self,
         rays: &RayTree,
@@ -70,7 +78,7 @@ impl DirectField {
         }
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, |_| probing, seed, cancel);
-        let disputed = self.disputed(hierarchy, elements.clone());
+        let disputed = self.disputed(&self.neighbours(hierarchy, elements.clone()));
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
@@ -97,14 +105,15 @@ impl DirectField {
     ) -> Option<u64> {
         let weights = vertex_share_roots(hierarchy);
         let all = 0..hierarchy.mesh.elements.len();
+        let neighbours = self.neighbours(hierarchy, all.clone());
         // Where no contrast counts, nothing is doubtful.
         let disputed = limits
             .contrast
             .is_finite()
-            .then(|| self.disputed(hierarchy, all.clone()));
+            .then(|| self.disputed(&neighbours));
         let may_be_noisy = |vertex: usize, light: &DirectLight| {
             let is_disputed = || disputed.as_ref().is_some_and(|disputed| disputed[vertex]);
-            limits.is_noisy(light, weights[vertex], mean)
+            limits.is_noisy(light, neighbours[vertex], weights[vertex], mean)
                 || is_disputed() && limits.is_doubtful(light, weights[vertex], mean)
         };
         let is_noisy = |vertex: usize, light: Option<DirectLight>| {
@@ -206,21 +215,41 @@ impl DirectField {
         self.learn(receivers, known);
     }
 
-    /// Which vertices share one of these elements with one whose rays had another outcome.
-    fn disputed(&self, hierarchy: &Hierarchy, elements: Range<usize>) -> Vec<bool> {
-        let mut disputed = vec![false; self.vertices.len()];
+    /// What the rays of the other corners of these elements found, by vertex.
+    fn neighbours(&self, hierarchy: &Hierarchy, elements: Range<usize>) -> Vec<Tally> {
+        let mut neighbours = vec![Tally::default(); self.vertices.len()];
         for leaf in hierarchy.mesh.leaves_among(elements) {
-            let corners = hierarchy.mesh.elements[leaf]
-                .vertices
-                .map(|vertex| vertex as usize);
-            let [a, b, c] = corners.map(|vertex| self.vertices[vertex].unwrap_or_default());
-            if !(a.agrees_with(&b) && b.agrees_with(&c) && c.agrees_with(&a)) {
-                for vertex in corners {
-                    disputed[vertex] = true;
+            let corners = hierarchy.mesh.elements[leaf].vertices;
+            for (side, vertex) in corners.into_iter().enumerate() {
+                for other in [corners[(side + 1) % 3], corners[(side + 2) % 3]] {
+                    neighbours[vertex as usize] += self.tally(other);
                 }
             }
         }
-        disputed
+        neighbours
+    }
+
+    /// What the rays of a vertex found.
+    fn tally(&self, vertex: u32) -> Tally {
+        let light = self.vertices[vertex as usize];
+        light.map_or(Tally::default(), |light| light.tally())
+    }
+
+    /// What the rays of the corners of an element found.
+    pub(super) fn tally_of_corners(&self, hierarchy: &Hierarchy, element: usize) -> Tally {
+        let mut sum = Tally::default();
+        for vertex in hierarchy.mesh.elements[element].vertices {
+            sum += self.tally(vertex);
+        }
+        sum
+    }
+
+    /// Which vertices lie among others whose rays had different outcomes, or another one than their own.
+    fn disputed(&self, neighbours: &[Tally]) -> Vec<bool> {
+        let is_disputed = |(vertex, others): (usize, &Tally)| {
+            others.is_mixed() || others.shot > 0 && !self.tally(vertex as u32).is_like(*others)
+        };
+        neighbours.iter().enumerate().map(is_disputed).collect()
     }
 
     /// As [`super::beyond::Beyond::vertex_places`] has it, by what is known of each vertex.

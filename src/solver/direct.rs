@@ -1,8 +1,8 @@
 //! Direct light: irradiance from the emitters at points, by exact form factors and shadow rays.
 //!
-//! Unoccluded, each emitting patch gives its exact irradiance. Shadow rays only tell which part of it arrives: they are
-//! spread over the patches in proportion to that irradiance, stratified, and weighed by the transfer that each stands
-//! for.
+//! Unoccluded, the irradiance of the emitters is exact, or that of many far ones together nearly so (see `light_tree`).
+//! Shadow rays only tell which part of it arrives: they are spread over the emitters in proportion to that irradiance,
+//! stratified, and weighed by the transfer that each stands for.
 
 use std::{f32::consts::PI, ops::Range};
 
@@ -11,20 +11,15 @@ use rayon::prelude::*;
 
 use super::{
     Cancel, Direct,
-    panel::{Panel, panels},
+    light_tree::{Arriving, LightTree, Target},
+    panel::panels,
 };
 use crate::{
-    geometry::{
-        Random, RayTree, SphericalTriangle, low_discrepancy_2d, point_irradiance, triangle_point,
-    },
-    hierarchy::{Hierarchy, Patch},
+    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_2d, triangle_point},
+    hierarchy::Hierarchy,
     scene::{MaterialId, Scene, TriangleId},
     transport::luminance,
 };
-
-/// An emitting patch is sampled if it gives at least one part in this many of all light. So at most as many patches are,
-/// and every vertex looks at all of them; of the others, so many give so little each that links blur them together.
-const LEAST_SAMPLED_SHARE: f64 = 512.0;
 
 /// Places of random streams per frame unit: single precision tells 2^17 of them apart at the rim of the frame.
 const PLACES: f32 = 16_384.0;
@@ -57,9 +52,7 @@ pub(super) struct Receiver {
 
 /// The emitters that are sampled.
 pub(super) struct Lights {
-    /// Those of a panel follow each other.
-    emitters: Vec<Emitter>,
-    panels: Vec<Panel>,
+    tree: LightTree,
     /// Largest radiosity of an emitter by channel: no irradiance can be larger.
     brightest: Vec4,
     /// By patch.
@@ -67,23 +60,15 @@ pub(super) struct Lights {
 }
 
 impl Lights {
-    /// The emitting patches of a hierarchy that are worth sampling: all of them, none, or those that give a good part of
-    /// the light by themselves, so that lamps of many small faces stay with the links.
+    /// The emitting patches of a hierarchy: all of them, or none.
     pub(super) fn new(scene: &Scene, hierarchy: &Hierarchy, mode: Direct) -> Self {
-        let power = |patch: &Patch| f64::from(luminance(patch.emission.extend(0.0)) * patch.area);
-        let total: f64 = hierarchy.patches.iter().map(power).sum();
-        let least = match mode {
-            Direct::Auto => total / LEAST_SAMPLED_SHARE,
-            Direct::Sampled => 0.0,
-            Direct::Linked => f64::INFINITY,
-        };
         let is_sampled: Vec<bool> = hierarchy
             .patches
             .iter()
             .enumerate()
             .map(|(index, patch)| {
                 let is_seen = hierarchy.held().contains(&index);
-                is_seen && patch.emission != Vec3::ZERO && power(patch) >= least
+                is_seen && patch.emission != Vec3::ZERO && mode != Direct::Linked
             })
             .collect();
         let sampled = (0..is_sampled.len()).filter(|&patch| is_sampled[patch]);
@@ -98,8 +83,7 @@ impl Lights {
         let (emitters, panels) = panels(emitters);
         Self {
             brightest: brightest(&emitters),
-            emitters,
-            panels,
+            tree: LightTree::new(emitters, panels),
             is_sampled,
         }
     }
@@ -107,6 +91,7 @@ impl Lights {
     /// The emitters whose materials `emission` knows, with that emitted radiance times their texture.
     pub(super) fn repainted(&self, emission: impl Fn(MaterialId) -> Option<Vec3>) -> Self {
         let emitters: Vec<Emitter> = self
+            .tree
             .emitters
             .iter()
             .filter_map(|emitter| {
@@ -134,7 +119,7 @@ impl Lights {
 
     /// Whether nothing is sampled.
     pub(super) fn is_empty(&self) -> bool {
-        self.emitters.is_empty()
+        self.tree.emitters.is_empty()
     }
 
     /// Whether the emission of a patch is sampled and so must not travel over links.
@@ -144,7 +129,7 @@ impl Lights {
 
     /// The triangles of the emitters.
     pub(super) fn triangles(&self) -> impl Iterator<Item = TriangleId> + '_ {
-        self.emitters.iter().map(|emitter| emitter.triangle)
+        self.tree.emitters.iter().map(|emitter| emitter.triangle)
     }
 
     /// Whether all emission that light is computed from is sampled.
@@ -157,7 +142,7 @@ impl Lights {
     /// no more than can.
     pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
         let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
-        let sum: f64 = self.emitters.iter().map(power).sum();
+        let sum: f64 = self.tree.emitters.iter().map(power).sum();
         let mean = (sum / hierarchy.importance.area.max(f64::MIN_POSITIVE)) as f32;
         mean.min(luminance(self.brightest))
     }
@@ -182,40 +167,33 @@ impl Lights {
             .par_iter_mut()
             .zip(receivers)
             .with_min_len(16)
-            .for_each_init(Vec::new, |sums, (light, receiver)| {
+            .for_each_init(Vec::new, |cut, (light, receiver)| {
                 if !cancel.is_cancelled() {
-                    self.shoot_at(
-                        rays,
-                        receiver,
-                        light.tried..wanted(light),
-                        seed,
-                        sums,
-                        light,
-                    );
+                    self.shoot_at(rays, receiver, light.tried..wanted(light), seed, cut, light);
                 }
             });
     }
 
-    /// Shoot a range of the shadow rays of one point. `sums` is scratch space.
+    /// Shoot a range of the shadow rays of one point. `cut` is scratch space.
     fn shoot_at(
         &self,
         rays: &RayTree,
         receiver: &Receiver,
         samples: Range<u32>,
         seed: u64,
-        sums: &mut Vec<Arriving>,
+        cut: &mut Vec<Arriving>,
         light: &mut DirectLight,
     ) {
         if samples.is_empty() {
             return;
         }
-        light.exact = self.unoccluded(receiver, sums);
+        light.exact = self.unoccluded(receiver, cut);
         light.tried = samples.end.max(light.tried);
         if rays.is_clear() {
             light.arrive_whole();
             return;
         }
-        let total = sums.last().map_or(0.0, |last| last.until);
+        let total = cut.last().map_or(0.0, |last| last.until);
         if total <= 0.0 {
             return;
         }
@@ -232,81 +210,49 @@ impl Lights {
         let (mut target, mut bundle) = (usize::MAX, Bundle::default());
         for (stratum, sample) in samples.enumerate() {
             let at = (stratum as f32 + random.uniform()) / count * total;
-            let chosen = sums.partition_point(|part| part.until <= at);
-            let chosen = chosen.min(sums.len() - 1);
+            let chosen = cut.partition_point(|part| part.until <= at);
+            let chosen = chosen.min(cut.len() - 1);
             if chosen != target {
                 light.count(&bundle);
-                (target, bundle) = (chosen, self.bundle(receiver, &sums[chosen]));
+                (target, bundle) = (chosen, self.bundle(receiver, cut[chosen].target));
             }
-            let before = chosen.checked_sub(1).map_or(0.0, |last| sums[last].until);
-            let place = (at - before) / (sums[chosen].until - before);
-            let emitter = sums[chosen]
-                .emitter
-                .unwrap_or_else(|| self.panels[sums[chosen].panel].emitter_at(place));
-            let emitter = &self.emitters[emitter];
+            let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
+            let place = (at - before) / (cut[chosen].until - before);
+            let (emitter, per_chance) = self.tree.pick(cut[chosen].target, receiver, place);
+            let emitter = &self.tree.emitters[emitter];
             bundle.rays += 1;
             let square = low_discrepancy_2d(sample, shift);
             let (point, weight) = emitter.aim(receiver, bundle.seen.as_ref(), square);
+            let weight = weight * per_chance;
             if !(weight.is_finite() && weight > 0.0) {
                 continue;
             }
             let ends = [Some(receiver.triangle), Some(emitter.triangle)];
-            bundle.count(weight, !rays.occluded(receiver.point, point, ends));
+            let color = emitter.radiosity / luminance(emitter.radiosity);
+            bundle.count(weight, color, !rays.occluded(receiver.point, point, ends));
         }
         light.count(&bundle);
     }
 
-    /// Rays that are about to be shot to a panel or an emitter.
-    fn bundle(&self, receiver: &Receiver, arriving: &Arriving) -> Bundle {
-        let first = self.panels[arriving.panel].emitters.start;
-        let emitter = &self.emitters[arriving.emitter.unwrap_or(first)];
-        let is_one = arriving.emitter.is_some();
-        let seen = || SphericalTriangle::new(receiver.point, emitter.corners);
+    /// Rays that are about to be shot to a target.
+    fn bundle(&self, receiver: &Receiver, target: Target) -> Bundle {
+        let seen = match target {
+            Target::Emitter(emitter) => {
+                let corners = self.tree.emitters[emitter as usize].corners;
+                SphericalTriangle::new(receiver.point, corners)
+            }
+            Target::Node(_) => None,
+        };
         Bundle {
-            color: emitter.radiosity / luminance(emitter.radiosity),
-            seen: is_one.then(seen).flatten(),
+            seen,
             ..Bundle::default()
         }
     }
 
-    /// Irradiance without occlusion; `sums` becomes the running sums of its luminance over panels and emitters.
-    pub(super) fn unoccluded(&self, receiver: &Receiver, sums: &mut Vec<Arriving>) -> Vec4 {
-        let (mut exact, mut until) = (Vec4::ZERO, 0.0);
-        sums.clear();
-        let mut add = |panel: usize, emitter: Option<usize>, arrives: Vec4| {
-            exact += arrives;
-            until += luminance(arrives);
-            sums.push(Arriving {
-                until,
-                panel,
-                emitter,
-            });
-        };
-        for (index, panel) in self.panels.iter().enumerate() {
-            if let Some(part) = panel.irradiance(receiver) {
-                let radiosity = self.emitters[panel.emitters.start].radiosity;
-                add(index, None, radiosity * part);
-                continue;
-            }
-            for at in panel.emitters.clone() {
-                let emitter = &self.emitters[at];
-                if emitter.triangle != receiver.triangle {
-                    let part = point_irradiance(receiver.point, receiver.normal, emitter.corners);
-                    add(index, Some(at), emitter.radiosity * part);
-                }
-            }
-        }
-        exact
+    /// Irradiance without occlusion; `cut` becomes where it comes from.
+    pub(super) fn unoccluded(&self, receiver: &Receiver, cut: &mut Vec<Arriving>) -> Vec4 {
+        self.tree.unoccluded(receiver, cut)
     }
-}
-
-/// What arrives from a panel, or from one of its emitters.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Arriving {
-    /// Luminance of it and of all before it.
-    until: f32,
-    panel: usize,
-    emitter: Option<usize>,
 }
 
 /// Largest radiosity by channel.
@@ -364,12 +310,10 @@ impl Emitter {
     }
 }
 
-/// Shadow rays from a point to one panel or emitter. How much unoccluded light comes from there is known, so of their
-/// weights only the ratios count: else a few rays that weigh much would speak for all targets.
+/// Shadow rays from a point to one target. How much unoccluded light comes from there is known, so of their weights only the
+/// ratios count: else a few rays that weigh much would speak for all targets.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bundle {
-    /// Radiosity over its luminance.
-    color: Vec4,
     /// The emitter, where it fills a large angle.
     seen: Option<SphericalTriangle>,
     /// Rays tried.
@@ -377,19 +321,61 @@ struct Bundle {
     shot: u32,
     visible: u32,
     /// Weights of the rays shot.
-    sent: f32,
-    /// Weights of those that got through.
-    arrived: f32,
+    weight: f32,
+    /// The same by colour, each with a luminance of 1.
+    sent: Vec4,
+    /// Of those that got through.
+    arrived: Vec4,
 }
 
 impl Bundle {
-    fn count(&mut self, weight: f32, is_visible: bool) {
-        self.sent += weight;
+    fn count(&mut self, weight: f32, color: Vec4, is_visible: bool) {
+        self.weight += weight;
+        self.sent += color * weight;
         self.shot += 1;
         if is_visible {
-            self.arrived += weight;
+            self.arrived += color * weight;
             self.visible += 1;
         }
+    }
+}
+
+/// How many shadow rays of one or several points got through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Tally {
+    pub shot: u32,
+    pub visible: u32,
+}
+
+/// Standard errors by which rays of one point may differ from those of its neighbours. Smaller takes chance for a border,
+/// which biases the light where few rays get through; larger shoots more rays beside the borders of shadows.
+const LIKELY_DEVIATIONS: f32 = 3.0;
+
+impl Tally {
+    /// Whether some got through and others did not.
+    pub(super) fn is_mixed(self) -> bool {
+        self.visible > 0 && self.visible < self.shot
+    }
+
+    /// The part that got through; 0 of none.
+    fn fraction(self) -> f32 {
+        self.visible as f32 / self.shot.max(1) as f32
+    }
+
+    /// Whether chance explains how these rays differ from others: by the part of the others, with half a hit and half a miss more.
+    pub(super) fn is_like(self, others: Self) -> bool {
+        let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
+        let expected = (others.visible as f32 + 0.5) / count;
+        let variance = expected * (1.0 - expected) * (1.0 / own + 1.0 / count);
+        let gap = self.fraction() - expected;
+        self.shot == 0 || gap * gap <= LIKELY_DEVIATIONS * LIKELY_DEVIATIONS * variance
+    }
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.shot += other.shot;
+        self.visible += other.visible;
     }
 }
 
@@ -414,10 +400,10 @@ impl DirectLight {
     fn count(&mut self, bundle: &Bundle) {
         self.shot += bundle.shot;
         self.visible += bundle.visible;
-        if bundle.sent > 0.0 {
-            let color = bundle.color * bundle.rays as f32;
-            self.sent += color;
-            self.arrived += color * (bundle.arrived / bundle.sent);
+        if bundle.weight > 0.0 {
+            let by_ray = bundle.rays as f32 / bundle.weight;
+            self.sent += bundle.sent * by_ray;
+            self.arrived += bundle.arrived * by_ray;
         }
     }
 
@@ -453,12 +439,6 @@ impl DirectLight {
         (self.sent, self.arrived) = (Vec4::ONE, Vec4::ONE);
     }
 
-    /// Whether all rays of both points had the same outcome. Points that no light can reach agree with all.
-    pub(super) fn agrees_with(&self, other: &Self) -> bool {
-        let (shot, visible) = (self.shot + other.shot, self.visible + other.visible);
-        visible == 0 || visible == shot
-    }
-
     /// Direct irradiance.
     pub(super) fn irradiance(&self) -> Vec4 {
         self.exact * self.fraction()
@@ -486,6 +466,27 @@ impl DirectLight {
         )
     }
 
+    /// What its rays found.
+    pub(super) fn tally(&self) -> Tally {
+        Tally {
+            shot: self.shot,
+            visible: self.visible,
+        }
+    }
+
+    /// Standard error of the luminance as the rays of its neighbours have it, unless its own are unlikely beside them. So
+    /// whether more rays are shot does not depend on what its own found, which would bias the light: where few get through, most
+    /// points would take their first rays for all, and the others would lose by more.
+    pub(super) fn error_among(&self, neighbours: Tally) -> f32 {
+        let own = self.tally();
+        if neighbours.shot == 0 || !own.is_like(neighbours) {
+            return self.error();
+        }
+        let fraction = neighbours.fraction();
+        let variance = fraction * (1.0 - fraction) / self.shot.max(1) as f32;
+        luminance(self.exact) * variance.sqrt()
+    }
+
     /// Square of the standard error of the fraction, as if the rays were independent: 0 where all agree.
     pub(super) fn fraction_variance(&self) -> f32 {
         let shot = self.shot.max(1) as f32;
@@ -493,12 +494,17 @@ impl DirectLight {
         fraction * (1.0 - fraction) / shot
     }
 
-    /// Standard error of the luminance as far as so few rays can tell, with half a hit and half a miss more: so that it is
+    /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
     /// above 0 where all agree.
-    pub(super) fn doubt(&self) -> f32 {
+    pub(super) fn fraction_doubt(&self) -> f32 {
         let shot = self.shot as f32 + 1.0;
         let fraction = (self.visible as f32 + 0.5) / shot;
-        luminance(self.exact) * (fraction * (1.0 - fraction) / shot).sqrt()
+        (fraction * (1.0 - fraction) / shot).sqrt()
+    }
+
+    /// As [`Self::fraction_doubt`] for the luminance.
+    pub(super) fn doubt(&self) -> f32 {
+        luminance(self.exact) * self.fraction_doubt()
     }
 
     /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.

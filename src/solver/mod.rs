@@ -22,6 +22,8 @@ mod inspect;
 mod inspection;
 mod iterate;
 mod light_parts;
+mod light_tree;
+mod multipole;
 mod panel;
 mod plan;
 mod prober;

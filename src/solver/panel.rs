@@ -41,28 +41,16 @@ type Corner = (u32, Vec3);
 pub(super) struct Panel {
     /// Which emitters.
     pub emitters: Range<usize>,
-    /// Running sums of their areas.
-    areas: Vec<f32>,
+    /// Area of all of them.
+    area: f32,
     /// Edges that no two emitters share, in the order of their front's corners.
     outline: Vec<[Vec3; 2]>,
-    normal: Vec3,
-    centre: Vec3,
+    pub(super) normal: Vec3,
+    pub(super) centre: Vec3,
     radius: f32,
 }
 
 impl Panel {
-    /// Area of all emitters.
-    pub(super) fn area(&self) -> f32 {
-        self.areas.last().copied().unwrap_or_default()
-    }
-
-    /// The emitter that holds a place of the area, given from 0 to 1.
-    pub(super) fn emitter_at(&self, place: f32) -> usize {
-        let wanted = place * self.area();
-        let before = self.areas.partition_point(|&area| area <= wanted);
-        self.emitters.start + before.min(self.emitters.len() - 1)
-    }
-
     /// Irradiance of the whole panel for radiosity 1; `None` where its emitters are better looked at one by one.
     pub(super) fn irradiance(&self, receiver: &Receiver) -> Option<f32> {
         if self.emitters.len() == 1 {
@@ -93,7 +81,7 @@ impl Panel {
             }
         }
         if squared > (FAR * self.radius).powi(2) {
-            return Some(self.area() * height * elevation.max(0.0) / (PI * squared * squared));
+            return Some(self.area * height * elevation.max(0.0) / (PI * squared * squared));
         }
         Some(outline_irradiance(
             receiver.point,
@@ -156,14 +144,10 @@ fn panel(
 ) -> Panel {
     let mut area = 0.0;
     let mut middle = Vec3::ZERO;
-    let areas = members
-        .iter()
-        .map(|emitter| {
-            area += emitter.area;
-            middle += emitter.corners.iter().sum::<Vec3>() * (emitter.area / 3.0);
-            area
-        })
-        .collect();
+    for emitter in members {
+        area += emitter.area;
+        middle += emitter.corners.iter().sum::<Vec3>() * (emitter.area / 3.0);
+    }
     let centre = match middle / area {
         middle if middle.is_finite() => middle,
         _ => members[0].corners[0],
@@ -183,7 +167,7 @@ fn panel(
     let corners = outline.iter().map(|[start, _]| start.distance(centre));
     Panel {
         emitters: range,
-        areas,
+        area,
         radius: corners.fold(0.0, f32::max),
         outline,
         normal: members[0].normal,
@@ -273,7 +257,7 @@ mod tests {
             let (emitters, panels) = panels(&lamp(n, |_, _| false));
             assert_eq!((panels.len(), panels[0].outline.len()), (1, 4), "{n}");
             assert_eq!(panels[0].emitters, 0..emitters.len());
-            assert!((panels[0].area() - 1.0).abs() < 1e-5);
+            assert!((panels[0].area - 1.0).abs() < 1e-5);
             assert!((panels[0].radius - 0.5f32.sqrt()).abs() < 1e-5);
         }
         // A window in the middle has an outline of its own.
@@ -342,19 +326,5 @@ mod tests {
             );
         }
         assert!(wholes > 500, "{wholes}");
-    }
-
-    #[test]
-    fn places_of_the_area_fall_to_emitters_by_their_area() {
-        let (emitters, panels) = panels(&lamp(3, |_, _| false));
-        let mut counts = vec![0; emitters.len()];
-        for number in 0..1800 {
-            counts[panels[0].emitter_at((number as f32 + 0.5) / 1800.0)] += 1;
-        }
-        assert!(
-            counts.iter().all(|&count| (99..=101).contains(&count)),
-            "{counts:?}"
-        );
-        assert_eq!(panels[0].emitter_at(1.0), emitters.len() - 1);
     }
 }

@@ -36,10 +36,10 @@ pub enum Oracle {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direct {
-    /// Sampled where the emitters are few or small, linked where they are many.
+    /// As measuring found best: sampled, whatever the emitters are.
     #[default]
     Auto,
-    /// Shadow rays from every vertex to every light.
+    /// Shadow rays from every vertex, spread over all emitters by the light that they give there.
     Sampled,
     /// Through links, as all other light (the paper's way).
     Linked,

@@ -1,9 +1,9 @@
 //! Shadow fractions smoothed over the mesh, as far as their own noise explains how neighbours differ.
 //!
 //! A few shadow rays leave a grain in penumbrae, which triangles draw out into streaks. Neighbouring vertices of a
-//! smooth surface see nearly the same fraction of the light, so a vertex that is in doubt takes a mean with its
-//! neighbours: they count fully while they differ by no more than noise, and less the further they are off. Vertices
-//! whose rays all agree stay as they are, so nothing leaks into the light or the dark beside a penumbra.
+//! smooth surface see nearly the same fraction of the light, so they exchange some of it: fully while they differ by no
+//! more than the noise of the surer one, and less the further they are off. What one gives the other takes, so that where few
+//! rays get through, vertices that saw nothing make up for those that saw too much.
 
 use glam::Vec4;
 
@@ -25,8 +25,10 @@ struct Fraction {
     color: Vec4,
     /// Mean over the colours.
     mean: f32,
-    /// Square of the standard error of the mean.
+    /// Square of the standard error of the mean; above 0 where all rays agree.
     variance: f32,
+    /// Whether some rays got through and others did not.
+    is_mixed: bool,
 }
 
 /// Visible fractions of the vertices, by colour; those of vertices without samples are 0.
@@ -39,7 +41,8 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
                 Fraction {
                     color,
                     mean: color.truncate().element_sum() / 3.0,
-                    variance: light.fraction_variance(),
+                    variance: light.fraction_doubt().powi(2),
+                    is_mixed: light.tally().is_mixed(),
                 }
             })
         })
@@ -52,7 +55,7 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
             edge.iter()
                 .all(|&vertex| samples.get(vertex).is_some_and(Option::is_some))
         })
-        .filter(|edge| edge.iter().any(|&vertex| fractions[vertex].variance > 0.0))
+        .filter(|edge| edge.iter().any(|&vertex| fractions[vertex].is_mixed))
         .collect();
     for _ in 0..ROUNDS {
         fractions = round(&fractions, &edges);
@@ -70,33 +73,64 @@ pub(super) fn agreement(gap: f32, variance: f32, half_deviations: f32) -> f32 {
     noise / (noise + gap * gap).max(f32::MIN_POSITIVE)
 }
 
-/// One round of averaging. The variance stays that of the rays: it says how far neighbours may differ.
+/// One round of exchange. The variance stays that of the rays: it says how far neighbours may differ.
 fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
-    let mut sums: Vec<(Vec4, f32)> = fractions
-        .iter()
-        .map(|fraction| (fraction.color * OWN_WEIGHT, OWN_WEIGHT))
-        .collect();
+    let weight = |a: Fraction, b: Fraction| {
+        let variance = 2.0 * a.variance.min(b.variance);
+        agreement(a.mean - b.mean, variance, HALF_DEVIATIONS)
+    };
+    let mut weights = vec![OWN_WEIGHT; fractions.len()];
+    for &[a, b] in edges {
+        let weight = weight(fractions[a], fractions[b]);
+        weights[a] += weight;
+        weights[b] += weight;
+    }
+    let mut next: Vec<Vec4> = fractions.iter().map(|fraction| fraction.color).collect();
     for &[a, b] in edges {
         let (one, other) = (fractions[a], fractions[b]);
-        let gap = one.mean - other.mean;
-        let weight = agreement(gap, one.variance + other.variance, HALF_DEVIATIONS);
-        for (vertex, neighbour) in [(a, other), (b, one)] {
-            if fractions[vertex].variance > 0.0 {
-                sums[vertex].0 += neighbour.color * weight;
-                sums[vertex].1 += weight;
-            }
-        }
+        let share = weight(one, other) / weights[a].max(weights[b]);
+        let given = (one.color - other.color) * share;
+        next[a] -= given;
+        next[b] += given;
     }
     fractions
         .iter()
-        .zip(sums)
-        .map(|(fraction, (sum, weight))| {
-            let color = sum / weight;
-            Fraction {
-                color,
-                mean: color.truncate().element_sum() / 3.0,
-                ..*fraction
-            }
+        .zip(next)
+        .map(|(fraction, color)| Fraction {
+            color,
+            mean: color.truncate().element_sum() / 3.0,
+            ..*fraction
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fraction(mean: f32, rays: f32) -> Fraction {
+        let doubtful = (mean * rays + 0.5) / (rays + 1.0);
+        Fraction {
+            color: Vec4::splat(mean),
+            mean,
+            variance: doubtful * (1.0 - doubtful) / (rays + 1.0),
+            is_mixed: mean > 0.0 && mean < 1.0,
+        }
+    }
+
+    #[test]
+    fn what_a_vertex_loses_its_neighbours_gain() {
+        let fractions = [fraction(0.0, 8.0), fraction(0.125, 8.0), fraction(0.0, 8.0)];
+        let smoothed = round(&fractions, &[[0, 1], [1, 2]]);
+        let sum: f32 = smoothed.iter().map(|fraction| fraction.mean).sum();
+        assert!((sum - 0.125).abs() < 1e-6);
+        assert!(smoothed[0].mean > 0.01 && smoothed[1].mean < 0.1);
+    }
+
+    #[test]
+    fn hardly_anything_leaks_into_what_many_rays_found_dark() {
+        let fractions = [fraction(0.0, 32.0), fraction(0.5, 32.0)];
+        let smoothed = round(&fractions, &[[0, 1]]);
+        assert!(smoothed[0].mean < 0.01, "{}", smoothed[0].mean);
+    }
 }

@@ -105,7 +105,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
                             (
                                 Direct::Auto,
                                 "Automatic",
-                                "Sampled where emitters are few or small, linked where they are many",
+                                "As measuring found best: sampled, whatever the emitters are",
                             ),
                             (
                                 Direct::Sampled,
