@@ -1,6 +1,6 @@
 //! From raw faces in world coordinates to a [`Scene`] that keeps its promises.
 
-use std::{collections::HashMap, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
