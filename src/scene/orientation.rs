@@ -315,6 +315,8 @@ mod tests {
             material: MaterialId,
             ceiling: MaterialId,
         ) -> Self {
+            let name = format!("cube {}", self.0.objects.len());
+            self.0.objects.push((name, self.0.faces.len()));
             let corners: Vec<u32> = (0..8)
                 .map(|corner| {
                     let of_axis = |axis: usize| f64::from(corner >> axis & 1) - 0.5;
@@ -350,6 +352,9 @@ mod tests {
 
         /// A level square sheet.
         fn sheet(mut self, at: [f64; 3], side: f64, material: MaterialId) -> Self {
+            self.0
+                .objects
+                .push(("sheet".to_owned(), self.0.faces.len()));
             let [a, b, c, d] =
                 [(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)].map(|(x, y)| {
                     let offset = DVec3::new(x, y, 0.0);
@@ -371,15 +376,20 @@ mod tests {
         /// How each cube is lit, in order, and how many the warning counts.
         fn lit(&self) -> (String, usize) {
             let scene = self.scene(Sides::Auto);
-            let cubes = scene.triangles.chunks(12);
-            let states = cubes.enumerate().filter(|(_, cube)| cube.len() == 12);
-            let states = states.map(|(number, cube)| {
+            let states = cubes(&scene).map(|triangles| {
                 let position = |corner: u32| scene.positions[corner as usize];
-                let corners = cube.iter().flat_map(|triangle| triangle.corners);
-                let centre = corners.map(position).sum::<glam::Vec3>() / 36.0;
-                let outward = position(cube[0].corners[0]) - centre;
-                let normal = scene.surfaces[12 * number].area_vector;
-                match (cube[0].two_sided, normal.dot(outward) > 0.0) {
+                let corners = scene.triangles[triangles.clone()]
+                    .iter()
+                    .flat_map(|triangle| triangle.corners);
+                let (min, max) = corners
+                    .map(position)
+                    .fold((glam::Vec3::MAX, glam::Vec3::MIN), |(min, max), at| {
+                        (min.min(at), max.max(at))
+                    });
+                let first = scene.triangles[triangles.start];
+                let outward = position(first.corners[0]) - (min + max) / 2.0;
+                let normal = scene.surfaces[triangles.start].area_vector;
+                match (first.two_sided, normal.dot(outward) > 0.0) {
                     (true, _) => 'b',
                     (false, true) => 'o',
                     (false, false) => 'i',
@@ -387,6 +397,14 @@ mod tests {
             });
             (states.collect(), warned(&scene))
         }
+    }
+
+    /// The triangles of each cube, which other faces may have cut.
+    fn cubes(scene: &Scene) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let cubes = scene.objects.iter();
+        cubes
+            .filter(|object| object.name.starts_with("cube"))
+            .map(|object| object.start.index()..object.end.index())
     }
 
     fn warned(scene: &Scene) -> usize {
@@ -553,8 +571,9 @@ mod tests {
     fn solids_and_their_hollows_are_told_from_rooms() {
         let solids = |cuboids: Cuboids| -> Vec<bool> {
             let scene = cuboids.scene(Sides::One);
-            let cubes = scene.triangles.chunks(12).filter(|cube| cube.len() == 12);
-            cubes.map(|cube| cube[0].bounds_solid).collect()
+            cubes(&scene)
+                .map(|triangles| scene.triangles[triangles.start].bounds_solid)
+                .collect()
         };
         let beside = [20.0, 0.0, 0.0];
         let all_outward = Cuboids::new()
