@@ -254,8 +254,8 @@ impl RunFlags {
         }
     }
 
-    /// How exported files look.
-    pub fn export(&self, up: UpFlag) -> MeshOptions {
+    /// How exported files of a scene with this [`crate::scene::Scene::radiance_unit`] look.
+    pub fn export(&self, up: UpFlag, radiance_unit: f32) -> MeshOptions {
         MeshOptions {
             color: ColorOptions {
                 exposure_ev: self.exposure.unwrap_or(0.0),
@@ -269,6 +269,7 @@ impl RunFlags {
                 UpFlag::Z => UpAxis::Z,
             },
             emission_scale: self.emission_scale.unwrap_or(1.0),
+            radiance_unit,
         }
     }
 }

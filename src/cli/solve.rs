@@ -25,6 +25,7 @@ use super::{
 };
 use crate::{
     export::MeshFormat,
+    metrics::ErrorMeasures,
     reference::MatrixError,
     scene::Scene,
     solver::{Snapshot, StepReport},
@@ -356,7 +357,8 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
     let Some(path) = &arguments.export else {
         return Ok(());
     };
-    let export = arguments.run_flags.export(arguments.scene_flags.up);
+    let up = arguments.scene_flags.up;
+    let export = arguments.run_flags.export(up, scene.radiance_unit);
     let format = MeshFormat::of(path)?;
     output::write_whole(path, |out| {
         format.write(out, &run.snapshot, &scene.frame, &export)
@@ -396,7 +398,10 @@ fn report(
         .iter()
         .map(|report| StepFacts {
             report: report.clone(),
-            error: errors.get(&report.step).cloned(),
+            error: errors.get(&report.step).map(|error| ErrorMeasures {
+                reference_rms: error.reference_rms * f64::from(scene.radiance_unit),
+                ..error.clone()
+            }),
         })
         .collect();
     let (elapsed_s, solve_s) = run.times;
@@ -405,7 +410,10 @@ fn report(
         version: env!("CARGO_PKG_VERSION"),
         scene: SceneFacts::of(scene),
         settings: arguments.setting_flags.settings(),
-        color: arguments.run_flags.export(arguments.scene_flags.up).color,
+        color: arguments
+            .run_flags
+            .export(arguments.scene_flags.up, scene.radiance_unit)
+            .color,
         left_out: run.snapshot.left_out.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),
         reference: measured.reference.clone(),

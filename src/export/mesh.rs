@@ -40,6 +40,8 @@ pub struct MeshOptions {
     pub up: UpAxis,
     /// What all emission, and with it all light, is multiplied by.
     pub emission_scale: f32,
+    /// Of the scene: see [`crate::scene::Scene::radiance_unit`].
+    pub radiance_unit: f32,
 }
 
 impl Default for MeshOptions {
@@ -48,6 +50,7 @@ impl Default for MeshOptions {
             color: ColorOptions::default(),
             up: UpAxis::default(),
             emission_scale: 1.0,
+            radiance_unit: 1.0,
         }
     }
 }
@@ -124,11 +127,12 @@ impl Light {
     pub(super) fn at(snapshot: &Snapshot, index: usize, options: &MeshOptions) -> Self {
         let mesh = &snapshot.mesh;
         let arriving = snapshot.light.irradiance.get(index).copied();
-        let irradiance = presentable(arriving.unwrap_or_default() * options.emission_scale);
-        let emission = mesh.emission[index] * options.emission_scale;
+        let irradiance = presentable(arriving.unwrap_or_default());
+        let radiance = mesh.emission[index] + mesh.reflectance[index] * irradiance * FRAC_1_PI;
+        let scale = [options.emission_scale, options.radiance_unit].map(f64::from);
         Self {
-            radiance: presentable(emission + mesh.reflectance[index] * irradiance * FRAC_1_PI),
-            irradiance,
+            radiance: scaled(radiance, scale),
+            irradiance: scaled(irradiance, scale),
         }
     }
 }
@@ -136,6 +140,13 @@ impl Light {
 /// Finite and not negative, whatever comes in.
 fn presentable(light: Vec3) -> Vec3 {
     light.map(|x| if x > 0.0 { x.min(f32::MAX) } else { 0.0 })
+}
+
+/// Light times two factors. What single precision cannot hold keeps its colour.
+fn scaled(light: Vec3, [first, second]: [f64; 2]) -> Vec3 {
+    let scaled = presentable(light).as_dvec3() * first * second;
+    let excess = scaled.max_element() / f64::from(f32::MAX);
+    (scaled / excess.max(1.0)).as_vec3()
 }
 
 pub(super) fn write_vector(out: &mut dyn Write, vector: Vec3) -> io::Result<()> {
@@ -198,5 +209,8 @@ pub(super) mod tests {
         for (value, expected) in [(f32::NAN, 0.0), (-1.0, 0.0), (f32::INFINITY, f32::MAX)] {
             assert_eq!(presentable(Vec3::splat(value)), Vec3::splat(expected));
         }
+        let colour = scaled(Vec3::new(4.0, 2.0, 0.0), [1e25, 1e20]);
+        assert_eq!(colour.x, f32::MAX);
+        assert!((colour.y / colour.x - 0.5).abs() < 1e-6 && colour.z == 0.0);
     }
 }

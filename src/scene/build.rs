@@ -5,10 +5,15 @@ use std::{path::PathBuf, sync::Arc};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::coplanar::Overlaps;
 use super::crossings::cut_crossings;
+use super::emission::cured;
 use super::means::TextureAverages;
+use super::nesting;
+use super::orientation::{Evidence, Facing, Regions};
+use super::overlay::{self, DOUBLED};
 use super::sidedness::{self, Shells};
-use super::texture::{MAX_SAMPLES, cured};
+use super::texture::MAX_SAMPLES;
 use super::{
     Appearance, Frame, Material, MaterialId, Object, Scene, SizeClasses, Spared, Surface, Texture,
     TextureId, Triangle, TriangleId, Warning, WarningKind,
@@ -60,6 +65,19 @@ pub struct Face {
     pub material: MaterialId,
     /// Line in the file, 0 where it has none.
     pub line: u32,
+}
+
+impl Face {
+    /// Make the back the front.
+    fn turn(&mut self) {
+        self.corners.swap(1, 2);
+        if let Some(texcoords) = &mut self.texcoords {
+            texcoords.swap(1, 2);
+        }
+        if let Some(normals) = &mut self.normals {
+            normals.swap(1, 2);
+        }
+    }
 }
 
 /// Where the faces come from, for messages.
@@ -157,15 +175,23 @@ impl SceneBuilder {
         self.sanitise_textures();
         let losing = self.limit_reflecting_textures(options.max_reflectance.clamp(0.0, 1.0));
         self.sanitise_materials(options, losing);
+        let radiance_unit = self.scale_emission();
         let frame = self.frame();
-        let (positions, corner_of) = self.weld(&frame);
+        let (mut positions, mut corner_of) = self.weld(&frame);
         let vanished = self.drop_vanished_faces(&frame, &corner_of);
         if self.faces.is_empty() {
             return Err(no_faces(&vanished));
         }
-        self.drop_doubled_faces(&corner_of);
+        let overlaps = self.drop_repeated_faces(&corner_of, &positions);
         self.spare_textures();
-        let triangles = self.triangles(&corner_of, &positions, options);
+        let mut triangles = self.triangles(&corner_of, &positions, options);
+        self.resolve_overlaps(
+            &overlaps,
+            &mut triangles,
+            &frame,
+            &mut positions,
+            &mut corner_of,
+        );
         let averages = TextureAverages::new(&self.textures, &self.materials);
         let surfaces = self.surfaces(&frame, &averages, options);
         let mut scene = Scene {
@@ -184,9 +210,8 @@ impl SceneBuilder {
             spared: self.spared,
             max_reflectance: options.max_reflectance.clamp(0.0, 1.0),
             averages: Arc::new(averages),
+            radiance_unit,
         };
-        mark_solids(&mut scene, &triangles.shells);
-        warn_of_orientation(&mut scene, &triangles.shells, options.sides);
         if !scene.has_emitter() {
             scene.warnings.push(Warning {
                 kind: WarningKind::NoEmitter,
@@ -201,13 +226,12 @@ impl SceneBuilder {
     }
 }
 
-/// Why a face is skipped that has the corners of an earlier one.
-pub const DOUBLED: &str = "it lies on another one that looks the same way";
-
 /// Triangles with the shells they form.
-struct ShelledTriangles {
-    list: Vec<Triangle>,
-    shells: Shells,
+pub(super) struct ShelledTriangles {
+    /// In the order of the faces.
+    pub(super) list: Vec<Triangle>,
+    /// Of these.
+    pub(super) shells: Shells,
 }
 
 /// The error for faces that were all skipped.
@@ -219,38 +243,6 @@ fn no_faces(skipped: &[Skipped]) -> BuildError {
     };
     BuildError::NoFaces { detail }
 }
-
-/// Find the triangles that bound solids.
-fn mark_solids(scene: &mut Scene, shells: &Shells) {
-    let emits = |triangle: usize| scene.surfaces[triangle].emission != Vec3::ZERO;
-    let solids = shells.bound_solids(&scene.triangles, &scene.positions, emits);
-    for (triangle, &shell) in scene.triangles.iter_mut().zip(&shells.of_triangle) {
-        triangle.bounds_solid = solids[shell as usize] && !triangle.two_sided;
-    }
-}
-
-/// Say so when a room's faces look away from its light.
-fn warn_of_orientation(scene: &mut Scene, shells: &Shells, sides: Sides) {
-    if sides == Sides::Two {
-        return;
-    }
-    let emits = |triangle: usize| scene.surfaces[triangle].emission != Vec3::ZERO;
-    let count = sidedness::inverted_shell_count(&scene.triangles, &scene.positions, emits, shells);
-    if count > 0 {
-        scene.warnings.push(Warning {
-            kind: WarningKind::Orientation,
-            message: "the faces of a closed shell with a light inside look outward, so the light falls on their \
-                      black backs; flip them or use --sides two"
-                .to_owned(),
-            count,
-            place: None,
-        });
-    }
-}
-
-/// Largest emission of a channel: beyond any light there is (the sun's surface has 2e7), small enough that products
-/// with textures and sums over a scene stay finite in single precision.
-pub(super) const MAX_EMISSION: f32 = 1e12;
 
 /// Faces left out for one reason.
 struct Skipped {
@@ -288,16 +280,25 @@ impl SceneBuilder {
         skipped
     }
 
-    /// Remove faces with the corners of an earlier one that look the same way: both would shine and reflect, and light would
-    /// be there twice.
-    fn drop_doubled_faces(&mut self, corner_of: &[u32]) {
-        let corners: Vec<[u32; 3]> = self
-            .faces
-            .iter()
-            .map(|face| face.corners.map(|corner| corner_of[corner as usize]))
-            .collect();
-        let coincident = sidedness::Coincident::of(&corners);
-        self.drop_faces(|index, _| coincident.is_double(index).then_some(DOUBLED));
+    /// Remove faces with the corners of an earlier one that look the same way, so that the shells of both are as one; returns
+    /// which of the others lie over each other.
+    fn drop_repeated_faces(&mut self, corner_of: &[u32], positions: &[Vec3]) -> Overlaps {
+        loop {
+            let corners: Vec<[u32; 3]> = self
+                .faces
+                .iter()
+                .map(|face| face.corners.map(|corner| corner_of[corner as usize]))
+                .collect();
+            let overlaps = Overlaps::of(&corners, positions);
+            let repeated = overlay::repeated(&overlaps, &corners);
+            if repeated.is_empty() {
+                return overlaps;
+            }
+            self.drop_faces(|index, _| {
+                let is_repeated = repeated.binary_search(&(index as u32)).is_ok();
+                is_repeated.then_some(DOUBLED)
+            });
+        }
     }
 
     /// Remove the faces for which there is a reason, count them by reason, and keep objects at their first faces. The
@@ -344,14 +345,29 @@ impl SceneBuilder {
             object.1 = kept;
         }
         for skipped in &skipped {
-            self.warn_of_skipped(skipped);
+            self.warn_of_skipped("a face", skipped);
         }
         skipped
     }
 
+    /// Say that faces, or parts of faces, of these lines were left out; nothing where there are none.
+    pub(super) fn warn_of_lines(&mut self, what: &str, reason: &'static str, lines: &[u32]) {
+        if let Some(&line) = lines.first() {
+            let count = lines.len();
+            self.warn_of_skipped(
+                what,
+                &Skipped {
+                    reason,
+                    count,
+                    line,
+                },
+            );
+        }
+    }
+
     /// Add to the warning that the reader may have given for the same reason.
-    fn warn_of_skipped(&mut self, skipped: &Skipped) {
-        let message = format!("skipped a face: {}", skipped.reason);
+    fn warn_of_skipped(&mut self, what: &str, skipped: &Skipped) {
+        let message = format!("skipped {what}: {}", skipped.reason);
         let known = self
             .warnings
             .iter_mut()
@@ -387,9 +403,9 @@ impl SceneBuilder {
         }
     }
 
-    /// Triangles in the frame with their sidedness.
+    /// Triangles in the frame with their sidedness. Shells that are wound the wrong way are turned.
     fn triangles(
-        &self,
+        &mut self,
         corner_of: &[u32],
         positions: &[Vec3],
         options: &SceneOptions,
@@ -402,12 +418,104 @@ impl SceneBuilder {
         };
         let mut list: Vec<Triangle> = self.faces.iter().map(make).collect();
         debug_assert!(positions.iter().all(|position| position.is_finite()));
-        let shells = Shells::of(&list);
-        let flags = sidedness::two_sided(&shells, &list, options.sides);
+        let shells = Shells::of(&list, positions);
+        let facings = self.orient(&mut list, &shells, positions, options.sides);
+        let flags = sidedness::two_sided(&shells, &facings, options.sides);
         for (triangle, two_sided) in list.iter_mut().zip(flags) {
             triangle.two_sided = two_sided;
+            triangle.bounds_solid &= !two_sided;
         }
         ShelledTriangles { list, shells }
+    }
+
+    /// Find out which side of each shell is meant, turn those that are wound otherwise, and mark those that bound solids.
+    fn orient(
+        &mut self,
+        list: &mut [Triangle],
+        shells: &Shells,
+        positions: &[Vec3],
+        sides: Sides,
+    ) -> Vec<Facing> {
+        let parents = nesting::parents(shells, list, positions);
+        let (regions, meant) = {
+            let regions = Regions::new(
+                shells,
+                &parents,
+                &Evidence {
+                    emits: &|triangle| {
+                        let material = list[triangle].material;
+                        self.materials[material.index()].emission != Vec3::ZERO
+                    },
+                    area_vector: &|triangle| {
+                        let corners = list[triangle].corners;
+                        let [a, b, c] = corners.map(|corner| positions[corner as usize]);
+                        (b - a).cross(c - a) * 0.5
+                    },
+                    normals: &|triangle| self.faces[triangle].normals,
+                },
+            );
+            let meant = regions.facings();
+            (regions, meant)
+        };
+        self.warn_of_orientation(shells, &regions, &meant, sides);
+        let facings = match sides {
+            Sides::Auto => meant,
+            Sides::One | Sides::Two => vec![Facing::AsWound; meant.len()],
+        };
+        let solids = regions.solids(&facings);
+        let faces = self.faces.iter_mut().zip(list);
+        for ((face, triangle), &shell) in faces.zip(&shells.of_triangle) {
+            triangle.bounds_solid = solids[shell as usize];
+            if facings[shell as usize] == Facing::Turned {
+                triangle.corners.swap(1, 2);
+                face.turn();
+            }
+        }
+        facings
+    }
+
+    /// Say which shells are not lit as they are wound, or would not be.
+    fn warn_of_orientation(
+        &mut self,
+        shells: &Shells,
+        regions: &Regions,
+        meant: &[Facing],
+        sides: Sides,
+    ) {
+        let is_odd = |shell: usize| {
+            meant[shell] != Facing::AsWound || sides == Sides::One && regions.is_opposed(shell)
+        };
+        let odd: Vec<usize> = (0..meant.len()).filter(|&shell| is_odd(shell)).collect();
+        let is_first = |shell: &u32| odd.first() == Some(&(*shell as usize));
+        let Some(first) = shells.of_triangle.iter().position(is_first) else {
+            return;
+        };
+        let of_kind = |kind: Facing| odd.iter().filter(|&&shell| meant[shell] == kind).count();
+        let message = match (sides, of_kind(Facing::Turned), of_kind(Facing::Both)) {
+            (Sides::Two, _, _) => return,
+            (Sides::One, _, _) => {
+                "the faces of a surface look away from what they should light, or light falls on their black backs; flip \
+                 them, or use --sides auto"
+            }
+            (Sides::Auto, _, 0) => {
+                "the faces of a closed surface looked away from what they should light and were turned; --sides one keeps \
+                 their winding"
+            }
+            (Sides::Auto, 0, _) => {
+                "light falls on the backs of a closed surface, so it is lit on both sides; --sides one keeps the backs black"
+            }
+            (Sides::Auto, _, _) => {
+                "the faces of a closed surface looked away from what they should light and were turned or are lit on both \
+                 sides; --sides one keeps their winding"
+            }
+        };
+        let line = self.faces[first].line as usize;
+        self.warnings.push(Warning {
+            kind: WarningKind::Orientation,
+            message: message.to_owned(),
+            count: odd.len(),
+            place: (line > 0).then(|| (self.source.file.clone(), line)),
+        });
     }
 
     /// Bring reflectance and emission into their ranges; give the scene a material if it has none. `clamped` are materials
@@ -427,7 +535,7 @@ impl SceneBuilder {
                     0.0
                 }
             });
-            let emission = material.emission.map(super::texture::cured);
+            let emission = material.emission.map(super::emission::cured);
             if material.reflectance.cmpgt(Vec3::splat(max)).any() {
                 clamped.push(material.name.clone());
             }
@@ -450,7 +558,7 @@ impl SceneBuilder {
             ),
             (
                 cured,
-                "reflectance or emission that was negative, not finite or beyond reason was brought into range"
+                "reflectance or emission that was negative or not finite was brought into range"
                     .to_owned(),
             ),
         ] {

@@ -3,15 +3,18 @@
 //! A [`Scene`] is made by [`SceneBuilder`], whatever it comes from (an OBJ file, a built-in scene, a test), so that
 //! every scene obeys the same promises: finite positions in the unit frame, no zero-area triangle, reflectance below
 //! the clamp, non-negative emission.
-//! Units: radiance in W·sr⁻¹·m⁻², lengths in units of the frame (see [`Frame`]).
+//! Units: radiance in units of [`Scene::radiance_unit`], lengths in units of the frame (see [`Frame`]).
 
 mod ahead;
 mod build;
 pub mod builtin;
 mod clean;
+mod clip;
+mod coplanar;
 mod crossings;
 mod edges;
 mod encoding;
+mod emission;
 mod frame;
 mod library;
 mod limited;
@@ -19,7 +22,10 @@ mod lines;
 mod locate;
 mod means;
 mod mtl;
+mod nesting;
 mod obj;
+mod orientation;
+mod overlay;
 mod relight;
 mod sidedness;
 mod size_classes;
@@ -32,11 +38,12 @@ mod warning;
 mod whole;
 mod write;
 
-pub use build::{BuildError, DOUBLED, Face, SceneBuilder, SceneOptions, Sides, Source};
+pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use frame::Frame;
 pub use means::TextureMeans;
 pub use obj::{ReadError, read_obj};
+pub use overlay::DOUBLED;
 pub use relight::{Appearance, Awakened};
 pub use size_classes::SizeClasses;
 pub use spared::Spared;
@@ -91,7 +98,7 @@ pub struct Material {
     pub name: String,
     /// Diffuse reflectance, 0 up to the clamp of [`SceneOptions::max_reflectance`]; multiplies the texture.
     pub reflectance: Vec3,
-    /// Emitted radiance (`Ke`), W·sr⁻¹·m⁻², at least 0; multiplies the texture.
+    /// Emitted radiance (`Ke`) in units of [`Scene::radiance_unit`], at least 0; multiplies the texture.
     pub emission: Vec3,
     /// `map_Kd`.
     pub reflectance_texture: Option<TextureId>,
@@ -133,7 +140,7 @@ pub struct Surface {
     pub area_vector: Vec3,
     /// Mean reflectance, below the clamp.
     pub reflectance: Vec3,
-    /// Mean emitted radiance of each side that emits.
+    /// Mean emitted radiance of each side that emits, in units of [`Scene::radiance_unit`].
     pub emission: Vec3,
 }
 
@@ -183,6 +190,9 @@ pub struct Scene {
     pub max_reflectance: f32,
     /// The textures, ready for means.
     averages: Arc<TextureAverages>,
+    /// What emission 1 stands for, W·sr⁻¹·m⁻²: emission here and light computed from it are multiplied by this on their way
+    /// out. A power of two, and 1 unless the file's brightest emission is beyond 1e-12 … 1e12.
+    pub radiance_unit: f32,
 }
 
 impl Scene {

@@ -3,14 +3,14 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Material, MaterialId, Scene, Surface, TriangleId, texture::cured};
+use super::{Material, MaterialId, Scene, Surface, TriangleId, emission::limited};
 
 /// How a material reflects and emits, without its name and its textures. Linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {
     /// Diffuse reflectance (`Kd`); multiplies the texture.
     pub reflectance: Vec3,
-    /// Emitted radiance (`Ke`), W·sr⁻¹·m⁻²; multiplies the texture.
+    /// Emitted radiance (`Ke`) in units of [`Scene::radiance_unit`]; multiplies the texture.
     pub emission: Vec3,
 }
 
@@ -23,7 +23,7 @@ impl Appearance {
         }
     }
 
-    /// With reflectance from 0 to the most there may be, and emission finite and not negative.
+    /// With reflectance from 0 to the most there may be, and emission in range.
     fn within(self, most: f32) -> Self {
         let bounded = |x: f32| {
             if x.is_finite() {
@@ -34,7 +34,7 @@ impl Appearance {
         };
         Self {
             reflectance: self.reflectance.map(bounded),
-            emission: self.emission.map(cured),
+            emission: limited(self.emission),
         }
     }
 }

@@ -7,7 +7,7 @@
 use glam::Vec2;
 use glam::Vec3;
 
-use super::texture::cured;
+use super::emission::cured;
 use super::{Face, SceneBuilder, Texture, TextureId};
 
 /// Pixels that differ by no more than this share of the first are of one colour: means of equal pixels are rounded.

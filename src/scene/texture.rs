@@ -6,6 +6,8 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel, Primitive, Rgba};
 
+use super::emission::cured;
+
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Texture {
@@ -280,15 +282,6 @@ fn decode(path: &Path) -> image::ImageResult<DynamicImage> {
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
     reader.decode()
-}
-
-/// A channel that is not negative, finite and within reason.
-pub(super) fn cured(channel: f32) -> f32 {
-    if channel.is_finite() {
-        channel.clamp(0.0, super::build::MAX_EMISSION)
-    } else {
-        0.0
-    }
 }
 
 /// The sRGB curve backwards, continued beyond 1.

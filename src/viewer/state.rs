@@ -302,6 +302,12 @@ impl State {
         })
     }
 
+    /// What light is multiplied by where it is shown as a number: see [`Scene::radiance_unit`].
+    pub fn radiance_unit(&self) -> f32 {
+        let loaded = self.loaded.as_ref();
+        loaded.map_or(1.0, |loaded| loaded.scene.radiance_unit)
+    }
+
     /// Whether nothing in the scene has a colour, so that one channel tells all.
     pub fn is_grey(&self) -> bool {
         let is_grey = self.loaded.as_ref().is_some_and(|loaded| loaded.is_grey);

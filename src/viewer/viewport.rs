@@ -149,7 +149,7 @@ impl Viewport {
         Ok(Drawn {
             canvas,
             gpu,
-            exposure_factor: key.view.exposure_factor(),
+            exposure_factor: key.view.exposure_factor() / state.radiance_unit(),
             tone_map: key.view.tone_map,
         })
     }

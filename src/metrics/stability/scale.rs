@@ -37,7 +37,7 @@ pub(super) fn cases() -> Vec<Case> {
             move |cancel| copy(moved(furnished_room(), 1.0, shift), 1.0, cancel),
         ));
     }
-    for factor in [1e-12, 1e-6, 1e6, 1e12] {
+    for factor in [1e-36, 1e-12, 1e-6, 1e6, 1e12, 1e36] {
         cases.push(Case::new(
             Group::Scale,
             format!("emission scaled by {factor:e}"),

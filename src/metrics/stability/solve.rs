@@ -314,6 +314,8 @@ impl Lit {
             point.position = a * at.x + b * at.y + c * at.z;
         }
         let others = other.irradiance_at(&points);
+        let unit = |lit: &Self| f64::from(lit.scene.radiance_unit);
+        let factor = factor * unit(self) / unit(other);
         let (mut difference, mut size) = (0.0, 0.0);
         for (own, other) in own.iter().zip(&others) {
             difference += (*other / factor - *own).length_squared();

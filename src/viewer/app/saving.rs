@@ -83,7 +83,11 @@ impl App {
         let mesh = saver::LitMesh {
             snapshot: snapshot.clone(),
             frame: loaded.scene.frame,
-            options: mesh_options(&self.state.view, self.state.rig.target.up),
+            options: mesh_options(
+                &self.state.view,
+                self.state.rig.target.up,
+                loaded.scene.radiance_unit,
+            ),
         };
         let saving = saver::Saving {
             path,
@@ -132,7 +136,7 @@ impl App {
 }
 
 /// A mesh that looks as the view does.
-fn mesh_options(view: &ViewSettings, up: Vec3) -> MeshOptions {
+fn mesh_options(view: &ViewSettings, up: Vec3, radiance_unit: f32) -> MeshOptions {
     MeshOptions {
         color: ColorOptions {
             exposure_ev: view.exposure_factor().log2(),
@@ -143,5 +147,6 @@ fn mesh_options(view: &ViewSettings, up: Vec3) -> MeshOptions {
         },
         up: if up == Vec3::Z { UpAxis::Z } else { UpAxis::Y },
         emission_scale: view.emission_scale,
+        radiance_unit,
     }
 }

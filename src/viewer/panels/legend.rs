@@ -53,6 +53,10 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         Stroke::new(1.0, Color32::from_gray(90)),
         StrokeKind::Inside,
     );
+    let scale = match mode {
+        ViewMode::Error => 1.0,
+        _ => f64::from(state.radiance_unit()),
+    };
     let [low, high] = state.false_color_range;
     for step in 0..=4 {
         let t = step as f32 / 4.0;
@@ -65,7 +69,7 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         text(
             pos2(at.x + SIZE.x + 8.0, y),
             Align2::LEFT_CENTER,
-            figure(f64::from(value)),
+            figure(f64::from(value) * scale),
         );
     }
 }

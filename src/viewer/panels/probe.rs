@@ -46,18 +46,15 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             (rgb as fn(Vec3) -> String, "Red, green, blue")
         };
         row::figure(ui, "Reflectance", color(surface.reflectance), channels);
+        let scale = state.view.emission_scale * state.radiance_unit();
         if surface.emission != Vec3::ZERO {
             row::figure(
                 ui,
                 "Emission",
-                format!(
-                    "{} W/(sr·m²)",
-                    color(surface.emission * state.view.emission_scale)
-                ),
+                format!("{} W/(sr·m²)", color(surface.emission * scale)),
                 "Emitted radiance",
             );
         }
-        let scale = state.view.emission_scale;
         if let Some(probe) = selection.probe.map(|probe| probe.scaled(scale)) {
             row::figure(
                 ui,
@@ -184,7 +181,7 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
         return;
     };
     let light = selection.object_light;
-    let scale = state.view.emission_scale;
+    let scale = state.view.emission_scale * state.radiance_unit();
     let area = loaded.scene.frame.area_to_world(f64::from(light.area));
     let name = if object.name.is_empty() {
         "whole scene"

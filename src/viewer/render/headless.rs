@@ -129,14 +129,13 @@ pub fn picture(
     let mut renderer = Renderer::new(open_gpu()?);
     let target = Target::new(renderer.gpu(), size)?;
     let view = exposed(view, subject.snapshot);
+    let exposure_factor = view.exposure_factor() / subject.scene.radiance_unit;
     with_picture(subject, camera, &view, |picture| {
         renderer.render(&target, picture)
     })?;
     Ok(HeadlessPicture {
         display: target.read_display(renderer.gpu())?,
-        radiance: target
-            .read_linear(renderer.gpu(), view.exposure_factor())
-            .ok(),
+        radiance: target.read_linear(renderer.gpu(), exposure_factor).ok(),
     })
 }
 
@@ -153,10 +152,11 @@ pub fn cutout(
     let mut renderer = Renderer::new(open_gpu()?);
     let target = CutoutTarget::new(renderer.gpu(), size)?;
     let view = exposed(view, subject.snapshot);
+    let exposure_factor = view.exposure_factor() / subject.scene.radiance_unit;
     with_picture(subject, camera, &view, |picture| {
         renderer.render_cutout(&target, picture)
     })?;
-    Ok(target.read(renderer.gpu(), view.tone_map, view.exposure_factor())?)
+    Ok(target.read(renderer.gpu(), view.tone_map, exposure_factor)?)
 }
 
 /// A view with the exposure that the light asks for, where it is automatic.
