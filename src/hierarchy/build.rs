@@ -8,7 +8,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Cluster, Patch};
+use super::{Cluster, Patch, sheets::SheetSides};
 use crate::{
     geometry::centroid,
     scene::{Scene, TriangleId},
@@ -72,9 +72,13 @@ pub struct PatchTree {
 }
 
 impl PatchTree {
-    /// The tree over all lit sides of a scene; `None` when cancelled.
-    pub fn build(scene: &Scene, cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
-        grow(scene, lit_sides(scene), &[], cancelled)
+    /// The tree over all lit sides of a scene; the two sides of `sheets` are apart in it. `None` when cancelled.
+    pub fn build(
+        scene: &Scene,
+        sheets: Option<&SheetSides>,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Self> {
+        grow(scene, sheets, lit_sides(scene), &[], cancelled)
     }
 
     /// The tree over the patches that are not left out, of which there is at least one; the others follow in their order.
@@ -82,6 +86,7 @@ impl PatchTree {
     pub fn without(
         &self,
         scene: &Scene,
+        sheets: Option<&SheetSides>,
         left_out: &[bool],
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
@@ -93,7 +98,13 @@ impl PatchTree {
         // In the order of triangles, as `lit_sides` has them, so that the tree is the one that their scene would have.
         let mut items: Vec<Item> = of(false).collect();
         items.sort_unstable_by_key(|item| (item.triangle, item.is_back));
-        grow(scene, items, &of(true).collect::<Vec<Item>>(), cancelled)
+        grow(
+            scene,
+            sheets,
+            items,
+            &of(true).collect::<Vec<Item>>(),
+            cancelled,
+        )
     }
 
     /// The patches that clusters hold; light is computed for these.
@@ -102,14 +113,28 @@ impl PatchTree {
     }
 }
 
-/// Divide the items until clusters are small, and put `others` after them.
+/// Divide the items, by the sides of sheets first, until clusters are small, and put `others` after them.
 fn grow(
     scene: &Scene,
+    sheets: Option<&SheetSides>,
     mut items: Vec<Item>,
     others: &[Item],
     cancelled: &(dyn Fn() -> bool + Sync),
 ) -> Option<PatchTree> {
-    let mut clusters = subtree(&mut items, 0, 0, cancelled)?;
+    let first_half = sheets.map_or(0, |sides| part_sides(sides, &mut items));
+    let mut clusters = if (1..items.len()).contains(&first_half) {
+        let (first, second) = items.split_at_mut(first_half);
+        let subtrees = [
+            subtree(first, 0, 1, cancelled)?,
+            subtree(second, first_half, 1, cancelled)?,
+        ];
+        let mut clusters = vec![cluster(0, items.len(), u32::MAX)];
+        clusters[0].first_child = 1;
+        graft(&mut clusters, &subtrees);
+        clusters
+    } else {
+        subtree(&mut items, 0, 0, cancelled)?
+    };
     let patches: Vec<Patch> = items
         .par_iter()
         .chain(others)
@@ -117,6 +142,14 @@ fn grow(
         .collect();
     fit_boxes(scene, &patches, &mut clusters);
     Some(PatchTree { clusters, patches })
+}
+
+/// Put the items of one half of the sides of sheets before those of the other, in their order, and return how many these
+/// are.
+fn part_sides(sides: &SheetSides, items: &mut [Item]) -> usize {
+    let is_second = |item: &Item| sides.is_in_second(item.triangle, item.is_back);
+    items.sort_by_key(is_second);
+    items.partition_point(|item| !is_second(item))
 }
 
 /// The clusters over some items, of which the first is item `start` of all: their root, and depth first, in pairs, all
@@ -342,7 +375,7 @@ mod tests {
         let scene = stability::rooms_with_pin_hole(0.5)
             .finish(&options)
             .unwrap();
-        let tree = PatchTree::build(&scene, &|| false).unwrap();
+        let tree = PatchTree::build(&scene, None, &|| false).unwrap();
         let rooms_of = |cluster: &Cluster| {
             let patches = tree.patches[cluster.patches()].iter();
             let mut rooms: Vec<&str> = patches

@@ -278,7 +278,7 @@ mod tests {
     }
 
     fn tree(scene: &Scene) -> PatchTree {
-        PatchTree::build(scene, &|| false).unwrap()
+        PatchTree::build(scene, None, &|| false).unwrap()
     }
 
     /// For each parallelogram, whether light may reach its front.
@@ -345,7 +345,7 @@ mod tests {
             assert_eq!(patch.is_back, is_dark);
         }
         assert!(!both.is_closed(&room), "two sides share each edge");
-        let inside = both.without(&room, &dark, &|| false).unwrap();
+        let inside = both.without(&room, None, &dark, &|| false).unwrap();
         assert_eq!(inside.held(), 0..12);
         assert_eq!(inside.patches.len(), 24);
         assert!(inside.is_clear(&room) && inside.is_closed(&room));

@@ -12,6 +12,7 @@ mod edge_leaves;
 mod facing;
 mod importance;
 mod mesh;
+mod sheets;
 mod subtrees;
 mod tables;
 mod validate;
@@ -20,6 +21,7 @@ pub use build::PatchTree;
 pub use directional::{Moments, Quantity, Reading};
 pub use importance::{Importance, longest_edge_squared};
 pub use mesh::{Element, Mesh, Vertex};
+pub use sheets::SheetSides;
 pub use subtrees::Subtrees;
 pub use tables::{Tables, luminance};
 
@@ -175,7 +177,8 @@ impl Hierarchy {
         crease_degrees: f32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
-        let tree = PatchTree::build(scene, cancelled)?;
+        let sheets = SheetSides::of(scene, &mut None);
+        let tree = PatchTree::build(scene, sheets.as_ref(), cancelled)?;
         Self::of_tree(scene, tree, crease_degrees, cancelled)
     }
 

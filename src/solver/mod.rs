@@ -51,7 +51,7 @@ pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
 use crate::{
     geometry::RayTree,
-    hierarchy::{Hierarchy, Reading, Tables},
+    hierarchy::{Hierarchy, Reading, SheetSides, Tables},
     scene::{Appearance, Awakened, Scene},
     transport::{
         Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
@@ -171,7 +171,10 @@ impl Solver {
         let awakened = wished.map_or_else(Awakened::default, |wished| {
             scene.awakened(&scene.allowed(wished))
         });
-        let (plan, tree) = Plan::make(&scene, &settings, awakened, &is_cancelled)?;
+        let mut rays = rays;
+        let sheets = SheetSides::of(&scene, &mut rays);
+        cancel.proceed()?;
+        let (plan, tree) = Plan::make(&scene, sheets.as_ref(), &settings, awakened, &is_cancelled)?;
         // Both take about as long, and neither keeps all processors busy.
         let (hierarchy, rays) = rayon::join(
             || {

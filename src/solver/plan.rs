@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Cancel, Method, Oracle, SolveSettings};
 use crate::{
-    hierarchy::{Hierarchy, Patch, PatchTree},
+    hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
     scene::{Awakened, Scene, WarningKind},
 };
 
@@ -121,7 +121,9 @@ impl LeftOut {
     /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
     pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
         let awakened = Awakened::default();
-        let (plan, _) = Plan::make(scene, settings, awakened, &|| cancel.is_cancelled())?;
+        let sheets = SheetSides::of(scene, &mut None);
+        let is_cancelled = || cancel.is_cancelled();
+        let (plan, _) = Plan::make(scene, sheets.as_ref(), settings, awakened, &is_cancelled)?;
         Some(Arc::unwrap_or_clone(plan.left_out))
     }
 }
@@ -161,6 +163,7 @@ impl Plan {
     /// the awakened materials emit or reflect.
     pub(super) fn make(
         scene: &Scene,
+        sheets: Option<&SheetSides>,
         settings: &SolveSettings,
         awakened: Awakened,
         cancelled: &(dyn Fn() -> bool + Sync),
@@ -170,9 +173,9 @@ impl Plan {
             awakened,
             ..Self::default()
         };
-        let mut tree = PatchTree::build(scene, cancelled)?;
+        let mut tree = PatchTree::build(scene, sheets, cancelled)?;
         if may_omit(Omission::Unlit) {
-            tree = plan.omit_unlit(scene, tree, cancelled)?;
+            tree = plan.omit_unlit(scene, sheets, tree, cancelled)?;
         }
         if may_omit(Omission::Rays) && tree.is_clear(scene) {
             // Who asks for the paper's way wants to see what it does.
@@ -192,6 +195,7 @@ impl Plan {
     fn omit_unlit(
         &mut self,
         scene: &Scene,
+        sheets: Option<&SheetSides>,
         tree: PatchTree,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<PatchTree> {
@@ -224,7 +228,7 @@ impl Plan {
                 "nothing changes: they shine as they are",
             );
         }
-        tree.without(scene, &dark, cancelled)
+        tree.without(scene, sheets, &dark, cancelled)
     }
 
     /// Whether what was left out of a hierarchy stays dark where these materials are awakened, too. If so, the plan holds
@@ -245,7 +249,7 @@ impl Plan {
         for patch in &hierarchy.patches[hierarchy.held()] {
             is_held[side(patch)] = true;
         }
-        let Some(tree) = PatchTree::build(scene, &|| false) else {
+        let Some(tree) = PatchTree::build(scene, None, &|| false) else {
             return false;
         };
         let mut lit = tree.lit(scene, &all).into_iter().zip(&tree.patches);

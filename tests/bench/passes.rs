@@ -57,7 +57,7 @@ fn building(criterion: &mut Criterion, scene: &Scene) {
     let mut group = criterion.benchmark_group("building");
     group.throughput(Throughput::Elements(scene.triangles.len() as u64));
     group.bench_function("tree of patches", |bencher| {
-        bencher.iter(|| black_box(PatchTree::build(scene, &|| false)));
+        bencher.iter(|| black_box(PatchTree::build(scene, None, &|| false)));
     });
     group.bench_function("hierarchy", |bencher| {
         bencher.iter(|| black_box(Hierarchy::new(scene, CREASE)));

@@ -1,0 +1,322 @@
+//! The two sides of sheets, told apart over whole surfaces.
+//!
+//! A sheet separates two spaces, and what one of its sides sees the other does not. A cluster that holds both sides of a
+//! tube has faces that look the same way and yet do not see the same: one visibility for all of them lights the inside of
+//! the tube with half of what its outside should get. So the light tree is divided by sides first and by places then.
+//!
+//! Over an edge that two triangles share, a side goes on as it is. Surfaces that share no edges are matched by what their
+//! sides see of each other: a floor sees the outside of a column, and so both belong to the same half of the tree.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use rayon::prelude::*;
+
+use crate::{
+    geometry::{Random, RayTree, cosine_direction, triangle_point},
+    scene::{DisjointSets, Scene, TriangleId, half_edges},
+};
+
+/// Rays that find which sides see each other. With fewer, columns whose share of the area is below one over this number
+/// are matched by chance; more delay the first picture: these take about a twentieth of a second.
+const SIGHT_RAYS: usize = 1 << 15;
+
+/// Which half of the light tree each side of a triangle belongs to.
+#[derive(Clone, Debug)]
+pub struct SheetSides {
+    /// By triangle, whether its front belongs to the second half and its back to the first.
+    is_turned: Vec<bool>,
+}
+
+impl SheetSides {
+    /// Tell the sides of a scene apart; `None` where no surface has two. Makes the ray tree of the scene where it is needed
+    /// and not there yet.
+    pub fn of(scene: &Scene, rays: &mut Option<Arc<RayTree>>) -> Option<Self> {
+        let corners: Vec<[u32; 3]> = scene.triangles.iter().map(|face| face.corners).collect();
+        let twins = twins(&corners);
+        let has_sheets = scene.triangles.iter().any(|face| face.two_sided);
+        if !has_sheets && twins.is_empty() {
+            return None;
+        }
+        let mut sides = Sides(DisjointSets::new(2 * corners.len()));
+        sides.join_over_edges(&corners, &twins);
+        let rays = rays.get_or_insert_with(|| Arc::new(RayTree::new(scene)));
+        sides.join_by_sight(scene, rays);
+        Some(Self {
+            is_turned: sides.turned(scene),
+        })
+    }
+
+    /// Whether a side of a triangle belongs to the second half.
+    pub(super) fn is_in_second(&self, triangle: TriangleId, is_back: bool) -> bool {
+        self.is_turned[triangle.index()] != is_back
+    }
+}
+
+/// Sets of sides that belong together: 2 i is the front of triangle i, 2 i + 1 its back. The two sides of a triangle are
+/// never in one set, and what holds for some sides holds for those behind them.
+struct Sides(DisjointSets);
+
+/// The side behind another one.
+fn behind(side: u32) -> u32 {
+    side ^ 1
+}
+
+impl Sides {
+    /// Join two sides, and those behind them. Where that would make the two sides of a surface one, as along a Möbius
+    /// strip, they stay apart.
+    fn join(&mut self, a: u32, b: u32) {
+        if self.0.root(a) != self.0.root(behind(b)) {
+            self.0.join(a, b);
+            self.0.join(behind(a), behind(b));
+        }
+    }
+
+    /// A surface by its least side, and whether a side of it is on the other side than that.
+    fn surface(&mut self, side: u32) -> (u32, bool) {
+        let (own, other) = (self.0.root(side), self.0.root(behind(side)));
+        (own.min(other), other < own)
+    }
+
+    /// Join what is one surface. The back of a triangle may be another one.
+    fn join_over_edges(&mut self, corners: &[[u32; 3]], twins: &[Twins]) {
+        let mut is_second = vec![false; corners.len()];
+        for twins in twins {
+            is_second[twins.second as usize] = true;
+            self.join(
+                2 * twins.first,
+                2 * twins.second + u32::from(twins.is_turned),
+            );
+        }
+        let single: Vec<u32> = (0..corners.len() as u32)
+            .filter(|&triangle| !is_second[triangle as usize])
+            .collect();
+        let edges = half_edges(single.iter().map(|&triangle| corners[triangle as usize]));
+        for group in edges.chunk_by(|a, b| a.ends == b.ends) {
+            if let [a, b] = group {
+                let [first, second] = [a, b].map(|edge| single[edge.triangle as usize]);
+                let is_turned = a.is_forward == b.is_forward;
+                self.join(2 * first, 2 * second + u32::from(is_turned));
+            }
+        }
+    }
+
+    /// Join sides of surfaces that see each other, those first that see most.
+    fn join_by_sight(&mut self, scene: &Scene, rays: &RayTree) {
+        // How many more rays tell that the least sides of two surfaces belong together than that they do not.
+        let mut votes: BTreeMap<[u32; 2], i32> = BTreeMap::new();
+        for [from, met] in sights(scene, rays) {
+            let ((a, a_turned), (b, b_turned)) = (self.surface(from), self.surface(met));
+            if a != b {
+                *votes.entry([a.min(b), a.max(b)]).or_default() +=
+                    if a_turned == b_turned { 1 } else { -1 };
+            }
+        }
+        let mut votes: Vec<([u32; 2], i32)> = votes.into_iter().collect();
+        votes.sort_by_key(|&(_, count)| std::cmp::Reverse(count.abs()));
+        for ([a, b], count) in votes {
+            match count {
+                0 => {}
+                1.. => self.join(a, b),
+                _ => self.join(a, behind(b)),
+            }
+        }
+    }
+
+    /// Whether the front of each triangle is not in that of the two sets of its surface that has more fronts.
+    fn turned(&mut self, scene: &Scene) -> Vec<bool> {
+        let mut fronts = vec![0.0f64; 2 * scene.triangles.len()];
+        for (triangle, surface) in scene.surfaces.iter().enumerate() {
+            let set = self.0.root(2 * triangle as u32);
+            fronts[set as usize] += f64::from(surface.area_vector.length());
+        }
+        let is_turned = |triangle: u32| {
+            let [front, back] = [0, 1].map(|side| self.0.root(2 * triangle + side));
+            let [by_front, by_back] = [front, back].map(|set| fronts[set as usize]);
+            by_front < by_back || by_front == by_back && back < front
+        };
+        (0..scene.triangles.len() as u32).map(is_turned).collect()
+    }
+}
+
+/// A triangle, and a later one that has the same corners.
+struct Twins {
+    first: u32,
+    second: u32,
+    /// Whether the second looks the other way.
+    is_turned: bool,
+}
+
+/// All triangles that share their corners with an earlier one.
+fn twins(corners: &[[u32; 3]]) -> Vec<Twins> {
+    let keyed = |(triangle, &[a, b, c]): (usize, &[u32; 3])| {
+        let mut sorted = [a, b, c];
+        sorted.sort_unstable();
+        let is_even = [[a, b, c], [b, c, a], [c, a, b]].contains(&sorted);
+        (sorted, triangle as u32, is_even)
+    };
+    let mut keyed: Vec<([u32; 3], u32, bool)> = corners.par_iter().enumerate().map(keyed).collect();
+    keyed.par_sort_unstable();
+    let twins = |run: &[([u32; 3], u32, bool)]| {
+        let (_, first, is_even) = run[0];
+        let later = run[1..].iter().map(move |next| Twins {
+            first,
+            second: next.1,
+            is_turned: next.2 != is_even,
+        });
+        later.collect::<Vec<Twins>>()
+    };
+    keyed.chunk_by(|a, b| a.0 == b.0).flat_map(twins).collect()
+}
+
+/// Pairs of lit sides of which the first sees the second, by rays from points spread evenly over the area.
+fn sights(scene: &Scene, rays: &RayTree) -> Vec<[u32; 2]> {
+    let mut sum = 0.0;
+    let sums = scene.surfaces.iter().map(|surface| {
+        sum += f64::from(surface.area_vector.length());
+        sum
+    });
+    let sums: Vec<f64> = sums.collect();
+    let sight = |index: usize| {
+        let mut random = Random::new(0, index as u64);
+        let target = (index as f64 + 0.5) / SIGHT_RAYS as f64 * sum;
+        let triangle = sums.partition_point(|&sum| sum <= target);
+        let triangle = triangle.min(sums.len() - 1);
+        let is_back = scene.triangles[triangle].two_sided && random.uniform() < 0.5;
+        let id = TriangleId(triangle as u32);
+        let [a, b, c] = scene.corners(id);
+        let at = triangle_point(random.uniform_2d());
+        let front = scene.surfaces[triangle].area_vector.normalize_or_zero();
+        let normal = if is_back { -front } else { front };
+        let direction = cosine_direction(normal, random.uniform_2d());
+        let hit = rays.closest(a * at.x + b * at.y + c * at.z, direction, Some(id))?;
+        let met = hit.triangle.index();
+        let meets_back = scene.surfaces[met].area_vector.dot(direction) > 0.0;
+        let is_lit = !meets_back || scene.triangles[met].two_sided;
+        is_lit.then(|| [(triangle, is_back), (met, meets_back)].map(side))
+    };
+    (0..SIGHT_RAYS).into_par_iter().filter_map(sight).collect()
+}
+
+/// A side of a triangle by number.
+fn side((triangle, is_back): (usize, bool)) -> u32 {
+    2 * triangle as u32 + u32::from(is_back)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::{
+        hierarchy::Hierarchy,
+        scene::{Material, SceneBuilder, SceneOptions, Sides as Sidedness},
+    };
+
+    /// A grid of `count` quads over places in the unit square, every `turned`-th triangle wound the other way.
+    fn grid(
+        builder: &mut SceneBuilder,
+        count: [usize; 2],
+        turned: usize,
+        place: impl Fn(f64, f64) -> DVec3,
+    ) {
+        let material = builder.materials.len() as u32 - 1;
+        let at = |i: usize, j: usize| place(i as f64 / count[0] as f64, j as f64 / count[1] as f64);
+        for i in 0..count[0] {
+            for j in 0..count[1] {
+                let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
+                let [a, b, c, d] = corners.map(|(i, j)| builder.push_position(at(i, j)));
+                for [p, q, r] in [[a, b, c], [a, c, d]] {
+                    let number = builder.faces.len();
+                    let corners = match number % turned {
+                        0 => [p, r, q],
+                        _ => [p, q, r],
+                    };
+                    builder.push_triangle(corners, crate::scene::MaterialId(material));
+                }
+            }
+        }
+    }
+
+    fn scene_of(fill: impl Fn(&mut SceneBuilder)) -> Scene {
+        let mut builder = SceneBuilder::default();
+        builder.push_material(Material::plain("grey", Vec3::splat(0.5), Vec3::ONE));
+        fill(&mut builder);
+        let options = SceneOptions {
+            sides: Sidedness::Two,
+            ..SceneOptions::default()
+        };
+        builder.finish(&options).unwrap()
+    }
+
+    /// A point of a tube of radius 1 and height 6.
+    fn on_tube(u: f64, v: f64) -> DVec3 {
+        let (sin, cos) = (u * std::f64::consts::TAU).sin_cos();
+        DVec3::new(cos, 6.0 * v, sin)
+    }
+
+    #[test]
+    fn no_cluster_but_the_root_holds_the_inside_and_the_outside_of_a_tube_however_it_is_wound() {
+        for turned in [2, 3, 1000] {
+            // A floor that sees the outside and no more, and shares no edge with it.
+            let scene = scene_of(|builder| {
+                grid(builder, [12, 6], turned, on_tube);
+                grid(builder, [1, 1], turned, |u, v| {
+                    DVec3::new(2.0 + 8.0 * u, 0.0, 8.0 * v)
+                });
+            });
+            let hierarchy = Hierarchy::new(&scene, 40.0);
+            let is_outside = |patch: &crate::hierarchy::Patch| {
+                let centre = crate::geometry::centroid(scene.corners(patch.triangle));
+                let world = scene.frame.to_world(centre);
+                let normal = patch.normal.as_dvec3();
+                (world.x.hypot(world.z) < 1.01)
+                    .then(|| DVec3::new(world.x, 0.0, world.z).dot(normal) > 0.0)
+            };
+            let is_up = |patch: &crate::hierarchy::Patch| {
+                (is_outside(patch).is_none()).then_some(patch.normal.y > 0.5)
+            };
+            for cluster in &hierarchy.clusters[1..] {
+                let patches = &hierarchy.patches[cluster.patches()];
+                let sides: Vec<bool> = patches.iter().filter_map(is_outside).collect();
+                let floor = patches.iter().filter_map(is_up);
+                let all: Vec<bool> = sides.into_iter().chain(floor).collect();
+                assert!(all.iter().all(|side| *side == all[0]), "{turned}: {all:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn surfaces_with_one_side_alone_are_left_as_they_are() {
+        let strip = |u: f64, v: f64| {
+            let (sin, cos) = (u * std::f64::consts::TAU).sin_cos();
+            let (half_sin, half_cos) = (u * std::f64::consts::PI).sin_cos();
+            let out = 3.0 + (v - 0.5) * half_cos;
+            DVec3::new(out * cos, (v - 0.5) * half_sin, out * sin)
+        };
+        let scene = scene_of(|builder| grid(builder, [24, 2], 1000, strip));
+        let sides = SheetSides::of(&scene, &mut None).unwrap();
+        for index in 0..scene.triangles.len() as u32 {
+            let [front, back] =
+                [false, true].map(|is_back| sides.is_in_second(TriangleId(index), is_back));
+            assert_ne!(front, back);
+        }
+        Hierarchy::new(&scene, 40.0).validate().unwrap();
+    }
+
+    #[test]
+    fn a_back_that_is_another_triangle_counts_as_a_back() {
+        let corners = [[0, 1, 2], [2, 1, 0], [1, 3, 2], [1, 2, 3]];
+        let found = twins(&corners);
+        let found: Vec<(u32, u32, bool)> = found
+            .iter()
+            .map(|twins| (twins.first, twins.second, twins.is_turned))
+            .collect();
+        assert_eq!(found, [(0, 1, true), (2, 3, true)]);
+        let mut sides = Sides(DisjointSets::new(8));
+        sides.join_over_edges(&corners, &twins(&corners));
+        let [fronts, backs] = [[0, 3, 4, 7], [1, 2, 5, 6]];
+        for (set, root) in [(fronts, 0), (backs, 1)] {
+            assert_eq!(set.map(|side| sides.0.root(side)), [root; 4]);
+        }
+    }
+}
