@@ -15,6 +15,11 @@ const RATIO_TARGETS: [f64; 2] = [0.1, 0.05];
 /// A smaller share calls noise an error of 0; a larger one hides what longer references would confirm.
 const RELIABLE_SHARE: f64 = 0.3;
 
+/// The smallest relative error that can be told from none under a reference with this relative noise.
+pub fn smallest_error(noise_floor: f64) -> f64 {
+    RELIABLE_SHARE * noise_floor
+}
+
 /// What errors are measured against.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReferenceFacts {
@@ -84,7 +89,7 @@ impl SceneComparison {
 
     /// The smallest error that can be told from none.
     pub fn smallest_error(&self) -> f64 {
-        RELIABLE_SHARE * self.reference.noise_floor
+        smallest_error(self.reference.noise_floor)
     }
 
     /// A Markdown table with a line for each run.

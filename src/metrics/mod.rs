@@ -9,7 +9,9 @@ pub mod stability;
 mod trajectory;
 mod vertex;
 
-pub use comparison::{ReferenceFacts, Row, SceneComparison, TARGETS, digits, grouped};
+pub use comparison::{
+    ReferenceFacts, Row, SceneComparison, TARGETS, digits, grouped, smallest_error,
+};
 pub use error::{ErrorMeasures, measure_error};
 pub use lookup::MeshLookup;
 pub use scaling::{COST_KINDS, CostKind, SizeCost, exponent_of, fitted_exponent, scaling_markdown};

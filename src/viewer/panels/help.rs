@@ -3,7 +3,7 @@
 use eframe::egui::{self, RichText};
 
 use crate::viewer::{
-    bindings::{Binding, Group, MOUSE},
+    bindings::{Binding, FOCUS, Group, MOUSE},
     state::State,
 };
 
@@ -30,13 +30,10 @@ pub fn help_window(ctx: &egui::Context, state: &mut State, table: &[Binding]) {
 fn sheet_ui(ui: &mut egui::Ui, table: &[Binding]) {
     ui.horizontal_top(|ui| {
         ui.vertical(|ui| {
-            rows(
-                ui,
-                "Mouse",
-                MOUSE.iter().map(|(keys, text)| ((*keys).to_owned(), *text)),
-            );
+            rows(ui, "Mouse", fixed_rows(&MOUSE));
             group_ui(ui, table, Group::Solve);
             group_ui(ui, table, Group::File);
+            rows(ui, "Controls", fixed_rows(&FOCUS));
         });
         ui.add_space(20.0);
         ui.vertical(|ui| {
@@ -44,6 +41,12 @@ fn sheet_ui(ui: &mut egui::Ui, table: &[Binding]) {
             group_ui(ui, table, Group::View);
         });
     });
+}
+
+fn fixed_rows<'t>(entries: &'t [(&'t str, &'t str)]) -> impl Iterator<Item = (String, &'t str)> {
+    entries
+        .iter()
+        .map(|(keys, text)| ((*keys).to_owned(), *text))
 }
 
 fn group_ui(ui: &mut egui::Ui, table: &[Binding], group: Group) {

@@ -78,13 +78,18 @@ fn exposed(radiance: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(clamp(radiance * view.display.y, vec3<f32>(0.0), vec3<f32>(BRIGHTEST)), 1.0);
 }
 
+// With the texture where it shows in detail.
+fn shown_reflectance(surface: Surface) -> vec3<f32> {
+    let texel = textureSample(detail_texture, detail_sampler, vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y));
+    if (detail.factor.w * view.display.w > 0.5) {
+        return detail.factor.rgb * texel.rgb;
+    }
+    return surface.reflectance;
+}
+
 @fragment
 fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
-    let texel = textureSample(detail_texture, detail_sampler, vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y));
-    var reflectance = surface.reflectance;
-    if (detail.factor.w * view.display.w > 0.5) {
-        reflectance = detail.factor.rgb * texel.rgb;
-    }
+    let reflectance = shown_reflectance(surface);
     let radiance = surface.emission + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
     switch u32(view.display.x) {
@@ -103,7 +108,27 @@ fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
     }
 }
 
-// The back of a one-sided face.
+// Bits of the luminance that a light mode shows, before emission scale and exposure: with the sign set where most of it
+// is emitted, 0 where there is none. Read by `Meter`.
+@fragment
+fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
+    let reflectance = shown_reflectance(surface);
+    var emitted = luminance(surface.emission);
+    var reflected = luminance(reflectance * surface.light / PI);
+    if (u32(view.display.x) == 1u) {
+        emitted = 0.0;
+        reflected = luminance(surface.light / PI);
+    }
+    let seen = max(emitted + reflected, 0.0);
+    return vec4<u32>(bitcast<u32>(select(seen, -seen, emitted > reflected)), 0u, 0u, 0u);
+}
+
+@fragment
+fn fs_meter_back(surface: Surface) -> @location(0) vec4<u32> {
+    return vec4<u32>(0u);
+}
+
+// The back of a face.
 @fragment
 fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
