@@ -36,6 +36,9 @@ use crate::worker::{RunOptions, Wake, WorkerHandle};
 /// adapter each takes time from the solver.
 const SOON: Duration = Duration::from_millis(1);
 
+/// How often the progress of reading is shown anew. More often would take the processor from the reading.
+const PROGRESS: Duration = Duration::from_millis(200);
+
 /// Where the list of recent files is kept.
 const RECENT_KEY: &str = "recent";
 
@@ -198,6 +201,9 @@ impl eframe::App for App {
         panels::table::table_window(&ctx, &mut self.state.panels, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
         dropping::hover_ui(&ctx);
+        if self.state.loading.is_some() {
+            ctx.request_repaint_after(PROGRESS);
+        }
         focus::ring_ui(&ctx);
         self.had_focus = focus::is_anywhere(&ctx);
         if self.state.view != before {

@@ -1,7 +1,5 @@
 //! The run: where it stands, its figures, and the buttons to steer it.
 
-use std::time::Duration;
-
 use eframe::egui::{self, Button};
 
 use super::{bound, bytes, count, figure, row, seconds};
@@ -10,7 +8,6 @@ use crate::{
     viewer::{
         action::Action,
         change::Change,
-        loader::Loader,
         state::{RunStatus, State},
         theme,
         wording::without_flags,
@@ -22,21 +19,17 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     let status = &state.run.status;
     let steps = state.settings.max_steps;
     let step = state.report().map_or(0, |report| report.step);
-    let share = match status {
-        RunStatus::Finished(_) => 1.0,
-        _ => step as f32 / steps.max(step + 1) as f32,
-    };
-    let text = match status {
-        RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
-        RunStatus::Paused => format!("Paused after {}", place(step, steps)),
-        _ => status.label(),
-    };
-    match &state.loading {
-        Some(loading) => reading_ui(ui, loading),
-        None => {
-            ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
+    let (share, text) = match &state.loading {
+        Some(loading) => {
+            let progress = loading.progress();
+            (progress.share, progress.text())
         }
-    }
+        None => (
+            run_share(status, step, steps),
+            run_text(status, step, steps),
+        ),
+    };
+    ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
     buttons_ui(ui, status, actions);
     if let RunStatus::Failed(message) = status {
         ui.colored_label(
@@ -48,13 +41,21 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     figures_ui(ui, state);
 }
 
-/// How far a scene has been read. It moves a few times a second: more frames would take the processor from the reading.
-fn reading_ui(ui: &mut egui::Ui, loading: &Loader) {
-    const REFRESH: Duration = Duration::from_millis(200);
-    let progress = loading.progress();
-    let bar = egui::ProgressBar::new(progress.share).text(progress.text());
-    ui.add(bar.corner_radius(3.0));
-    ui.ctx().request_repaint_after(REFRESH);
+/// The part of a run's steps that is done, 0…1.
+fn run_share(status: &RunStatus, step: u32, steps: u32) -> f32 {
+    match status {
+        RunStatus::Finished(_) => 1.0,
+        _ => step as f32 / steps.max(step + 1) as f32,
+    }
+}
+
+/// Where a run stands.
+fn run_text(status: &RunStatus, step: u32, steps: u32) -> String {
+    match status {
+        RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
+        RunStatus::Paused => format!("Paused after {}", place(step, steps)),
+        _ => status.label(),
+    }
 }
 
 /// What the last change of settings did. Its room is always there, so that no slider moves away from the hand.
