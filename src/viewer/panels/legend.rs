@@ -37,6 +37,9 @@ impl Scale {
     /// Values for marks, from low to high: round numbers, on logarithmic scales whole powers of ten where there are two.
     pub fn marks(&self) -> Vec<f64> {
         let [low, high] = self.ends;
+        if high <= low {
+            return vec![low];
+        }
         let is_inside = |value: &f64| (-1e-6..=1.0 + 1e-6).contains(&self.position(*value));
         if !self.has_decades() {
             let step = round_step((high - low) / 5.0);
@@ -73,10 +76,9 @@ pub(super) fn round_step(least: f64) -> f64 {
     factor.unwrap_or(10.0) * power
 }
 
-/// A round number, as short as it can be written.
+/// A round number, as short as it can be written; any other with four digits.
 fn mark_text(value: f64) -> String {
-    // Single precision drops what rounding has added.
-    let short = value as f32;
+    let short: f32 = format!("{value:.3e}").parse().unwrap_or(value as f32);
     match short.abs() {
         size if size < f32::MIN_POSITIVE => "0".to_owned(),
         size if (1e3..1e6).contains(&size) => count(value.round() as u64),
