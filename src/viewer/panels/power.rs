@@ -7,7 +7,7 @@ use crate::viewer::state::State;
 /// From powers in frame units to text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerScale {
-    unit: &'static str,
+    is_in_watts: bool,
     factor: f64,
 }
 
@@ -17,7 +17,7 @@ impl PowerScale {
         let loaded = state.loaded.as_ref();
         match loaded.filter(|_| state.view.is_in_metres) {
             Some(loaded) => Self {
-                unit: "W",
+                is_in_watts: true,
                 factor: loaded.scene.frame.area_to_world(1.0)
                     * f64::from(state.view.emission_scale),
             },
@@ -32,33 +32,33 @@ impl PowerScale {
 
     fn relative_to(whole: f64) -> Self {
         Self {
-            unit: "%",
+            is_in_watts: false,
             factor: if whole > 0.0 { 100.0 / whole } else { 0.0 },
         }
     }
 
     /// What the figures are called.
     pub fn name(&self) -> &'static str {
-        match self.unit {
-            "W" => "Power",
-            _ => "Relative power",
+        if self.is_in_watts {
+            "Power"
+        } else {
+            "Relative power"
         }
     }
 
     /// What the figures are, for a hint.
     pub fn explanation(&self) -> &'static str {
-        match self.unit {
-            "W" => "Luminance of the power that leaves",
-            _ => {
-                "Part of the power that leaves all surfaces. Watts need the unit of length, which OBJ files do not say: see \
-                 'Limits and scene'"
-            }
+        if self.is_in_watts {
+            "Luminance of the power that leaves"
+        } else {
+            "Part of the power that leaves all surfaces. Watts need the unit of length, which OBJ files do not say: see \
+             'Limits and scene'"
         }
     }
 
     /// The unit of the figures.
     pub fn unit(&self) -> &'static str {
-        self.unit
+        if self.is_in_watts { "W" } else { "%" }
     }
 
     /// A power in frame units as a figure.
@@ -68,7 +68,7 @@ impl PowerScale {
 
     /// A power in frame units with its unit.
     pub fn text(&self, power: f32) -> String {
-        format!("{} {}", figure(self.value(power)), self.unit)
+        format!("{} {}", figure(self.value(power)), self.unit())
     }
 }
 

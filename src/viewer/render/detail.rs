@@ -19,7 +19,7 @@ const MAX_SIDE: u32 = 2048;
 
 /// Which copies of a triangle the mesh has, in the order in which they are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Copy {
+pub(super) enum FaceCopy {
     /// The only one, of a one-sided triangle: from behind its back is seen, or nothing.
     Only,
     /// The front of a two-sided triangle.
@@ -34,7 +34,7 @@ pub(super) struct DrawRange {
     /// Which indices.
     pub(super) indices: Range<u32>,
     /// Which copies these triangles are.
-    pub(super) copy: Copy,
+    pub(super) copy: FaceCopy,
     /// Number of their group of textures.
     pub(super) group: usize,
 }
@@ -172,9 +172,9 @@ impl DetailSet {
         let kind = |index: usize| {
             let triangle = &scene.triangles[mesh.triangle_of[index] as usize];
             let copy = match (mesh.is_back[index], triangle.two_sided) {
-                (true, _) => Copy::Back,
-                (false, true) => Copy::Front,
-                (false, false) => Copy::Only,
+                (true, _) => FaceCopy::Back,
+                (false, true) => FaceCopy::Front,
+                (false, false) => FaceCopy::Only,
             };
             let group = match has_details {
                 true => self.group_of[triangle.material.index()],
@@ -182,7 +182,7 @@ impl DetailSet {
             };
             (copy, group)
         };
-        let kinds: Vec<(Copy, usize)> = (0..mesh.indices.len()).map(kind).collect();
+        let kinds: Vec<(FaceCopy, usize)> = (0..mesh.indices.len()).map(kind).collect();
         let mut order: Vec<usize> = (0..mesh.indices.len()).collect();
         order.sort_by_key(|&index| kinds[index]);
         let mut ranges: Vec<DrawRange> = Vec::new();

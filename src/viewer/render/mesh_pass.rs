@@ -5,7 +5,7 @@
 
 use super::{
     DEPTH_FORMAT, Gpu,
-    detail::{Copy, DetailSet},
+    detail::{DetailSet, FaceCopy},
     meter::METER_FORMAT,
     uploads::Uploads,
 };
@@ -60,7 +60,7 @@ impl MeshPass {
     ) {
         let shows_orientation = view.mode == ViewMode::FaceOrientation;
         let front_of = |copy| match (shows_orientation, copy) {
-            (true, Copy::Back) => &self.turned,
+            (true, FaceCopy::Back) => &self.turned,
             _ => &self.front,
         };
         let back = (view.backs || shows_orientation).then_some(&self.back);
@@ -92,7 +92,7 @@ impl MeshPass {
 fn draw_sides<'p>(
     pass: &mut wgpu::RenderPass<'_>,
     uploads: &Uploads,
-    front_of: impl Fn(Copy) -> &'p wgpu::RenderPipeline,
+    front_of: impl Fn(FaceCopy) -> &'p wgpu::RenderPipeline,
     back: Option<&wgpu::RenderPipeline>,
 ) {
     let (Some(mesh), Some(light)) = (uploads.mesh(), uploads.light()) else {
@@ -120,7 +120,10 @@ fn draw_sides<'p>(
     if let Some(back) = back {
         pass.set_pipeline(back);
         pass.set_bind_group(1, details.bind_group(0), &[]);
-        let one_sided = mesh.ranges.iter().filter(|range| range.copy == Copy::Only);
+        let one_sided = mesh
+            .ranges
+            .iter()
+            .filter(|range| range.copy == FaceCopy::Only);
         for range in one_sided {
             pass.draw_indexed(range.indices.clone(), 0, 0..1);
         }

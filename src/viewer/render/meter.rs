@@ -66,7 +66,8 @@ impl Metering {
 
     /// The picture, if it is there.
     pub fn poll(&self, gpu: &Gpu) -> Option<Result<Metered, ReadError>> {
-        Some(self.0.poll(gpu)?.map(Metered::from_bits))
+        let bytes = self.0.poll(gpu)?;
+        Some(bytes.map(|bytes| Metered::from_bits(&bytes)))
     }
 
     /// Wait for the picture.
@@ -74,7 +75,8 @@ impl Metering {
     /// # Errors
     /// When the device is lost or out of memory.
     pub fn wait(self, gpu: &Gpu) -> Result<Metered, ReadError> {
-        self.0.wait(gpu).map(Metered::from_bits)
+        let bytes = self.0.wait(gpu)?;
+        Ok(Metered::from_bits(&bytes))
     }
 }
 
@@ -90,7 +92,7 @@ pub struct Metered {
 
 impl Metered {
     /// Twin of `fs_meter` in mesh_pass.wgsl.
-    fn from_bits(bytes: Vec<u8>) -> Self {
+    fn from_bits(bytes: &[u8]) -> Self {
         let mut metered = Self::default();
         for bytes in bytes.chunks_exact(4) {
             let luminance = f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
