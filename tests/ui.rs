@@ -20,7 +20,8 @@ use vecrad::{
         action::Action,
         app::App,
         loader::SceneSource,
-        state::{RunStatus, Severity},
+        messages::Severity,
+        state::RunStatus,
         view::{ClusterCut, ClusterRequest, LinkEnd, ViewMode, ViewRequest},
     },
     worker::{Effect, StopReason},
@@ -84,7 +85,7 @@ fn a_scene_is_read_lit_and_finished() {
             .iter()
             .all(|light| light.is_finite())
     );
-    harness.get_by_label("Begin again");
+    harness.get_by_label("Restart");
     // The heading may lie below the fold of the panel.
     harness.get_by_label("Statistics").click_accesskit();
     harness.run_steps(20);
@@ -112,7 +113,7 @@ fn a_finer_threshold_refines_and_another_method_restarts() {
     other.seed += 1;
     perform(&mut harness, Action::Settings(other));
     assert_eq!(last_effect(&harness), Some(Effect::Restarts));
-    assert_told(&harness, "so it began again");
+    assert_told(&harness, "so the run was restarted");
 }
 
 fn last_effect(harness: &Harness<'static, App>) -> Option<Effect> {
@@ -138,8 +139,8 @@ fn light_that_is_finer_than_asked_for_says_so_where_the_run_is_shown() {
     let epsilon = coarser.epsilon;
     perform(&mut harness, Action::Settings(coarser));
     assert_eq!(last_effect(&harness), Some(Effect::Continues));
-    assert_told(&harness, "Begin again to have it coarser");
-    let sentence = harness.query_all_by_label_contains("Begin again to have it coarser");
+    assert_told(&harness, "Restart to have it coarser");
+    let sentence = harness.query_all_by_label_contains("Restart to have it coarser");
     let progress = harness.get_by_label("Progress").rect().bottom();
     let highest = sentence
         .map(|said| said.rect().top())

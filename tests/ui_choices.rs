@@ -24,9 +24,10 @@ use vecrad::{
         app::App,
         camera::AxisView,
         loader::SceneSource,
+        messages::Severity,
         panels::figure,
         start::Faults,
-        state::{RunStatus, Severity},
+        state::RunStatus,
         view::{ToneMap, ViewMode, ViewRequest},
     },
 };
@@ -167,7 +168,7 @@ fn a_scene_shows_only_what_it_can_use() {
     // The table of views does not offer errors without a reference either.
     harness.get_by_label("View mode").click();
     harness.run_steps(3);
-    harness.get_by_label("Uncertainty");
+    harness.get_by_label("False colour: error bound");
     // Only the panel of that name.
     assert_eq!(harness.query_all_by_label("Measured error").count(), 1);
 }

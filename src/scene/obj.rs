@@ -17,6 +17,7 @@ use super::library::{Defined, Library};
 use super::lines::{Notation, spellings};
 use super::locate::{Missing, SceneFolder};
 use super::mtl::{MtlMaterial, read_mtl};
+use super::progress::ReadProgress;
 use super::source;
 use super::texture::{Role, linear_from_srgb};
 use super::texture_statement::{TextureReference, TextureStatement};
@@ -110,7 +111,20 @@ pub enum ReadError {
 /// # Errors
 /// [`ReadError`] when no scene is left; everything else is a warning in [`Scene::warnings`].
 pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError> {
+    read_obj_with_progress(path, options, &ReadProgress::default())
+}
+
+/// Read an OBJ file and tell another thread how much of it has been read.
+///
+/// # Errors
+/// As [`read_obj`].
+pub fn read_obj_with_progress(
+    path: &Path,
+    options: &SceneOptions,
+    progress: &ReadProgress,
+) -> Result<Scene, ReadError> {
     let (reader, watch) = source::open(path)?;
+    let reader = progress.count(reader, watch.length());
     let file = path
         .file_name()
         .unwrap_or(path.as_os_str())

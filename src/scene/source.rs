@@ -34,6 +34,11 @@ pub(super) struct Watch {
 }
 
 impl Watch {
+    /// Bytes that the file had when it was opened.
+    pub(super) fn length(&self) -> u64 {
+        self.before.length
+    }
+
     /// Whether it has another length or time of change, or cannot be asked.
     pub(super) fn has_changed(&self) -> bool {
         Stamp::of(&self.file).map_or(true, |now| now != self.before)

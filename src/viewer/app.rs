@@ -20,7 +20,7 @@ use eframe::egui;
 use super::{
     action::Action,
     bindings::{self, Binding},
-    panels,
+    focus, panels,
     preferences::Preferences,
     saver::{Notice, Unfinished},
     session::Recent,
@@ -35,6 +35,9 @@ use crate::worker::{RunOptions, Wake, WorkerHandle};
 /// When the next frame is drawn after something arrived. At once would draw two frames, and on a processor that plays
 /// adapter each takes time from the solver.
 const SOON: Duration = Duration::from_millis(1);
+
+/// How often the progress of reading is shown anew. More often would take the processor from the reading.
+const PROGRESS: Duration = Duration::from_millis(200);
 
 /// Where the list of recent files is kept.
 const RECENT_KEY: &str = "recent";
@@ -61,6 +64,8 @@ pub struct App {
     title: Option<String>,
     /// Camera and view stay as they are when the scene being read arrives.
     keeps_view: bool,
+    /// Whether a control had the keyboard focus at the end of the last frame.
+    had_focus: bool,
 }
 
 impl App {
@@ -121,6 +126,7 @@ impl App {
             first: None,
             title: None,
             keeps_view: false,
+            had_focus: false,
         };
         if let Some(up) = options.camera.up {
             app.state.rig.target.up = up;
@@ -157,10 +163,11 @@ impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         // What keys ask for shows in this frame already. Keys belong to fields and open menus first.
-        if !ctx.egui_wants_keyboard_input() && !egui::Popup::is_any_open(&ctx) {
+        if !focus::is_typing(&ctx) && !egui::Popup::is_any_open(&ctx) {
             self.obey_keys(&ctx);
         }
-        let mut actions: Vec<Action> = self.take_dropped(&ctx).into_iter().collect();
+        self.take_dropped(&ctx);
+        let mut actions: Vec<Action> = Vec::new();
         let before = self.state.view.clone();
         if self.state.panels.shown {
             egui::Panel::top("menu").show(ui, |ui| {
@@ -194,6 +201,11 @@ impl eframe::App for App {
         panels::table::table_window(&ctx, &mut self.state.panels, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
         dropping::hover_ui(&ctx);
+        if self.state.loading.is_some() {
+            ctx.request_repaint_after(PROGRESS);
+        }
+        focus::ring_ui(&ctx);
+        self.had_focus = focus::is_anywhere(&ctx);
         if self.state.view != before {
             self.follow_light();
             ctx.request_repaint();

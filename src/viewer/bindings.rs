@@ -92,9 +92,16 @@ pub const MOUSE: [(&str, &str); 10] = [
     ("Right drag + W A S D Q E", "Fly; Shift faster, Ctrl slower"),
     ("Wheel while flying", "Flying speed"),
     ("Click", "Pick a surface"),
-    ("Double-click a surface", "Turn around that point"),
+    ("Double-click a surface", "Set orbit centre"),
     ("Double-click the background", "Show the whole scene"),
     ("Drop a file", "Open it"),
+];
+
+/// What keys do with the controls of the panels, for the key sheet.
+pub const FOCUS: [(&str, &str); 3] = [
+    ("Tab, Shift+Tab", "Next or previous control"),
+    ("Space, Enter", "Press the control with the focus"),
+    ("Esc", "Leave the control"),
 ];
 
 /// Keys that move the camera while the right button is held; Ctrl slows it then, and means nothing else.
@@ -172,12 +179,7 @@ pub fn bindings() -> Vec<Binding> {
             Action::ClusterLevelBy(1),
         ),
         plain(Key::L, View, "Links of what is picked", Action::ToggleLinks),
-        plain(
-            Key::N,
-            View,
-            "Normals, or what was shown before",
-            Action::ToggleNormals,
-        ),
+        plain(Key::N, View, "Normals and back", Action::ToggleNormals),
         plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
         plain(Key::Minus, View, "Darker by ½ EV", Action::ExposureBy(-0.5)),
         plain(
@@ -197,14 +199,14 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Escape,
             Solve,
-            "Close a dialog, else stop, else select nothing",
+            "Close a dialog, else stop, else clear the selection",
             Action::Stop,
         ),
-        command(Key::R, Solve, "Begin again", Action::Reset),
+        command(Key::R, Solve, "Restart", Action::Reset),
         plain(
             Key::R,
             Solve,
-            "Trace the reference, or rest",
+            "Trace the reference, or pause it",
             Action::TraceReference,
         ),
         command(Key::O, File, "Open…", Action::OpenDialog),
@@ -234,12 +236,6 @@ pub fn bindings() -> Vec<Binding> {
             Action::Screenshot,
         ),
         command(Key::P, File, "Picture of any size…", Action::PictureDialog),
-        plain(
-            Key::Tab,
-            File,
-            "Hide or show the panels",
-            Action::TogglePanels,
-        ),
         command(
             Key::B,
             File,
@@ -258,7 +254,7 @@ pub fn bindings() -> Vec<Binding> {
         command(
             Key::Num0,
             File,
-            "Text and panels as at first",
+            "Text and panels at their default size",
             Action::Scale(Scale::Whole),
         ),
         plain(Key::F1, File, "This sheet", Action::ToggleHelp),
@@ -287,8 +283,9 @@ pub fn bindings() -> Vec<Binding> {
     all
 }
 
-/// The actions whose keys were pressed, with exactly their modifiers; the key presses are used up.
-pub fn pressed(input: &mut InputState, table: &[Binding]) -> Vec<Action> {
+/// The actions whose keys were pressed, with exactly their modifiers; the key presses are used up. Those of `in_use` are
+/// left to the control that has the focus.
+pub fn pressed(input: &mut InputState, table: &[Binding], in_use: &[Key]) -> Vec<Action> {
     let mut actions = Vec::new();
     let flies = input.pointer.secondary_down();
     input.events.retain(|event| {
@@ -303,7 +300,8 @@ pub fn pressed(input: &mut InputState, table: &[Binding]) -> Vec<Action> {
         else {
             return true;
         };
-        if flies && FLYING.contains(key) {
+        let is_taken = in_use.contains(key) && modifiers.is_none();
+        if is_taken || flies && FLYING.contains(key) {
             return true;
         }
         let fits = |binding: &&Binding| binding.fits(*key, *modifiers, *repeat);

@@ -18,16 +18,16 @@ impl Change {
         let rests = self.status.can_continue();
         Some(match self.effect {
             Effect::Nothing => return None,
-            Effect::Continues if rests => "The change holds once the light goes on.",
+            Effect::Continues if rests => "The change takes effect when the run continues.",
             Effect::Continues if self.status.is_busy() => {
-                "The change holds from the next step on; nothing is lost."
+                "The change takes effect from the next step on; nothing is lost."
             }
             Effect::Continues => {
-                "The light is as fine as that already. Begin again to have it coarser and sooner."
+                "The light is as fine as that already. Restart to have it coarser and sooner."
             }
             Effect::Refines if rests => "Continue refines the light further; nothing is lost.",
             Effect::Refines => "The light is refined further; nothing is lost.",
-            Effect::Restarts => "What was changed needs new light, so it began again.",
+            Effect::Restarts => "The change needs new light, so the run was restarted.",
         })
     }
 }
@@ -41,9 +41,9 @@ mod tests {
     fn what_a_change_does_depends_on_where_the_run_stood() {
         let label = |effect, status| Change { effect, status }.label().unwrap_or_default();
         let done = RunStatus::Finished(StopReason::Converged);
-        assert!(label(Effect::Continues, done.clone()).contains("Begin again"));
+        assert!(label(Effect::Continues, done.clone()).contains("Restart"));
         assert!(label(Effect::Continues, RunStatus::Running).contains("next step"));
-        assert!(label(Effect::Continues, RunStatus::Paused).contains("goes on"));
+        assert!(label(Effect::Continues, RunStatus::Paused).contains("when the run continues"));
         assert!(label(Effect::Refines, RunStatus::Paused).contains("Continue"));
         assert!(label(Effect::Refines, done.clone()).contains("is refined"));
         assert_eq!(label(Effect::Nothing, done), "");

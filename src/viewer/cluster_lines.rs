@@ -12,23 +12,37 @@ use crate::solver::ClusterBox;
 /// Boxes drawn at most. More are a grey fog and slow on a software adapter.
 pub const MAX_BOXES: usize = 200_000;
 
+/// Part of the ramp's colours below those of boxes: the darkest would not show on dark surfaces.
+pub const RAMP_START: f32 = 0.15;
+
+/// Boxes in colours.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ColoredBoxes {
+    /// The boxes.
+    pub instances: Vec<BoxInstance>,
+    /// What the first and the last of the colours stand for: powers and areas in frame units, counts, or W/m².
+    pub ends: [f32; 2],
+}
+
 /// The boxes of an overlay that shows these clusters of all; empty where it is off.
-pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> Vec<BoxInstance> {
-    if !overlay.shown {
-        return Vec::new();
+pub fn boxes(all: &[ClusterBox], shown: &[usize], overlay: &ClusterOverlay) -> ColoredBoxes {
+    if !overlay.shown || shown.is_empty() {
+        return ColoredBoxes::default();
     }
     let shown: Vec<&ClusterBox> = chosen(all, shown, MAX_BOXES)
         .into_iter()
         .map(|index| &all[index])
         .collect();
     let [low, high] = color_range(&shown, overlay.color);
-    shown
-        .iter()
-        .map(|cluster| {
-            let t = (quantity(cluster, overlay.color) - low) / (high - low).max(f32::MIN_POSITIVE);
-            instance(cluster, theme::ramp(0.15 + 0.85 * t.clamp(0.0, 1.0)))
-        })
-        .collect()
+    let colored = |cluster: &&ClusterBox| {
+        let t = (quantity(cluster, overlay.color) - low) / (high - low).max(f32::MIN_POSITIVE);
+        let at = RAMP_START + (1.0 - RAMP_START) * t.clamp(0.0, 1.0);
+        instance(cluster, theme::ramp(at))
+    };
+    ColoredBoxes {
+        instances: shown.iter().map(colored).collect(),
+        ends: [low, high].map(|end| value_of(end, overlay.color)),
+    }
 }
 
 /// At most so many boxes: the largest, and with half of them or more the others, evenly spread.
@@ -131,6 +145,15 @@ fn quantity(cluster: &ClusterBox, color: ClusterColor) -> f32 {
     }
 }
 
+/// What a position of [`quantity`] stands for.
+fn value_of(position: f32, color: ClusterColor) -> f32 {
+    match color {
+        ClusterColor::Spread => position,
+        ClusterColor::Links => 10f32.powf(position) - 1.0,
+        _ => 10f32.powf(position),
+    }
+}
+
 /// Ends of the colours of some boxes; at most six magnitudes for logarithms.
 fn color_range(shown: &[&ClusterBox], color: ClusterColor) -> [f32; 2] {
     if color == ClusterColor::Spread {
@@ -153,16 +176,41 @@ mod tests {
     fn boxes_are_finite_and_only_there_when_shown() {
         let mut overlay = ClusterOverlay::default();
         let all: Vec<usize> = (0..tree().len()).collect();
-        assert!(boxes(&tree(), &all, &overlay).is_empty());
+        assert_eq!(boxes(&tree(), &all, &overlay), ColoredBoxes::default());
         overlay.shown = true;
         for color in ClusterColor::ALL {
             overlay.color = color;
-            for instance in boxes(&tree(), &all, &overlay) {
+            for instance in boxes(&tree(), &all, &overlay).instances {
                 assert!(
                     instance.iter().all(|x| x.is_finite()),
                     "{color:?} {instance:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn the_ends_of_the_colours_are_those_of_the_boxes() {
+        let mut tree = tree();
+        (tree[1].power, tree[2].link_count) = (100.0, 7);
+        let all: Vec<usize> = (0..tree.len()).collect();
+        let ends = |color| {
+            let overlay = ClusterOverlay {
+                shown: true,
+                color,
+                ..ClusterOverlay::default()
+            };
+            boxes(&tree, &all, &overlay).ends
+        };
+        for (color, expected) in [
+            (ClusterColor::Power, [1.0, 100.0]),
+            (ClusterColor::Links, [0.0, 7.0]),
+            (ClusterColor::Spread, [0.0, 1.0]),
+        ] {
+            let found = ends(color);
+            let is_near =
+                |index: usize| (found[index] - expected[index]).abs() < 1e-3 * expected[1];
+            assert!(is_near(0) && is_near(1), "{color:?}: {found:?}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Where the light of a snapshot lies: automatic exposure, and the ends of automatic false colours.
+//! Where the light of a snapshot lies: the ends of automatic false colours.
 
 use glam::Vec3;
 
@@ -7,37 +7,12 @@ use crate::solver::Snapshot;
 
 /// Vertices looked at. Fewer miss small bright spots; more take longer than a frame of a large scene may.
 const SAMPLES: usize = 20_000;
-/// Display value that the middle of the light is exposed to. Brighter washes out, darker hides the corners.
-const MIDDLE_GRAY: f32 = 0.24;
-/// Display value that the bright end of the light stays below.
-const BRIGHT_END: f32 = 1.6;
 /// Below this nothing counts as light, in W/(sr·m²).
 const DARKNESS: f32 = 1e-12;
 
 /// Luminance of linear RGB.
 pub fn luminance(color: Vec3) -> f32 {
     color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}
-
-/// Exposure in EV that shows the reflected light, as it was computed, well, or `None` while nothing is lit.
-pub fn auto_exposure(snapshot: &Snapshot) -> Option<f32> {
-    let mut lit: Vec<f32> = sampled(snapshot)
-        .map(|vertex| reflected(snapshot, vertex))
-        .filter(|radiance| *radiance > DARKNESS)
-        .collect();
-    if lit.is_empty() {
-        // Only emitters: show the brightest just below white.
-        let brightest = sampled(snapshot)
-            .map(|vertex| luminance(snapshot.mesh.emission[vertex]))
-            .fold(0.0, f32::max);
-        return (brightest > DARKNESS).then(|| -brightest.log2());
-    }
-    lit.sort_by(f32::total_cmp);
-    let middle = quantile(&lit, 0.5);
-    let bright = quantile(&lit, 0.95);
-    let exposure = (MIDDLE_GRAY / middle).min(BRIGHT_END / bright).log2();
-    // Tenths of EV: exposure should not creep while the light settles.
-    Some((exposure * 10.0).round() / 10.0)
 }
 
 /// Ends of the false colours of a mode: the fixed ones, or those of the light. `errors` are those at the vertices.

@@ -4,9 +4,11 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc,
+        atomic::{AtomicU8, Ordering},
         mpsc::{self, Receiver, TryRecvError},
     },
     thread,
+    time::{Duration, Instant},
 };
 
 use glam::Vec3;
@@ -15,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::{camera::Camera, opening};
 use crate::{
     geometry::RayTree,
-    scene::{self, Scene, SceneOptions, builtin},
+    scene::{self, ReadProgress, Scene, SceneOptions, builtin},
     worker::Wake,
 };
 
@@ -73,10 +75,80 @@ pub struct LoadedScene {
     pub viewpoint: Camera,
 }
 
+/// What is done to a scene on its way, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The file, its materials and textures.
+    Reading,
+    /// What picking and the reference need.
+    BuildingRayTree,
+    /// Where to look from.
+    ChoosingView,
+}
+
+/// How far a scene is on its way, told by the thread that reads it. Clones tell the same.
+#[derive(Clone, Debug, Default)]
+struct Tracker {
+    phase: Arc<AtomicU8>,
+    file: ReadProgress,
+}
+
+impl Tracker {
+    fn enter(&self, phase: Phase) {
+        self.phase.store(phase as u8, Ordering::Relaxed);
+    }
+
+    fn progress(&self, elapsed: Duration) -> LoadProgress {
+        /// Parts of the bar at which the text has been read, and at which each later phase begins. Reading takes longest.
+        const TEXT: f32 = 0.7;
+        let share = self.file.share();
+        let (share, doing) = match self.phase.load(Ordering::Relaxed) {
+            phase if phase == Phase::BuildingRayTree as u8 => (0.85, "Building the ray tree"),
+            phase if phase == Phase::ChoosingView as u8 => (0.95, "Choosing a view"),
+            _ if share < 1.0 => (TEXT * share, "Reading"),
+            _ => (TEXT, "Reading materials and textures"),
+        };
+        LoadProgress {
+            share,
+            doing,
+            elapsed,
+        }
+    }
+}
+
+/// How far a scene is on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadProgress {
+    /// The part that is done, 0…1.
+    pub share: f32,
+    /// What is being done.
+    doing: &'static str,
+    /// Since reading began.
+    elapsed: Duration,
+}
+
+impl LoadProgress {
+    /// What is being done and how far it is, short.
+    pub fn text(&self) -> String {
+        let percent = (100.0 * self.share).floor();
+        match self.elapsed.as_secs() {
+            0 => format!("{}: {percent} %", self.doing),
+            seconds => format!("{}: {percent} %, {seconds} s", self.doing),
+        }
+    }
+
+    /// The same with the name of the scene.
+    pub fn sentence(&self, name: &str) -> String {
+        format!("{name}: {}", self.text())
+    }
+}
+
 /// A scene on its way.
 pub struct Loader {
     source: SceneSource,
     receiver: Receiver<Result<LoadedScene, String>>,
+    tracker: Tracker,
+    since: Instant,
 }
 
 impl Loader {
@@ -86,15 +158,26 @@ impl Loader {
     /// When the system refuses a thread.
     pub fn start(source: SceneSource, options: SceneOptions, wake: Wake) -> std::io::Result<Self> {
         let (sender, receiver) = mpsc::channel();
-        let wanted = source.clone();
+        let tracker = Tracker::default();
+        let (wanted, tracked) = (source.clone(), tracker.clone());
         thread::Builder::new()
             .name("loader".to_owned())
             .spawn(move || {
                 // Nobody listens when another scene was asked for meanwhile.
-                let _ = sender.send(load(wanted, &options));
+                let _ = sender.send(load(wanted, &options, &tracked));
                 wake();
             })?;
-        Ok(Self { source, receiver })
+        Ok(Self {
+            source,
+            receiver,
+            tracker,
+            since: Instant::now(),
+        })
+    }
+
+    /// How far it is.
+    pub fn progress(&self) -> LoadProgress {
+        self.tracker.progress(self.since.elapsed())
     }
 
     /// What is being read.
@@ -119,11 +202,16 @@ impl Loader {
 ///
 /// # Errors
 /// One sentence for people.
-pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, String> {
+fn load(
+    source: SceneSource,
+    options: &SceneOptions,
+    tracker: &Tracker,
+) -> Result<LoadedScene, String> {
+    tracker.enter(Phase::Reading);
     let (scene, viewpoint) = match &source {
         SceneSource::File(path) => {
-            let scene = scene::read_obj(path, options).map_err(|error| error.to_string())?;
-            (scene, None)
+            let scene = scene::read_obj_with_progress(path, options, &tracker.file);
+            (scene.map_err(|error| error.to_string())?, None)
         }
         SceneSource::Builtin(name) => {
             let found = builtin::find_builtin(name)
@@ -134,7 +222,9 @@ pub fn load(source: SceneSource, options: &SceneOptions) -> Result<LoadedScene, 
         }
     };
     let (min, max) = bounds(&scene);
+    tracker.enter(Phase::BuildingRayTree);
     let rays = RayTree::new(&scene);
+    tracker.enter(Phase::ChoosingView);
     let viewpoint = viewpoint.unwrap_or_else(|| opening::deepest_view(&scene, &rays, min, max));
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
@@ -173,4 +263,26 @@ pub fn bounds(scene: &Scene) -> (Vec3, Vec3) {
         .fold((Vec3::MAX, Vec3::MIN), |(min, max), position| {
             (min.min(*position), max.max(*position))
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_moves_from_phase_to_phase() {
+        let tracker = Tracker::default();
+        let at = |seconds| tracker.progress(Duration::from_secs(seconds));
+        assert_eq!(at(0).text(), "Reading: 0 %");
+        let mut shares = vec![at(0).share];
+        for phase in [Phase::BuildingRayTree, Phase::ChoosingView] {
+            tracker.enter(phase);
+            shares.push(at(0).share);
+        }
+        assert!(shares.is_sorted_by(|a, b| a < b), "{shares:?}");
+        assert_eq!(
+            at(3).sentence("hall.obj"),
+            "hall.obj: Choosing a view: 95 %, 3 s"
+        );
+    }
 }

@@ -12,6 +12,8 @@ pub mod cluster_lines;
 pub mod clusters;
 #[cfg(target_os = "linux")]
 mod display_server;
+pub mod exposure;
+pub mod focus;
 pub mod fonts;
 pub mod frame_time;
 pub mod inspection;
@@ -20,6 +22,7 @@ mod line_cache;
 pub mod links;
 pub mod loader;
 pub mod materials;
+pub mod messages;
 pub mod navigation;
 pub mod opening;
 pub mod overlay;
@@ -38,5 +41,6 @@ pub mod theme;
 pub mod truth;
 pub mod view;
 pub mod viewport;
+pub mod wording;
 
 pub use start::{CameraRequest, Options, ViewerError, run};

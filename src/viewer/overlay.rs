@@ -36,7 +36,7 @@ impl ClusterColor {
             Self::Area => "Area",
             Self::Spread => "Direction spread",
             Self::Links => "Links received",
-            Self::Error => "Estimated error",
+            Self::Error => "Error bound",
         }
     }
 }

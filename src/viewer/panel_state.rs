@@ -1,14 +1,27 @@
 //! What the panels hold open and half typed.
 
+use eframe::egui::Rangef;
+
+/// A panel beside the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The run and its settings, on the left.
+    Light,
+    /// What is picked, clusters, links, figures and messages, on the right.
+    Look,
+}
+
 /// What the panels hold open and half typed.
 #[derive(Clone, Debug)]
 pub struct PanelState {
     /// Whether anything but the scene is shown.
     pub shown: bool,
-    /// Whether the panel of the run and its settings is shown beside the scene.
+    /// Whether the panel of the run and its settings is open.
     pub light: bool,
-    /// Whether the panel of what is looked into is shown beside the scene.
+    /// Whether the panel of what is looked into is open.
     pub look: bool,
+    /// The panel that is shown where both are open and there is room for one.
+    pub first_side: Side,
     /// Whether the key sheet is open.
     pub help: bool,
     /// Whether the dialog for pictures is open.
@@ -41,9 +54,60 @@ pub struct PanelState {
     pub fly_speed: f32,
 }
 
+impl Side {
+    /// Widths that a panel can be dragged to, in points. Narrower cuts its figures off, wider has nothing to show.
+    pub fn width_range(self) -> Rangef {
+        match self {
+            Self::Light => Rangef::new(290.0, 480.0),
+            Self::Look => Rangef::new(250.0, 520.0),
+        }
+    }
+
+    /// Width that the panels have together in a window of this width, in points: the other half is the view's.
+    pub fn room(window_width: f32) -> f32 {
+        0.5 * window_width
+    }
+}
+
 impl PanelState {
     /// Speeds that can be flown at.
     pub const FLY_SPEED_RANGE: std::ops::RangeInclusive<f32> = 0.05..=1000.0;
+
+    /// The open panels that a window of this width in points has room for: the view keeps half of it.
+    pub fn shown_sides(&self, window_width: f32) -> Vec<Side> {
+        let open: Vec<Side> = [(Side::Light, self.light), (Side::Look, self.look)]
+            .into_iter()
+            .filter_map(|(side, is_open)| is_open.then_some(side))
+            .collect();
+        let needed: f32 = open.iter().map(|side| side.width_range().min).sum();
+        if open.len() > 1 && needed > Side::room(window_width) {
+            return vec![self.first_side];
+        }
+        open
+    }
+
+    /// Open a panel; where there is no room for both, the other one gives way.
+    pub fn open_side(&mut self, side: Side) {
+        *self.is_open(side) = true;
+        self.first_side = side;
+    }
+
+    /// Close a panel, and with it one that gave way to it: closing is for seeing more of the scene.
+    pub fn close_side(&mut self, side: Side, window_width: f32) {
+        let shown = self.shown_sides(window_width);
+        for closed in [Side::Light, Side::Look] {
+            if closed == side || !shown.contains(&closed) {
+                *self.is_open(closed) = false;
+            }
+        }
+    }
+
+    fn is_open(&mut self, side: Side) -> &mut bool {
+        match side {
+            Side::Light => &mut self.light,
+            Side::Look => &mut self.look,
+        }
+    }
 
     /// Open the field for a path.
     pub fn ask_for_path(&mut self) {
@@ -85,6 +149,7 @@ impl Default for PanelState {
             shown: true,
             light: true,
             look: true,
+            first_side: Side::Light,
             help: false,
             picture: false,
             mesh: false,
@@ -107,6 +172,24 @@ impl Default for PanelState {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn in_a_narrow_window_the_panel_that_was_opened_last_stays() {
+        let mut panels = PanelState::default();
+        assert_eq!(panels.shown_sides(1280.0), [Side::Light, Side::Look]);
+        assert_eq!(panels.shown_sides(800.0), [Side::Light]);
+        panels.open_side(Side::Look);
+        assert_eq!(panels.shown_sides(800.0), [Side::Look]);
+        assert_eq!(panels.shown_sides(1280.0), [Side::Light, Side::Look]);
+        panels.close_side(Side::Look, 1280.0);
+        assert_eq!(panels.shown_sides(1280.0), [Side::Light]);
+        panels.open_side(Side::Look);
+        panels.close_side(Side::Look, 800.0);
+        assert!(
+            panels.shown_sides(800.0).is_empty(),
+            "nothing takes its place"
+        );
+    }
 
     #[test]
     fn dialogs_are_closed_once() {

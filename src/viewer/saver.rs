@@ -11,8 +11,8 @@ use image::{DynamicImage, ImageFormat, RgbaImage};
 
 use super::{
     loader::SceneSource,
+    messages::Severity,
     render::{CutoutTarget, Gpu, ReadError, Target},
-    state::Severity,
     view::ToneMap,
 };
 use crate::{
@@ -225,13 +225,18 @@ pub fn encode(
     Ok(bytes.into_inner())
 }
 
-/// A name in the pictures folder that is free: `scene_1.png` and on.
-pub fn free_path(scene: &str) -> PathBuf {
-    let folder = directories::UserDirs::new()
-        .and_then(|folders| folders.picture_dir().map(Path::to_owned))
-        .filter(|folder| folder.is_dir())
-        .unwrap_or_default();
-    free_name(&folder, &plain_stem(scene), "png")
+/// A name for a picture that is free, beside the scene where that is a file, else in the pictures folder: `scene_1.png`
+/// and on.
+pub fn free_picture_path(source: Option<&SceneSource>) -> PathBuf {
+    let folder = match source.and_then(SceneSource::path) {
+        Some(path) => folder_of(path).to_owned(),
+        None => directories::UserDirs::new()
+            .and_then(|folders| folders.picture_dir().map(Path::to_owned))
+            .filter(|folder| folder.is_dir())
+            .unwrap_or_default(),
+    };
+    let name = source.map(SceneSource::label).unwrap_or_default();
+    free_name(&folder, &plain_stem(&name), "png")
 }
 
 /// A name for a table of errors that is free, beside the scene where that is a file: `scene_errors_1.csv` and on.
@@ -255,8 +260,12 @@ fn free_path_beside(source: &SceneSource, what: &str, extension: &str) -> PathBu
 
 /// The name of a scene as files may have it.
 fn plain_stem(scene: &str) -> String {
-    let stem: String = scene
-        .trim_end_matches(".obj")
+    let is_obj = |ending: &str| ending.eq_ignore_ascii_case("obj");
+    let stem = match scene.rsplit_once('.') {
+        Some((stem, ending)) if is_obj(ending) => stem,
+        _ => scene,
+    };
+    let stem: String = stem
         .chars()
         .map(|c| {
             if c.is_alphanumeric() || "-_".contains(c) {
@@ -278,4 +287,29 @@ fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
         .map(|number| folder.join(format!("{stem}_{number}.{extension}")))
         .find(|path| !path.exists())
         .unwrap_or_else(|| folder.join(format!("vecrad.{extension}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_stand_beside_their_scene_under_free_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let source = SceneSource::File(folder.path().join("Hall 2.OBJ"));
+        let first = free_picture_path(Some(&source));
+        assert_eq!(first, folder.path().join("Hall_2_1.png"));
+        std::fs::write(&first, "").expect("a file");
+        assert_eq!(
+            free_picture_path(Some(&source)),
+            folder.path().join("Hall_2_2.png")
+        );
+        assert_eq!(
+            free_mesh_path(&source),
+            folder.path().join("Hall_2_lit_1.glb")
+        );
+        let builtin = SceneSource::Builtin("cornell".to_owned());
+        assert!(free_picture_path(Some(&builtin)).ends_with("cornell_1.png"));
+        assert!(free_picture_path(None).ends_with("vecrad_1.png"));
+    }
 }

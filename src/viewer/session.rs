@@ -131,7 +131,7 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
 /// One sentence for people.
 pub fn save(source: &SceneSource, session: &Session, frame: &Frame) -> Result<PathBuf, String> {
     let path = sidecar_path(source)
-        .ok_or("a built-in scene has no file to save settings beside; write it with 'vecrad scenes --write' first")?;
+        .ok_or("a built-in scene has no file to save settings beside; open a scene from a file")?;
     let text = to_toml(session, frame)?;
     write_whole(&path, |out| out.write_all(text.as_bytes()))
         .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
@@ -147,7 +147,12 @@ pub fn load(source: &SceneSource, frame: &Frame) -> Option<Result<Session, Strin
     };
     Some(
         text.and_then(|text| from_toml(&text, frame))
-            .map_err(|error| format!("{} was not used: {error}", path.display())),
+            .map_err(|error| {
+                format!(
+                    "the saved settings were not used: {error}: {}",
+                    path.display()
+                )
+            }),
     )
 }
 

@@ -72,6 +72,8 @@ pub struct Staged {
     pub is_lit: bool,
     /// The clusters that boxes are drawn of.
     pub clusters: ShownClusters,
+    /// What the ends of their colours stand for, as [`cluster_lines::ColoredBoxes`] has them.
+    pub box_ends: [f32; 2],
     /// Light at the picked point.
     pub probe: Option<Probe>,
     /// Light over its object.
@@ -177,6 +179,7 @@ fn newest(inbox: &Receiver<Order>) -> Option<Box<Wanted>> {
 struct Boxes {
     of: Option<(Arc<Vec<ClusterBox>>, ClusterOverlay)>,
     instances: Arc<Vec<BoxInstance>>,
+    ends: [f32; 2],
 }
 
 /// The thread's state.
@@ -195,10 +198,11 @@ impl StageHand {
             Arc::ptr_eq(held, tree) && *drawn == overlay
         };
         if !self.boxes.of.as_ref().is_some_and(is_current) {
-            let instances = cluster_lines::boxes(tree, &self.clusters.shown, &overlay);
+            let boxes = cluster_lines::boxes(tree, &self.clusters.shown, &overlay);
             self.boxes = Boxes {
                 of: Some((tree.clone(), overlay)),
-                instances: Arc::new(instances),
+                instances: Arc::new(boxes.instances),
+                ends: boxes.ends,
             };
         }
         let error = self.upload(&wanted);
@@ -208,6 +212,7 @@ impl StageHand {
             error,
             is_lit: wanted.snapshot.is_lit(),
             clusters: self.clusters.clone(),
+            box_ends: self.boxes.ends,
             probe: picked.and_then(|(pick, _)| pick::probe(&wanted.snapshot, pick)),
             object_light: picked
                 .and_then(|(_, object)| *object)

@@ -224,7 +224,7 @@ impl Faults {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             faults.push(match error {
                 wgpu::Error::OutOfMemory { .. } => {
-                    "the graphics adapter is out of memory; close other programs, or raise the smallest element area and begin again".to_owned()
+                    "the graphics adapter is out of memory; close other programs, or raise the smallest element area and restart".to_owned()
                 }
                 other => format!("the graphics adapter refused: {}", first_line(&other.to_string())),
             });

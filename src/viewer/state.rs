@@ -6,10 +6,12 @@ use super::{
     camera::CameraRig,
     change::Change,
     clusters::ShownClusters,
+    exposure::Follower,
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
     materials::Materials,
+    messages::Messages,
     panel_state::PanelState,
     pick::{ObjectLight, Pick, Probe},
     session::Recent,
@@ -133,71 +135,6 @@ impl Run {
     }
 }
 
-/// How much a message matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// Something was done.
-    Note,
-    /// Something may not be as expected.
-    Warning,
-    /// Something was not done.
-    Error,
-}
-
-/// One sentence for the messages panel.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Message {
-    /// How much it matters.
-    pub severity: Severity,
-    /// The sentence.
-    pub text: String,
-}
-
-/// All messages, and how many were seen.
-#[derive(Clone, Debug, Default)]
-pub struct Messages {
-    /// The oldest first.
-    pub all: Vec<Message>,
-    /// How many of them were shown.
-    pub seen: usize,
-}
-
-impl Messages {
-    /// Messages kept; older ones go.
-    const KEPT: usize = 500;
-
-    /// Add a sentence.
-    pub fn push(&mut self, severity: Severity, text: impl Into<String>) {
-        let message = Message {
-            severity,
-            text: sentence(text.into()),
-        };
-        // What repeats itself every frame is said once.
-        if self.all.last() == Some(&message) {
-            return;
-        }
-        if self.all.len() >= Self::KEPT {
-            self.all.remove(0);
-            self.seen = self.seen.saturating_sub(1);
-        }
-        self.all.push(message);
-    }
-
-    /// Messages that nobody has seen.
-    pub fn unseen(&self) -> &[Message] {
-        &self.all[self.seen.min(self.all.len())..]
-    }
-}
-
-/// A first capital, as sentences have on screen.
-fn sentence(text: String) -> String {
-    let mut chars = text.chars();
-    match chars.next() {
-        Some(first) if first.is_lowercase() => first.to_uppercase().chain(chars).collect(),
-        _ => text,
-    }
-}
-
 /// The picked point and what was looked up for it.
 pub struct Selection {
     /// The point.
@@ -233,6 +170,8 @@ pub struct State {
     pub view: ViewSettings,
     /// What the surfaces showed before the key for normals was pressed.
     pub mode_before_normals: ViewMode,
+    /// What the automatic exposure makes for.
+    pub exposure: Follower,
     /// From where.
     pub rig: CameraRig,
     /// The picked point.
@@ -314,6 +253,11 @@ impl State {
         is_grey && (!self.materials.are_changed() || self.materials.are_grey())
     }
 
+    /// Whether there are one-sided faces, whose backs can be shown.
+    pub fn has_backs(&self) -> bool {
+        self.loaded.as_ref().is_some_and(|loaded| loaded.has_backs)
+    }
+
     /// Whether there are emitters; of no scene nobody knows.
     pub fn has_emitters(&self) -> bool {
         let loaded = self.loaded.as_ref();
@@ -349,14 +293,5 @@ mod tests {
             run.reports.is_empty(),
             "a new run begins with an empty plot"
         );
-    }
-
-    #[test]
-    fn a_repeated_message_is_said_once() {
-        let mut messages = Messages::default();
-        messages.push(Severity::Error, "no room");
-        messages.push(Severity::Error, "no room");
-        assert_eq!(messages.unseen().len(), 1);
-        assert_eq!(messages.all[0].text, "No room");
     }
 }

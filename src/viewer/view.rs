@@ -71,7 +71,7 @@ impl ViewMode {
             Self::FaceOrientation => "Face orientation",
             Self::FalseIrradiance => "False colour: irradiance",
             Self::FalseRadiance => "False colour: radiance",
-            Self::Uncertainty => "Uncertainty",
+            Self::Uncertainty => "False colour: error bound",
             Self::Error => "Measured error",
         }
     }
@@ -88,7 +88,9 @@ impl ViewMode {
             Self::FaceOrientation => "Fronts are blue, backs are red.",
             Self::FalseIrradiance => "Luminance of the irradiance in W/m², as false colour.",
             Self::FalseRadiance => "Luminance of the radiance in W/(sr·m²), as false colour.",
-            Self::Uncertainty => "Estimated error of the irradiance in W/m², as false colour.",
+            Self::Uncertainty => {
+                "Bound of the error of the irradiance in W/m², as false colour; the real error is far below."
+            }
             Self::Error => {
                 "Difference of radiance from the path-traced reference, in per cent of its root mean square."
             }
@@ -129,6 +131,17 @@ impl ViewMode {
             Self::FalseRadiance => Some("W/(sr·m²)"),
             Self::Error => Some("% of RMS"),
             _ => None,
+        }
+    }
+
+    /// What the legend names where the mode is a false-colour one.
+    pub fn false_color_quantity(self) -> &'static str {
+        match self {
+            Self::FalseIrradiance => "Irradiance",
+            Self::FalseRadiance => "Radiance",
+            Self::Uncertainty => "Error bound",
+            Self::Error => "Measured error",
+            _ => "",
         }
     }
 
@@ -181,6 +194,8 @@ pub struct ViewSettings {
     pub clusters: ClusterOverlay,
     /// The links of what is selected.
     pub links: LinkOverlay,
+    /// Whether the scene's unit of length is the metre, which OBJ files do not say: only then are powers in watts.
+    pub is_in_metres: bool,
 }
 
 impl ViewSettings {
@@ -300,6 +315,7 @@ impl Default for ViewSettings {
             texture_detail: true,
             clusters: ClusterOverlay::default(),
             links: LinkOverlay::default(),
+            is_in_metres: false,
         }
     }
 }

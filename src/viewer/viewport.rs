@@ -1,6 +1,6 @@
 //! The pane that shows the scene: keeps a target of its own size, and draws only when something changed.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use eframe::{
     egui::{self, Color32, Rect, TextureId, pos2},
@@ -10,19 +10,22 @@ use glam::Vec3;
 
 use super::{
     camera::Camera,
+    exposure,
     line_cache::LineCache,
+    messages::Severity,
     navigation,
     pick::Pick,
     render::{
-        CutoutTarget, Gpu, Overlay, Picture, RenderError, Renderer, SegmentInstance, Target,
-        Uploads,
+        CutoutTarget, Gpu, Metering, Overlay, Picture, RenderError, Renderer, SegmentInstance,
+        Target, Uploads,
     },
     saver::{Canvas, Drawn},
     stage::Staged,
-    state::{Severity, State},
+    state::State,
     theme,
-    view::ViewSettings,
+    view::{ViewMode, ViewSettings},
 };
+use crate::solver::VertexLight;
 
 /// The adapter's half of the pane.
 pub struct Viewport {
@@ -32,6 +35,39 @@ pub struct Viewport {
     /// What the target shows.
     drawn: Option<PictureKey>,
     lines: LineCache,
+    metered: Option<MeterKey>,
+    metering: Option<Metering>,
+}
+
+/// Everything that the automatic exposure depends on.
+struct MeterKey {
+    /// Not held: its light may be large.
+    light: Weak<VertexLight>,
+    mode: ViewMode,
+    texture_detail: bool,
+    backs: bool,
+    camera: Camera,
+}
+
+impl MeterKey {
+    fn of(key: &PictureKey) -> Self {
+        Self {
+            light: Arc::downgrade(&key.staged.wanted.snapshot.light),
+            mode: key.view.mode,
+            texture_detail: key.view.texture_detail,
+            backs: key.view.backs,
+            camera: key.camera,
+        }
+    }
+
+    /// Whether another picture may need another exposure.
+    fn differs_from(&self, other: &Self) -> bool {
+        !self.light.ptr_eq(&other.light)
+            || self.mode != other.mode
+            || self.texture_detail != other.texture_detail
+            || self.backs != other.backs
+            || exposure::shows_other_things(&self.camera, &other.camera)
+    }
 }
 
 /// Everything that a picture depends on. Arcs are held, so that an address is not used twice.
@@ -70,6 +106,8 @@ impl Viewport {
             target: None,
             drawn: None,
             lines: LineCache::default(),
+            metered: None,
+            metering: None,
         }
     }
 
@@ -89,9 +127,13 @@ impl Viewport {
         let size = [rect.width(), rect.height()]
             .map(|points| ((points * pixels_per_point).round() as u32).max(1));
         state.viewport_size = size;
-        let Some(key) = self.key(state, size, background(ui), true) else {
+        let Some(mut key) = self.key(state, size, background(ui), true) else {
             return;
         };
+        if self.expose(ui, &key, state) {
+            ui.ctx().request_repaint();
+        }
+        key.view.exposure = state.view.exposure;
         let texture = match self.texture(size) {
             Ok(texture) => texture,
             Err(error) => {
@@ -112,6 +154,50 @@ impl Viewport {
         ui.painter().image(texture, rect, whole, Color32::WHITE);
     }
 
+    /// Meter the picture where that is due, and let the exposure follow. Returns whether it is still on its way.
+    fn expose(&mut self, ui: &egui::Ui, key: &PictureKey, state: &mut State) -> bool {
+        if !state.view.auto_exposure {
+            return false;
+        }
+        let gpu = self.renderer.gpu().clone();
+        let is_first = state.exposure.target.is_none();
+        // Lights that are dimmed would look as bright as before.
+        let is_due =
+            key.view.mode.is_light() && key.staged.is_lit && !state.materials.are_changed();
+        if is_due && self.metering.is_none() {
+            let wanted = MeterKey::of(key);
+            let held = self.metered.as_ref();
+            if held.is_none_or(|held| wanted.differs_from(held)) {
+                self.metering = self.draw(key, 1.0, |renderer, picture, uploads| {
+                    renderer.meter(key.size, picture, uploads)
+                });
+                self.metered = Some(wanted);
+            }
+        }
+        let came = match self.metering.take() {
+            // The first picture of a scene is exposed from the start.
+            Some(metering) if is_first => Some(metering.wait(&gpu)),
+            Some(metering) => {
+                let came = metering.poll(&gpu);
+                self.metering = came.is_none().then_some(metering);
+                came
+            }
+            None => None,
+        };
+        match came {
+            Some(Ok(metered)) => state.exposure.note(&metered),
+            Some(Err(error)) => state
+                .messages
+                .push_lasting(Severity::Error, error.to_string()),
+            None => {}
+        }
+        let seconds = ui.input(|input| input.stable_dt).min(0.1);
+        let seconds = if is_first { f32::INFINITY } else { seconds };
+        let (exposure, is_moving) = state.exposure.advance(state.view.exposure, seconds);
+        state.view.exposure = exposure;
+        is_moving || self.metering.is_some()
+    }
+
     /// Begin a picture of what is shown, at another size, with or without the background.
     ///
     /// # Errors
@@ -126,9 +212,12 @@ impl Viewport {
         // What is picked is marked for the one who picks, not for those who look at the picture: without boxes or links
         // they would not know what the mark is.
         let marks_selection = state.view.clusters.shown || state.view.links.shown;
-        let key = self
+        let mut key = self
             .key(state, size, background, marks_selection)
             .ok_or("there is nothing to take a picture of; open a scene first")?;
+        if let (true, Some(exposure)) = (state.view.auto_exposure, state.exposure.target) {
+            key.view.exposure = exposure;
+        }
         let gpu = self.renderer.gpu().clone();
         let canvas = if is_transparent {
             CutoutTarget::new(&gpu, size).map(|target| Canvas::Cutout(Box::new(target)))
@@ -179,16 +268,14 @@ impl Viewport {
         })
     }
 
-    /// Describe the picture, and draw it.
-    fn draw(
+    /// Describe the picture, and draw it; `None` without what is to be drawn.
+    fn draw<T>(
         &mut self,
         key: &PictureKey,
         pixels_per_point: f32,
-        draw: impl FnOnce(&mut Renderer, &Picture<'_>, &Uploads),
-    ) {
-        let Some(uploads) = &key.staged.uploads else {
-            return;
-        };
+        draw: impl FnOnce(&mut Renderer, &Picture<'_>, &Uploads) -> T,
+    ) -> Option<T> {
+        let uploads = key.staged.uploads.as_ref()?;
         let wanted = &key.staged.wanted;
         let overlay = Overlay {
             boxes: Arc::default(),
@@ -207,7 +294,7 @@ impl Viewport {
             background: key.background,
             pixels_per_point,
         };
-        draw(&mut self.renderer, &picture, uploads);
+        Some(draw(&mut self.renderer, &picture, uploads))
     }
 
     /// The texture of a target of a size.
@@ -248,6 +335,11 @@ fn background(ui: &egui::Ui) -> Vec3 {
     }
 }
 
+/// What the pane is known by, such as when it has the keyboard focus.
+pub fn scene_id() -> egui::Id {
+    egui::Id::unique("scene")
+}
+
 /// The pane: picture, navigation, marks. Without an adapter only navigation works, as in tests.
 pub fn viewport_ui(
     ui: &mut egui::Ui,
@@ -255,7 +347,8 @@ pub fn viewport_ui(
     state: &mut State,
 ) -> Option<navigation::Picked> {
     let rect = ui.available_rect_before_wrap();
-    let response = ui.allocate_rect(rect, egui::Sense::click_and_drag());
+    ui.advance_cursor_after_rect(rect);
+    let response = ui.interact(rect, scene_id(), egui::Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Scene"));
     let picked = navigation::navigate(ui, &response, state);
     ui.painter().rect_filled(rect, 0.0, ui.visuals().panel_fill);

@@ -18,20 +18,29 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A window that opens with these options.
 pub(crate) fn window(options: Options) -> Harness<'static, App> {
-    Harness::builder()
-        .with_size([1280.0, 900.0])
-        .build_eframe(move |cc| {
-            App::new(cc, options, Arc::new(Faults::default())).expect("threads can be had")
-        })
+    window_of_size(options, [1280.0, 900.0])
+}
+
+/// A window of a size in points.
+pub(crate) fn window_of_size(options: Options, size: [f32; 2]) -> Harness<'static, App> {
+    Harness::builder().with_size(size).build_eframe(move |cc| {
+        App::new(cc, options, Arc::new(Faults::default())).expect("threads can be had")
+    })
 }
 
 /// A window that lights the two plates: a moment's work.
 pub(crate) fn plates() -> Harness<'static, App> {
-    let mut harness = window(Options {
+    plates_of_size([1280.0, 900.0])
+}
+
+/// The same in a window of a size in points.
+pub(crate) fn plates_of_size(size: [f32; 2]) -> Harness<'static, App> {
+    let options = Options {
         source: Some(SceneSource::Builtin("plates".to_owned())),
         settings: SolveSettings::draft(),
         ..Options::default()
-    });
+    };
+    let mut harness = window_of_size(options, size);
     wait_for(&mut harness, |app| {
         matches!(app.state.run.status, RunStatus::Finished(_))
     });

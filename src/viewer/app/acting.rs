@@ -7,13 +7,14 @@ use super::{
         action::{Action, Scale},
         bindings,
         change::Change,
-        clusters, light_range,
+        clusters, focus,
         materials::Materials,
+        messages::Severity,
         navigation::Picked,
         panel_state::PanelState,
-        pick, saver,
+        pick,
         session::Recent,
-        state::{RunStatus, Selection, Severity, State},
+        state::{RunStatus, Selection, State},
         view::ViewMode,
     },
     App,
@@ -64,10 +65,10 @@ impl App {
             Action::ScreenshotWithWindow => self.save_window(ctx),
             Action::Screenshot => {
                 let size = self.state.viewport_size;
-                self.save_picture(saver::free_path(&self.scene_name()), size, false);
+                self.save_picture(self.free_picture_path(), size, false);
             }
             Action::PictureDialog => {
-                let path = saver::free_path(&self.scene_name());
+                let path = self.free_picture_path();
                 self.state.panels.picture_text = path.display().to_string();
                 self.state.panels.picture = true;
             }
@@ -103,7 +104,12 @@ impl App {
             }
             return;
         }
-        for action in ctx.input_mut(|input| bindings::pressed(input, &self.table)) {
+        // Escape takes the focus from a control, and does nothing else then.
+        if self.had_focus {
+            ctx.input_mut(|input| input.consume_key(egui::Modifiers::NONE, egui::Key::Escape));
+        }
+        let in_use = focus::keys_in_use(ctx);
+        for action in ctx.input_mut(|input| bindings::pressed(input, &self.table, in_use)) {
             // The key that stops closes what lies over the scene first.
             if action != Action::Stop || !self.state.panels.close_dialogs() {
                 self.perform(ctx, action);
@@ -123,7 +129,7 @@ impl App {
                 state.view.auto_exposure = false;
             }
             Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
-            Action::AutoExposure => expose(state),
+            Action::AutoExposure => state.view.auto_exposure = true,
             Action::ToggleToneMap => {
                 use crate::viewer::view::ToneMap;
                 state.view.tone_map = match state.view.tone_map {
@@ -132,7 +138,11 @@ impl App {
                 };
             }
             Action::ToggleEdges => state.view.edges = !state.view.edges,
-            Action::ToggleBacks => state.view.backs = !state.view.backs,
+            Action::ToggleBacks if state.has_backs() => state.view.backs = !state.view.backs,
+            Action::ToggleBacks => {
+                let text = "there are no backs to show: all faces are lit on both sides";
+                state.messages.push(Severity::Note, text);
+            }
             Action::ToggleClusters => {
                 state.view.clusters.shown = !state.view.clusters.shown;
             }
@@ -188,7 +198,7 @@ impl App {
     fn stop(&mut self) {
         let status = &mut self.state.run.status;
         if self.state.loading.take().is_some() {
-            let text = "reading was given up";
+            let text = "reading was cancelled";
             self.state.messages.push(Severity::Note, text);
         } else if status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused) {
             *status = RunStatus::Stopping;
@@ -240,7 +250,8 @@ impl App {
         if self.state.truth.exists() {
             self.worker.watch(None);
             self.state.truth.forget_reference();
-            let text = "the reference was of other lights and materials; trace it again for these";
+            let text =
+                "the reference was traced for other lights and materials; trace it again for these";
             self.state.messages.push(Severity::Note, text);
         }
         if self.state.view.mode == ViewMode::Error {
@@ -301,15 +312,6 @@ impl App {
                 }
             }
         }
-    }
-}
-
-/// Expose for the present light, and let the exposure follow.
-fn expose(state: &mut State) {
-    state.view.auto_exposure = true;
-    let snapshot = state.run.snapshot.as_deref();
-    if let Some(exposure) = snapshot.and_then(light_range::auto_exposure) {
-        state.view.exposure = exposure;
     }
 }
 

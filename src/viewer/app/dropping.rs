@@ -5,33 +5,31 @@ use std::path::{Path, PathBuf};
 use eframe::egui;
 
 use super::{
-    super::{action::Action, loader::SceneSource, state::Severity},
+    super::{loader::SceneSource, messages::Severity},
     App,
 };
 
 impl App {
-    /// What to do about files that were dropped since the last frame.
-    pub(super) fn take_dropped(&mut self, ctx: &egui::Context) -> Option<Action> {
+    /// Open the scene among files that were dropped since the last frame.
+    pub(super) fn take_dropped(&mut self, ctx: &egui::Context) {
         let paths: Vec<PathBuf> = ctx.input(|input| {
             let files = input.raw.dropped_files.iter();
             files.map(|file| file.path().to_owned()).collect()
         });
-        match scene_among(&paths)? {
-            Ok(path) => {
+        match scene_among(&paths) {
+            None => {}
+            Some(Ok(path)) => {
+                let name = path.display().to_string();
+                self.load(SceneSource::File(path));
                 if paths.len() > 1 {
+                    let count = paths.len();
                     let text = format!(
-                        "{} files were dropped; {} is read, with what it names",
-                        paths.len(),
-                        path.display()
+                        "{count} files were dropped; {name} is read, with the files that it names"
                     );
                     self.state.messages.push(Severity::Note, text);
                 }
-                Some(Action::Load(SceneSource::File(path)))
             }
-            Err(sentence) => {
-                self.state.messages.push(Severity::Error, sentence);
-                None
-            }
+            Some(Err(sentence)) => self.state.messages.push(Severity::Error, sentence),
         }
     }
 }

@@ -6,8 +6,8 @@ use super::{
     super::{
         inspection, light_range,
         loader::{Loader, SceneSource},
+        messages::Severity,
         stage::Wanted,
-        state::Severity,
         view::ViewMode,
     },
     App,
@@ -28,10 +28,10 @@ impl App {
             }
         }
         while let Ok((severity, text)) = self.notices.1.try_recv() {
-            self.state.messages.push(severity, text);
+            self.state.messages.push_lasting(severity, text);
         }
         for fault in self.faults.take() {
-            self.state.messages.push(Severity::Error, fault);
+            self.state.messages.push_lasting(Severity::Error, fault);
         }
         if let Some(outcome) = self.state.loading.as_ref().and_then(Loader::poll) {
             self.state.loading = None;
@@ -115,18 +115,11 @@ impl App {
         }
     }
 
-    /// Let exposure and range follow the newest light.
+    /// Let the range of false colours follow the newest light.
     pub(super) fn follow_light(&mut self) {
         let Some(snapshot) = &self.state.run.snapshot else {
             return;
         };
-        // Lights that are dimmed would look as bright as before.
-        if self.state.view.auto_exposure
-            && !self.state.materials.are_changed()
-            && let Some(exposure) = light_range::auto_exposure(snapshot)
-        {
-            self.state.view.exposure = exposure;
-        }
         self.state.false_color_range = light_range::false_color_range(
             snapshot,
             &self.state.view,

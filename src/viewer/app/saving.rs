@@ -8,9 +8,9 @@ use glam::Vec3;
 
 use super::{
     super::{
+        messages::Severity,
         saver::{self, Content},
         session::{self, Session},
-        state::Severity,
         view::{ToneMap, ViewSettings},
     },
     App,
@@ -18,15 +18,14 @@ use super::{
 use crate::export::{self, ColorOptions, MeshOptions, UpAxis};
 
 impl App {
-    pub(super) fn scene_name(&self) -> String {
-        self.state
-            .loaded
-            .as_ref()
-            .map_or_else(|| "vecrad".to_owned(), |loaded| loaded.source.label())
+    /// Where a picture goes unless another place is named.
+    pub(super) fn free_picture_path(&self) -> PathBuf {
+        let loaded = self.state.loaded.as_ref();
+        saver::free_picture_path(loaded.map(|loaded| &loaded.source))
     }
 
     pub(super) fn save_window(&mut self, ctx: &egui::Context) {
-        let path = saver::free_path(&self.scene_name());
+        let path = self.free_picture_path();
         let (sender, wake) = (self.notices.0.clone(), self.wake.clone());
         let unfinished = self.unfinished.clone();
         ctx.request_screenshot(move |seen| {
@@ -129,7 +128,7 @@ impl App {
             Ok(path) => self
                 .state
                 .messages
-                .push(Severity::Note, format!("saved {}", path.display())),
+                .push_lasting(Severity::Note, format!("saved {}", path.display())),
             Err(error) => self.state.messages.push(Severity::Error, error),
         }
     }

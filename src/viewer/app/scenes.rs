@@ -4,13 +4,15 @@ use std::{sync::Arc, thread, time::Instant};
 
 use super::{
     super::{
+        exposure::Follower,
         loader::{LoadedScene, Loader, SceneSource},
         materials::Materials,
+        messages::Severity,
         session,
         start::{self, CameraRequest},
-        state::Severity,
         truth::Truth,
         view::ViewMode,
+        wording,
     },
     App,
 };
@@ -24,6 +26,7 @@ impl App {
     }
 
     fn start_loader(&mut self, source: SceneSource) {
+        self.state.messages.open_scene();
         match Loader::start(source, self.state.scene_options, self.wake.clone()) {
             Ok(loader) => self.state.loading = Some(loader),
             Err(error) => self
@@ -36,17 +39,16 @@ impl App {
     /// Show a scene that was read, and begin to light it.
     pub(super) fn show(&mut self, loaded: LoadedScene) {
         self.state.panels.path = false;
-        // What went wrong before is over; the panel still tells.
-        self.state.messages.seen = self.state.messages.all.len();
+        self.state.messages.show_scene();
         for warning in &loaded.scene.warnings {
-            self.state
-                .messages
-                .push(Severity::Warning, warning.to_string());
+            let text = wording::without_flags(&warning.to_string());
+            self.state.messages.push(Severity::Warning, text);
         }
         if let Some(path) = loaded.source.path() {
             self.state.recent.push(path);
         }
         if !self.keeps_view {
+            self.state.exposure = Follower::default();
             self.open_view(&loaded);
         }
         self.keeps_view = true;

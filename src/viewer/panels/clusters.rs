@@ -2,12 +2,17 @@
 
 use eframe::egui::{self, Slider};
 
-use super::{count, figure, legend, row};
+use super::{
+    count, figure,
+    legend::{Scale, scale_ui},
+    power::PowerScale,
+    row,
+};
 use crate::{
     solver::ClusterBox,
     viewer::{
         action::Action,
-        cluster_lines::MAX_BOXES,
+        cluster_lines::{MAX_BOXES, RAMP_START},
         clusters::path_to,
         state::State,
         theme,
@@ -36,7 +41,7 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
             selected_ui(ui, state, cluster);
             // The probe lists the way to what is picked.
             if state.inspections.element().is_none() {
-                path_ui(ui, clusters, index, actions);
+                path_ui(ui, clusters, index, PowerScale::of(state), actions);
             }
         }
         None if state.view.clusters.shown => {
@@ -84,7 +89,7 @@ fn cut_ui(ui: &mut egui::Ui, overlay: &mut ClusterOverlay, deepest: u32) {
 
 fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
     let shown = state.shown_clusters.shown.len();
-    legend::scale_ui(ui, "little", "much");
+    legend_ui(ui, state);
     ui.weak(format!(
         "{} boxes of {} clusters.",
         count(shown as u64),
@@ -98,13 +103,43 @@ fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
     }
 }
 
+/// What the colours of the boxes stand for.
+fn legend_ui(ui: &mut egui::Ui, state: &State) {
+    let (Some(staged), Some(loaded)) = (&state.staged, &state.loaded) else {
+        return;
+    };
+    let color = staged.wanted.clusters.color;
+    let power = PowerScale::of(state);
+    let ends = staged.box_ends.map(f64::from);
+    let (ends, unit) = match color {
+        ClusterColor::Power => (staged.box_ends.map(|end| power.value(end)), power.unit()),
+        ClusterColor::Area => {
+            let frame = &loaded.scene.frame;
+            (ends.map(|end| frame.area_to_world(end)), "square units")
+        }
+        ClusterColor::Spread => (ends, "of 1"),
+        ClusterColor::Links => (ends, "links"),
+        ClusterColor::Error => (ends, "W/m²"),
+    };
+    let scale = Scale {
+        ends,
+        is_logarithmic: color != ClusterColor::Spread,
+    };
+    let quantity = match color {
+        ClusterColor::Power => power.name(),
+        other => other.label(),
+    };
+    ui.weak(quantity);
+    scale_ui(ui, &scale, unit, RAMP_START);
+}
+
 fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
     let Some(loaded) = &state.loaded else { return };
     let frame = &loaded.scene.frame;
     // Lists of figures are in world units; the cluster is in frame units.
     let area_scale = frame.area_to_world(1.0);
     let size = (cluster.max - cluster.min).as_dvec3() / frame.scale;
-    let power = |value: f32| figure(f64::from(value) * area_scale);
+    let power = PowerScale::of(state);
     ui.add_space(4.0);
     ui.colored_label(
         theme::selected_text(ui.visuals()),
@@ -113,12 +148,18 @@ fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
     row::figures(ui, "cluster", |ui| {
         row::figure(ui, "Patches", count(u64::from(cluster.patch_count)), "");
         row::size(ui, size);
-        row::figure(ui, "Area", power(cluster.area), "Of its patches");
+        let area = figure(f64::from(cluster.area) * area_scale);
         row::figure(
             ui,
-            "Power",
-            format!("{} W", power(cluster.power)),
-            "Luminance of the light that leaves",
+            "Area",
+            area,
+            "Of its patches, in square units of the file",
+        );
+        row::figure(
+            ui,
+            power.name(),
+            power.text(cluster.power),
+            power.explanation(),
         );
         row::figure(
             ui,
@@ -140,9 +181,9 @@ fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
         );
         row::figure(
             ui,
-            "Estimated error",
+            "Error bound",
             format!("{} W/m²", figure(f64::from(cluster.error))),
-            "Of these links",
+            "Of the links that it receives over",
         );
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let [plus, minus] = [
@@ -151,15 +192,21 @@ fn selected_ui(ui: &mut egui::Ui, state: &State, cluster: &ClusterBox) {
             ];
             row::figure(
                 ui,
-                &format!("Power +{name} / −{name}"),
-                format!("{} / {} W", power(plus), power(minus)),
-                "Along the box normals; drawn as arrows",
+                &format!("Along +{name} / −{name}"),
+                format!("{} / {}", figure(power.value(plus)), power.text(minus)),
+                "Power along the normals of the box; drawn as arrows",
             );
         }
     });
 }
 
-fn path_ui(ui: &mut egui::Ui, clusters: &[ClusterBox], index: usize, actions: &mut Vec<Action>) {
+fn path_ui(
+    ui: &mut egui::Ui,
+    clusters: &[ClusterBox],
+    index: usize,
+    power: PowerScale,
+    actions: &mut Vec<Action>,
+) {
     ui.add_space(4.0);
     ui.weak("Path from the root");
     let path = path_to(clusters, index);
@@ -169,7 +216,7 @@ fn path_ui(ui: &mut egui::Ui, clusters: &[ClusterBox], index: usize, actions: &m
             "Level {} · {} patches · power {} · links {}",
             cluster.level,
             count(u64::from(cluster.patch_count)),
-            figure(f64::from(cluster.power)),
+            power.text(cluster.power),
             count(u64::from(cluster.link_count)),
         );
         if ui.selectable_label(node == index, text).clicked() {

@@ -3,8 +3,9 @@
 use eframe::egui::{self, Color32, RichText};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use super::{count, figure, plot, row, seconds};
+use super::{bound, count, figure, plot, row, seconds};
 use crate::{
+    metrics::{ErrorMeasures, smallest_error},
     solver::StepReport,
     viewer::{
         action::Action,
@@ -15,7 +16,7 @@ use crate::{
     },
 };
 
-/// Smallest error on the logarithmic axis, in per cent. Noise of the reference hides less.
+/// Smallest error on the logarithmic axis, in per cent, where not even noise of the reference hides it.
 const FLOOR_PERCENT: f64 = 0.01;
 
 /// Show the reference and what was measured by it; wishes go into `actions`.
@@ -52,7 +53,7 @@ fn reference_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let button = egui::Button::new(text).min_size(egui::vec2(120.0, 24.0));
         let explanation = "Path-trace the truth in the background (R). While light is computed it takes one thread, \
-                           which slows the run; begin again when it is done for times without it.";
+                           which slows the run; restart when it is done for times without it.";
         if ui
             .add_enabled(state.loaded.is_some(), button)
             .on_hover_text(explanation)
@@ -92,7 +93,7 @@ fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
         row::figure(
             ui,
             "Relative RMS",
-            percent(error.relative_rms),
+            measured(error.relative_rms, error),
             &format!(
                 "Root mean square difference of radiance after step {step}, relative to the reference's, at {} random \
                  surface points, without the reference's noise",
@@ -102,7 +103,7 @@ fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
         row::figure(
             ui,
             "Trimmed",
-            percent(error.relative_rms_trimmed),
+            measured(error.relative_rms_trimmed, error),
             "The same without the worst 1 % of the points",
         );
         row::figure(
@@ -117,13 +118,13 @@ fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
             ui,
             "Reference noise",
             percent(error.noise_floor),
-            "Standard error of the reference; errors far below it cannot be told",
+            "Standard error of the reference; errors far below it cannot be told from none",
         );
         row::figure(
             ui,
-            "Bound",
-            percent(f64::from(report.estimated_error)),
-            "What the solver guarantees by itself, of the irradiance",
+            "Error bound",
+            bound(f64::from(report.estimated_error)),
+            "What the solver guarantees by itself, of the irradiance; the same as under 'Progress'",
         );
     });
 }
@@ -142,16 +143,16 @@ fn steps_ui(ui: &mut egui::Ui, truth: &Truth) {
             };
             heading(ui, "Step", "Steps shown while the reference was there");
             heading(ui, "Time", "Since the run began");
-            heading(ui, "Bound", "What the solver guarantees by itself");
+            heading(ui, "Error bound", "What the solver guarantees by itself");
             heading(ui, "RMS", "Measured, relative");
             heading(ui, "Trimmed", "Without the worst 1 % of the points");
             ui.end_row();
             for (step, report, error) in truth.steps_of(run) {
                 ui.label(step.to_string());
                 ui.label(seconds(report.elapsed_s));
-                ui.label(percent(f64::from(report.estimated_error)));
-                ui.label(percent(error.relative_rms));
-                ui.label(percent(error.relative_rms_trimmed));
+                ui.label(bound(f64::from(report.estimated_error)));
+                ui.label(measured(error.relative_rms, error));
+                ui.label(measured(error.relative_rms_trimmed, error));
                 ui.end_row();
             }
         });
@@ -165,7 +166,9 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
         return;
     }
     ui.add_space(4.0);
-    ui.label("Trimmed RMS against run time");
+    ui.label("Trimmed RMS against run time").on_hover_text(
+        "On a logarithmic scale; errors below the noise stand at the smallest that can be told",
+    );
     ui.horizontal(|ui| {
         let save = egui::Button::new("Save CSV…").small();
         if ui
@@ -205,7 +208,7 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
                 let is_present = Some(run.number) == present;
                 let points: Vec<[f64; 2]> = truth
                     .steps_of(run)
-                    .map(|(_, report, error)| point(report, error.relative_rms_trimmed))
+                    .map(|(_, report, error)| point(report, error))
                     .collect();
                 let color = run_color(run.ordinal);
                 plot.points(
@@ -222,8 +225,21 @@ fn plot_ui(ui: &mut egui::Ui, truth: &Truth, actions: &mut Vec<Action>) {
         });
 }
 
-fn point(report: &StepReport, error: f64) -> [f64; 2] {
-    [report.elapsed_s, (100.0 * error).max(FLOOR_PERCENT).log10()]
+/// A step in the plot. An error below the noise stands at the smallest one that can be told.
+fn point(report: &StepReport, error: &ErrorMeasures) -> [f64; 2] {
+    let told = error
+        .relative_rms_trimmed
+        .max(smallest_error(error.noise_floor));
+    [report.elapsed_s, (100.0 * told).max(FLOOR_PERCENT).log10()]
+}
+
+/// A measured relative error, where the noise of the reference leaves one to be told.
+fn measured(relative: f64, error: &ErrorMeasures) -> String {
+    if relative < smallest_error(error.noise_floor) {
+        "below noise".to_owned()
+    } else {
+        percent(relative)
+    }
 }
 
 /// Colours that tell neighbours apart, in turn.
@@ -234,4 +250,27 @@ fn run_color(ordinal: u32) -> Color32 {
 
 fn percent(share: f64) -> String {
     format!("{} %", figure(100.0 * share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_below_the_noise_are_not_told_as_none() {
+        let error = ErrorMeasures {
+            noise_floor: 0.1,
+            ..ErrorMeasures::default()
+        };
+        assert_eq!(measured(0.0, &error), "below noise");
+        assert_eq!(measured(0.01, &error), "below noise");
+        assert_eq!(measured(0.2, &error), "20.0 %");
+        let [_, height] = point(&StepReport::default(), &error);
+        assert!(
+            (0.0..2.0).contains(&height),
+            "within the decades of the noise: {height}"
+        );
+        // A reference without noise tells everything.
+        assert_eq!(measured(0.0, &ErrorMeasures::default()), "0 %");
+    }
 }

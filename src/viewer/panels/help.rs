@@ -3,7 +3,7 @@
 use eframe::egui::{self, RichText};
 
 use crate::viewer::{
-    bindings::{Binding, Group, MOUSE},
+    bindings::{Binding, FOCUS, Group, MOUSE},
     state::State,
 };
 
@@ -27,23 +27,36 @@ pub fn help_window(ctx: &egui::Context, state: &mut State, table: &[Binding]) {
         });
 }
 
+/// Width of a window that has room for two columns, in points. In a narrower one their texts would be cut off.
+const TWO_COLUMNS: f32 = 940.0;
+
 fn sheet_ui(ui: &mut egui::Ui, table: &[Binding]) {
+    let left = |ui: &mut egui::Ui| {
+        rows(ui, "Mouse", fixed_rows(&MOUSE));
+        group_ui(ui, table, Group::Solve);
+        group_ui(ui, table, Group::File);
+        rows(ui, "Controls", fixed_rows(&FOCUS));
+    };
+    let right = |ui: &mut egui::Ui| {
+        group_ui(ui, table, Group::Camera);
+        group_ui(ui, table, Group::View);
+    };
+    if ui.ctx().content_rect().width() < TWO_COLUMNS {
+        left(ui);
+        right(ui);
+        return;
+    }
     ui.horizontal_top(|ui| {
-        ui.vertical(|ui| {
-            rows(
-                ui,
-                "Mouse",
-                MOUSE.iter().map(|(keys, text)| ((*keys).to_owned(), *text)),
-            );
-            group_ui(ui, table, Group::Solve);
-            group_ui(ui, table, Group::File);
-        });
+        ui.vertical(left);
         ui.add_space(20.0);
-        ui.vertical(|ui| {
-            group_ui(ui, table, Group::Camera);
-            group_ui(ui, table, Group::View);
-        });
+        ui.vertical(right);
     });
+}
+
+fn fixed_rows<'t>(entries: &'t [(&'t str, &'t str)]) -> impl Iterator<Item = (String, &'t str)> {
+    entries
+        .iter()
+        .map(|(keys, text)| ((*keys).to_owned(), *text))
 }
 
 fn group_ui(ui: &mut egui::Ui, table: &[Binding], group: Group) {

@@ -1,9 +1,91 @@
-//! The scale of false colours, over the scene.
+//! Scales of colours: over the scene that of false colours, in the panels those of boxes and links. Logarithmic ones have
+//! their marks at decades.
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, StrokeKind, pos2, vec2};
 
-use super::figure;
+use super::count;
 use crate::viewer::{state::State, theme, view::ViewMode};
+
+/// Marks on a scale at most. More touch each other.
+const MOST_MARKS: usize = 7;
+
+/// What colours stand for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// What the first and the last colour stand for.
+    pub ends: [f64; 2],
+    /// Whether values are spaced by their logarithm.
+    pub is_logarithmic: bool,
+}
+
+impl Scale {
+    /// Where a value stands, 0…1 between the ends.
+    fn position(&self, value: f64) -> f64 {
+        let [low, high] = self.ends;
+        if self.has_decades() {
+            (value / low).ln() / (high / low).ln()
+        } else {
+            (value - low) / (high - low).max(f64::MIN_POSITIVE)
+        }
+    }
+
+    fn has_decades(&self) -> bool {
+        let [low, high] = self.ends;
+        self.is_logarithmic && low > 0.0 && high > low
+    }
+
+    /// Values for marks, from low to high: round numbers, on logarithmic scales whole powers of ten where there are two.
+    pub fn marks(&self) -> Vec<f64> {
+        let [low, high] = self.ends;
+        if high <= low {
+            return vec![low];
+        }
+        let is_inside = |value: &f64| (-1e-6..=1.0 + 1e-6).contains(&self.position(*value));
+        if !self.has_decades() {
+            let step = round_step((high - low) / 5.0);
+            let first = (low / step - 1e-6).ceil();
+            let marks = (0..MOST_MARKS).map(|index| (first + index as f64) * step);
+            return marks.filter(is_inside).collect();
+        }
+        let [first, last] = [low, high].map(|end| end.log10().floor() as i32);
+        let multiples = |factors: &[f64]| -> Vec<f64> {
+            let powers = (first..=last).map(|exponent| 10_f64.powi(exponent));
+            powers
+                .flat_map(|power| factors.iter().map(move |factor| factor * power))
+                .filter(is_inside)
+                .collect()
+        };
+        let decades = multiples(&[1.0]);
+        match decades.len() {
+            0 | 1 => multiples(&[1.0, 2.0, 5.0]),
+            number => decades
+                .into_iter()
+                .step_by(number.div_ceil(MOST_MARKS))
+                .collect(),
+        }
+    }
+}
+
+/// The smallest of 1, 2, 5, 10, … times a power of ten that is at least this.
+pub(super) fn round_step(least: f64) -> f64 {
+    let least = least.max(f64::MIN_POSITIVE);
+    let power = 10_f64.powf(least.log10().floor());
+    let factor = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|factor| factor * power >= least * (1.0 - 1e-9));
+    factor.unwrap_or(10.0) * power
+}
+
+/// A round number, as short as it can be written; any other with four digits.
+fn mark_text(value: f64) -> String {
+    let short: f32 = format!("{value:.3e}").parse().unwrap_or(value as f32);
+    match short.abs() {
+        size if size < f32::MIN_POSITIVE => "0".to_owned(),
+        size if (1e3..1e6).contains(&size) => count(value.round() as u64),
+        size if (1e-3..1e3).contains(&size) => format!("{short}"),
+        _ => format!("{short:e}"),
+    }
+}
 
 /// Draw the scale where the mode has one.
 pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
@@ -20,9 +102,9 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         return;
     };
     const SIZE: egui::Vec2 = vec2(18.0, 180.0);
-    let at = rect.right_top() + vec2(-104.0, 44.0);
+    let at = rect.right_top() + vec2(-108.0, 58.0);
     let painter = ui.painter().with_clip_rect(rect);
-    let plate = Rect::from_min_size(at - vec2(14.0, 34.0), vec2(110.0, SIZE.y + 64.0));
+    let plate = Rect::from_min_size(at - vec2(14.0, 48.0), vec2(114.0, SIZE.y + 78.0));
     painter.rect_filled(plate, 4.0, Color32::from_black_alpha(190));
     let text = |at, anchor, text: String| {
         painter.text(
@@ -33,7 +115,9 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
             Color32::from_gray(225),
         );
     };
-    text(at - vec2(2.0, 26.0), Align2::LEFT_TOP, unit.to_owned());
+    let quantity = mode.false_color_quantity().to_owned();
+    text(at - vec2(2.0, 42.0), Align2::LEFT_TOP, quantity);
+    text(at - vec2(2.0, 27.0), Align2::LEFT_TOP, unit.to_owned());
     // The ramp, and the marks of what lies outside it.
     const BANDS: usize = 90;
     let band = SIZE.y / BANDS as f32;
@@ -53,43 +137,67 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         Stroke::new(1.0, Color32::from_gray(90)),
         StrokeKind::Inside,
     );
-    let scale = match mode {
+    let unit = match mode {
         ViewMode::Error => 1.0,
         _ => f64::from(state.radiance_unit()),
     };
-    let [low, high] = state.false_color_range;
-    for step in 0..=4 {
-        let t = step as f32 / 4.0;
-        let value = if state.view.logarithmic && low > 0.0 {
-            low * (high / low).powf(t)
-        } else {
-            low + (high - low) * t
-        };
-        let y = at.y + SIZE.y * (1.0 - t);
-        text(
-            pos2(at.x + SIZE.x + 8.0, y),
-            Align2::LEFT_CENTER,
-            figure(f64::from(value) * scale),
-        );
+    let scale = Scale {
+        ends: state.false_color_range.map(|end| f64::from(end) * unit),
+        is_logarithmic: state.view.logarithmic,
+    };
+    let stroke = Stroke::new(1.0, Color32::from_gray(225));
+    for value in scale.marks() {
+        let y = at.y + SIZE.y * (1.0 - scale.position(value) as f32);
+        painter.hline(at.x + SIZE.x..=at.x + SIZE.x + 4.0, y, stroke);
+        let place = pos2(at.x + SIZE.x + 8.0, y);
+        text(place, Align2::LEFT_CENTER, mark_text(value));
     }
 }
 
-/// A scale in a panel: the ramp between what stands for its ends.
-pub fn scale_ui(ui: &mut egui::Ui, low: &str, high: &str) {
-    const SIZE: egui::Vec2 = vec2(110.0, 10.0);
-    const BANDS: usize = 44;
-    ui.horizontal(|ui| {
-        ui.weak(low);
-        let (rect, _) = ui.allocate_exact_size(SIZE, egui::Sense::hover());
-        let band = SIZE.x / BANDS as f32;
-        for index in 0..BANDS {
-            let left = rect.left_top() + vec2(index as f32 * band, 0.0);
-            let color = theme::ramp_color((index as f32 + 0.5) / BANDS as f32);
-            let plate = Rect::from_min_size(left, vec2(band + 0.5, SIZE.y));
-            ui.painter().rect_filled(plate, 0.0, color);
+/// A scale in a panel: the colours of the ramp from `start` (0…1) on, marks with their values below, and the unit.
+pub fn scale_ui(ui: &mut egui::Ui, scale: &Scale, unit: &str, start: f32) {
+    const BAR_HEIGHT: f32 = 10.0;
+    const BANDS: usize = 60;
+    /// Room for half a value beside the bar, and for the unit behind it.
+    const MARGINS: [f32; 2] = [14.0, 78.0];
+    let size = vec2(ui.available_width(), 28.0);
+    let (rect, _) = ui.allocate_exact_size(size, egui::Sense::hover());
+    let bar = Rect::from_min_max(
+        rect.left_top() + vec2(MARGINS[0], 0.0),
+        pos2(rect.right() - MARGINS[1], rect.top() + BAR_HEIGHT),
+    );
+    let band = bar.width() / BANDS as f32;
+    for index in 0..BANDS {
+        let left = bar.left_top() + vec2(index as f32 * band, 0.0);
+        let t = (index as f32 + 0.5) / BANDS as f32;
+        let color = theme::ramp_color(start + (1.0 - start) * t);
+        let plate = Rect::from_min_size(left, vec2(band + 0.5, BAR_HEIGHT));
+        ui.painter().rect_filled(plate, 0.0, color);
+    }
+    let color = theme::secondary_text(ui.visuals());
+    let font = FontId::proportional(11.0);
+    let mut free_from = f32::NEG_INFINITY;
+    for value in scale.marks() {
+        let x = bar.left() + bar.width() * scale.position(value) as f32;
+        let y = bar.bottom();
+        ui.painter().vline(x, y..=y + 4.0, Stroke::new(1.0, color));
+        let text = ui
+            .painter()
+            .layout_no_wrap(mark_text(value), font.clone(), color);
+        let left = x - 0.5 * text.size().x;
+        // Values that would touch the one before are left out; their mark tells where they are.
+        if left > free_from {
+            free_from = left + text.size().x + 4.0;
+            ui.painter().galley(pos2(left, y + 4.0), text, color);
         }
-        ui.weak(high);
-    });
+    }
+    ui.painter().text(
+        pos2(bar.right() + 10.0, bar.center().y),
+        Align2::LEFT_CENTER,
+        unit,
+        font,
+        color,
+    );
 }
 
 fn swatches(ui: &egui::Ui, rect: Rect, entries: &[(&str, Color32)]) {
@@ -106,5 +214,59 @@ fn swatches(ui: &egui::Ui, rect: Rect, entries: &[(&str, Color32)]) {
             Color32::from_gray(225),
         );
         at.y += 20.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marks(low: f64, high: f64, is_logarithmic: bool) -> Vec<String> {
+        let scale = Scale {
+            ends: [low, high],
+            is_logarithmic,
+        };
+        scale.marks().into_iter().map(mark_text).collect()
+    }
+
+    #[test]
+    fn logarithmic_scales_have_marks_at_decades() {
+        assert_eq!(marks(0.004, 37.0, true), ["0.01", "0.1", "1", "10"]);
+        assert_eq!(marks(0.01, 100.0, true), ["0.01", "0.1", "1", "10", "100"]);
+        assert_eq!(marks(0.3, 6.0, true), ["0.5", "1", "2", "5"]);
+        let many = marks(1e-9, 2e9, true);
+        assert!(
+            many.len() <= MOST_MARKS && many.contains(&"1e-9".to_owned()),
+            "{many:?}"
+        );
+    }
+
+    #[test]
+    fn even_scales_have_round_marks() {
+        assert_eq!(marks(0.0, 4.83, false), ["0", "1", "2", "3", "4"]);
+        assert_eq!(
+            marks(0.0, 1.0, false),
+            ["0", "0.2", "0.4", "0.6", "0.8", "1"]
+        );
+        assert_eq!(
+            marks(900.0, 6200.0, false).first().map(String::as_str),
+            Some("2\u{2009}000")
+        );
+        // A logarithmic scale from 0 has no decades.
+        assert_eq!(marks(0.0, 1.0, true), marks(0.0, 1.0, false));
+    }
+
+    #[test]
+    fn scales_without_extent_have_few_marks_and_no_endless_ones() {
+        for ends in [[0.0, 0.0], [3.0, 3.0], [1e-30, 1e-30], [1e30, 1e30]] {
+            for is_logarithmic in [false, true] {
+                let scale = Scale {
+                    ends,
+                    is_logarithmic,
+                };
+                let found = scale.marks();
+                assert!(found.len() <= 3 * MOST_MARKS && found.iter().all(|mark| mark.is_finite()));
+            }
+        }
     }
 }

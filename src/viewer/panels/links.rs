@@ -2,7 +2,11 @@
 
 use eframe::egui::{self, Slider};
 
-use super::{count, figure, legend::scale_ui, row};
+use super::{
+    count,
+    legend::{Scale, scale_ui},
+    row,
+};
 use crate::viewer::{
     links,
     state::State,
@@ -60,7 +64,7 @@ fn summary_ui(ui: &mut egui::Ui, state: &State) {
     let overlay = &state.view.links;
     let Some(inspection) = state.inspections.of(overlay.of) else {
         ui.weak(if state.inspections.is_waiting(overlay.of) {
-            "The solver answers after this step; pausing answers at once."
+            "The solver answers after this step, or at once when paused."
         } else {
             match overlay.of {
                 LinkEnd::Element => "Click a surface to see where its light comes from.",
@@ -70,11 +74,16 @@ fn summary_ui(ui: &mut egui::Ui, state: &State) {
         return;
     };
     let summary = links::summary(inspection, overlay);
-    let [low, high] = summary.range.map(|end| figure(f64::from(end)));
-    match overlay.color {
-        LinkColor::Visibility => scale_ui(ui, "hidden", "visible"),
-        LinkColor::Strength => scale_ui(ui, &low, &format!("{high} W/m²")),
-    }
+    let scale = Scale {
+        ends: summary.range.map(f64::from),
+        is_logarithmic: overlay.color == LinkColor::Strength,
+    };
+    let (quantity, unit) = match overlay.color {
+        LinkColor::Visibility => ("Visible part", "of 1"),
+        LinkColor::Strength => ("Irradiance over a link", "W/m²"),
+    };
+    ui.weak(quantity);
+    scale_ui(ui, &scale, unit, 0.0);
     ui.weak(format!(
         "{} of {} links, {:.0} % of their light, after step {}.",
         count(summary.drawn as u64),

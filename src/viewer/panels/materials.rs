@@ -5,7 +5,7 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{row, seconds, settings::slider};
+use super::{color::color_button, row, seconds, settings::slider};
 use crate::viewer::{
     action::Action,
     materials::{LightControl, Materials},
@@ -32,9 +32,10 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
             materials.reset();
         }
         if let Some(secs) = state.run.relit_secs {
-            ui.weak(format!("in {}", seconds(secs))).on_hover_text(
-                "What the last change took to show. It uses the links that there are; continue refines them.",
-            );
+            ui.weak(format!("Relit in {}", seconds(secs)))
+                .on_hover_text(
+                    "What the last change took to show. It uses the links that there are; Continue refines them.",
+                );
         }
     });
     if materials != state.materials {
@@ -68,11 +69,8 @@ fn light_ui(ui: &mut egui::Ui, materials: &mut Materials, index: usize) {
         return;
     };
     ui.horizontal(|ui| {
-        color_ui(
-            ui,
-            &format!("Colour of {}", material.name),
-            &mut light.color,
-        );
+        let name = format!("Colour of {}", material.name);
+        color_button(ui, &name, &mut light.color);
         ui.checkbox(&mut light.is_on, &material.name)
             .on_hover_text("Whether it emits light");
     });
@@ -104,7 +102,7 @@ fn reflectances_ui(ui: &mut egui::Ui, materials: &mut Materials, most: f32) {
                 ui.push_id(index, |ui| {
                     ui.horizontal(|ui| {
                         let name = format!("Reflectance of {}", material.name);
-                        color_ui(ui, &name, &mut material.reflectance);
+                        color_button(ui, &name, &mut material.reflectance);
                         material.reflectance = material.reflectance.min(Vec3::splat(most));
                         ui.label(&material.name);
                         if material.reflectance != default && row::reset_button(ui, &name).clicked()
@@ -115,16 +113,4 @@ fn reflectances_ui(ui: &mut egui::Ui, materials: &mut Materials, most: f32) {
                 });
             }
         });
-}
-
-/// A button with a linear colour that opens a picker.
-fn color_ui(ui: &mut egui::Ui, name: &str, color: &mut Vec3) {
-    let mut picked = color.to_array();
-    let response = ui.color_edit_button_rgb(&mut picked);
-    // The picker gives back what it was given but for rounding: only what the user changed counts.
-    if response.changed() {
-        *color = Vec3::from_array(picked).clamp(Vec3::ZERO, Vec3::ONE);
-    }
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ColorWell, true, name));
-    response.on_hover_text(name);
 }

@@ -28,7 +28,7 @@ pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions:
                 Action::PauseContinue,
             );
             item(ui, table, actions, "Stop", Action::Stop);
-            item(ui, table, actions, "Begin again", Action::Reset);
+            item(ui, table, actions, "Restart", Action::Reset);
             ui.separator();
             item(
                 ui,
@@ -69,7 +69,13 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
                 }
             }
             ui.separator();
-            item(ui, table, actions, "Forget these", Action::ClearRecent);
+            item(
+                ui,
+                table,
+                actions,
+                "Clear recent files",
+                Action::ClearRecent,
+            );
         });
     });
     item(ui, table, actions, "Reload", Action::Reload);
@@ -119,7 +125,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     });
     ui.separator();
     let view = &state.view;
-    let has_backs = state.loaded.as_ref().is_none_or(|loaded| loaded.has_backs);
+    let has_backs = state.has_backs() && view.mode != ViewMode::FaceOrientation;
     let toggles = [
         (
             "Element mesh over the light",
@@ -172,7 +178,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         for (label, scale) in [
             ("Larger", Scale::Larger),
             ("Smaller", Scale::Smaller),
-            ("As at first", Scale::Whole),
+            ("Default", Scale::Whole),
         ] {
             item(ui, table, actions, label, Action::Scale(scale));
         }
@@ -184,7 +190,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
 fn theme_menu(ui: &mut egui::Ui) {
     let present = ui.ctx().options(|options| options.theme_preference);
     for (label, preference) in [
-        ("As the system", egui::ThemePreference::System),
+        ("System", egui::ThemePreference::System),
         ("Dark", egui::ThemePreference::Dark),
         ("Light", egui::ThemePreference::Light),
     ] {

@@ -2,15 +2,12 @@
 
 use eframe::egui::{self, RichText};
 
-use crate::viewer::{
-    state::{Severity, State},
-    theme,
-};
+use super::status::severity_color;
+use crate::viewer::{messages::Severity, state::State};
 
-/// Show all messages, the newest first; they are then seen.
+/// Show all messages, the newest first. Those that are not scrolled away are then seen.
 pub fn messages_ui(ui: &mut egui::Ui, state: &mut State) {
     let messages = &mut state.messages;
-    messages.seen = messages.all.len();
     if messages.all.is_empty() {
         ui.weak("Nothing to report.");
         return;
@@ -29,17 +26,22 @@ pub fn messages_ui(ui: &mut egui::Ui, state: &mut State) {
             messages.seen = 0;
         }
     });
+    let mut is_newest = true;
     for message in messages.all.iter().rev() {
-        let (mark, color) = match message.severity {
-            Severity::Note => ("Note", theme::good(ui.visuals())),
-            Severity::Warning => ("Warning", theme::warning(ui.visuals())),
-            Severity::Error => ("Error", theme::bad(ui.visuals())),
+        let mark = match message.severity {
+            Severity::Note => "Note",
+            Severity::Warning => "Warning",
+            Severity::Error => "Error",
         };
-        ui.horizontal_wrapped(|ui| {
+        let color = severity_color(message.severity, ui.visuals());
+        let shown = ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
             ui.label(RichText::new(mark).color(color).small());
             // Selectable, so that a part of it can be copied.
             ui.add(egui::Label::new(&message.text).selectable(true).wrap());
         });
+        if std::mem::take(&mut is_newest) && ui.is_rect_visible(shown.response.rect) {
+            messages.seen = messages.all.len();
+        }
     }
 }

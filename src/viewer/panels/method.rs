@@ -16,7 +16,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
         row::setting(
             ui,
             "Clusters",
-            "How a cluster keeps its power and area by direction. Changing it begins again.",
+            "How a cluster keeps its power and area by direction. Changing it restarts the run.",
             &mut settings.method,
             &default.method,
             |ui, value| {
@@ -53,7 +53,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
         row::setting(
             ui,
             "Link error",
-            "How the error of a link is judged. Changing it begins again.",
+            "How the error of a link is judged. Changing it restarts the run.",
             &mut settings.oracle,
             &default.oracle,
             |ui, value| {
@@ -93,7 +93,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
             row::setting(
                 ui,
                 "Direct light",
-                "How light straight from emitters is computed. Changing it begins again.",
+                "How light straight from emitters is computed. Changing it restarts the run.",
                 &mut settings.direct,
                 &default.direct,
                 |ui, value| {
@@ -125,7 +125,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
         row::setting(
             ui,
             "Push",
-            "How the light of several links reaches the faces of a cluster. Changing it begins again.",
+            "How the light of several links reaches the faces of a cluster. Changing it restarts the run.",
             &mut settings.push,
             &default.push,
             |ui, value| {
@@ -134,7 +134,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
                     "push",
                     value,
                     &[
-                        (Push::Combined, "Once a sweep", "Combined first"),
+                        (Push::Combined, "Once an iteration", "Combined first"),
                         (
                             Push::AtOnce,
                             "Link by link",
@@ -147,7 +147,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
         row::setting(
             ui,
             "Crease angle",
-            "Edges sharper than this are shaded as edges. Changing it begins again.",
+            "Edges sharper than this are shaded as edges. Changing it restarts the run.",
             &mut settings.crease_degrees,
             &default.crease_degrees,
             |ui, value| {
@@ -162,7 +162,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
         row::setting(
             ui,
             "Convergence",
-            "Sweeps stop when the change is below this fraction of the power.",
+            "The iteration ends when it changes less than this fraction of the power.",
             &mut settings.tolerance,
             &default.tolerance,
             |ui, value| ui.add(slider(value, 1e-6..=1e-1)),
@@ -170,7 +170,7 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
         row::setting(
             ui,
             "Seed",
-            "Of every random choice. The same seed gives the same light. Changing it begins again.",
+            "Of every random choice. The same seed gives the same light. Changing it restarts the run.",
             &mut settings.seed,
             &default.seed,
             |ui, value| ui.add(DragValue::new(value).speed(0.1)),

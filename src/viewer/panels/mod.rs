@@ -1,6 +1,7 @@
 //! The panels around the viewport, one a file. They show the state, and return wishes as actions.
 
 pub mod clusters;
+pub mod color;
 pub mod dialog;
 pub mod emission;
 pub mod error;
@@ -16,6 +17,7 @@ pub mod method;
 pub mod path;
 pub mod picture;
 pub mod plot;
+pub mod power;
 pub mod probe;
 pub mod progress;
 pub mod row;
@@ -98,6 +100,15 @@ pub fn bytes(value: u64) -> String {
     }
 }
 
+/// A bound of a relative error as per cent, where it says more than that all may be wrong.
+pub fn bound(relative: f64) -> String {
+    if relative < 1.0 {
+        format!("{} %", figure(100.0 * relative))
+    } else {
+        "over 100 %".to_owned()
+    }
+}
+
 /// Seconds as people read them.
 pub fn seconds(value: f64) -> String {
     if value < 1.0 {
@@ -132,6 +143,14 @@ mod tests {
         assert_eq!(count(1_234_567), "1\u{2009}234\u{2009}567");
         assert_eq!(count(999), "999");
         assert_eq!(seconds(75.2), "1 min 15 s");
+    }
+
+    #[test]
+    fn a_bound_is_a_figure_only_where_it_bounds() {
+        assert_eq!(bound(0.25), "25.0 %");
+        assert_eq!(bound(24.99), "over 100 %");
+        assert_eq!(bound(f64::INFINITY), "over 100 %");
+        assert_eq!(bound(f64::NAN), "over 100 %");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, RichText};
 
-use super::{count, figure};
+use super::{count, figure, power::PowerScale};
 use crate::{
     scene::Frame,
     solver::PathNode,
@@ -20,6 +20,7 @@ pub fn path_ui(
     ui: &mut egui::Ui,
     path: &[PathNode],
     frame: &Frame,
+    power: PowerScale,
     selected: Option<usize>,
     actions: &mut Vec<Action>,
 ) {
@@ -34,7 +35,7 @@ pub fn path_ui(
             ui.spacing_mut().item_spacing.y = 1.0;
             ui.spacing_mut().button_padding = egui::vec2(4.0, 1.0);
             for node in path {
-                node_ui(ui, node, frame, selected, actions);
+                node_ui(ui, node, frame, power, selected, actions);
             }
         });
 }
@@ -43,11 +44,12 @@ fn node_ui(
     ui: &mut egui::Ui,
     node: &PathNode,
     frame: &Frame,
+    power: PowerScale,
     selected: Option<usize>,
     actions: &mut Vec<Action>,
 ) {
     let small = |text: String| RichText::new(text).size(FONT_SIZE);
-    let explanation = explanation(node, frame);
+    let explanation = explanation(node, frame, power);
     let Some(patch_count) = node.patch_count else {
         let text = format!(
             "Element {} · {} links",
@@ -63,10 +65,10 @@ fn node_ui(
     };
     let index = node.place.node.index();
     let text = format!(
-        "Level {} · {} patches · {} W · {} links",
+        "Level {} · {} patches · {} · {} links",
         node.level,
         count(u64::from(patch_count)),
-        figure(f64::from(node.power) * frame.area_to_world(1.0)),
+        power.text(node.power),
         count(u64::from(node.link_count))
     );
     let response = ui
@@ -78,9 +80,8 @@ fn node_ui(
 }
 
 /// Box, area, power with its bounds, and error.
-fn explanation(node: &PathNode, frame: &Frame) -> String {
-    let area_scale = frame.area_to_world(1.0);
-    let scaled = |value: f32| figure(f64::from(value) * area_scale);
+fn explanation(node: &PathNode, frame: &Frame, power: PowerScale) -> String {
+    let area = figure(frame.area_to_world(f64::from(node.area)));
     let corner = |point| {
         let [x, y, z] = frame.to_world(point).to_array().map(figure);
         format!("{x}  {y}  {z}")
@@ -88,13 +89,13 @@ fn explanation(node: &PathNode, frame: &Frame) -> String {
     let [least, most] = node.power_bounds;
     let [x, y, z] = node.main_direction.to_array();
     format!(
-        "From {} to {}\nArea {}\nPower {} W; over links {} … {} W along {x:.2}  {y:.2}  {z:.2}\nError of its links {} W/m²",
+        "From {} to {}\nArea {area}\n{} {}; over links {} … {} along {x:.2}  {y:.2}  {z:.2}\nError bound of its links {} W/m²",
         corner(node.place.min),
         corner(node.place.max),
-        scaled(node.area),
-        scaled(node.power),
-        scaled(least),
-        scaled(most),
+        power.name(),
+        power.text(node.power),
+        figure(power.value(least)),
+        power.text(most),
         figure(f64::from(node.error)),
     )
 }

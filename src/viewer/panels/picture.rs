@@ -28,9 +28,9 @@ fn picture_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) -
         }
     });
     ui.horizontal(|ui| {
-        ui.weak("As the window");
         for multiple in [1, 2, 4] {
-            if ui.small_button(format!("× {multiple}")).clicked() {
+            let text = format!("Viewport size × {multiple}");
+            if ui.small_button(text).clicked() {
                 panels.picture_size = window.map(|side| side * multiple);
             }
         }

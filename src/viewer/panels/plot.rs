@@ -3,7 +3,7 @@
 use eframe::egui;
 use egui_plot::{AxisHints, GridInput, GridMark, Line, Plot, PlotPoints};
 
-use super::count;
+use super::{count, legend::round_step};
 use crate::{
     solver::StepReport,
     viewer::{state::State, theme},
@@ -25,12 +25,9 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         ui.weak("The plot begins with the second step.");
         return;
     }
-    let line = |name: &'static str, of: fn(&StepReport) -> f32| {
-        let points: PlotPoints<'_> = reports
-            .iter()
-            .map(|report| [report.elapsed_s, f64::from(of(report)).max(FLOOR).log10()])
-            .collect();
-        Line::new(name, points).width(2.0)
+    let height = |report: &StepReport, of: fn(&StepReport) -> f32| {
+        let value = f64::from(of(report));
+        value.max(FLOOR).log10()
     };
     let lines = [
         (
@@ -46,8 +43,18 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
             ui.colored_label(color, "—");
             ui.label(name);
         }
+        ui.weak("relative");
+    });
+    let heights = reports
+        .iter()
+        .flat_map(|report| lines.map(|(.., of)| height(report, of)));
+    // Whole decades, so that there are marks however little the lines move.
+    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), at| {
+        (low.min(at.floor()), high.max(at.ceil()))
     });
     Plot::new("residual")
+        .include_y(low)
+        .include_y(high)
         .height(160.0)
         .allow_scroll(false)
         .allow_zoom(false)
@@ -59,7 +66,11 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         .y_grid_spacer(decade_spacer())
         .show(ui, |plot| {
             for (name, color, of) in lines {
-                plot.line(line(name, of).color(color));
+                let points: PlotPoints<'_> = reports
+                    .iter()
+                    .map(|report| [report.elapsed_s, height(report, of)])
+                    .collect();
+                plot.line(Line::new(name, points).width(2.0).color(color));
             }
         });
 }
@@ -74,7 +85,7 @@ pub(super) fn time_axis() -> AxisHints<'static> {
 /// Marks at round numbers of seconds, few enough for labels.
 pub(super) fn time_spacer() -> impl Fn(GridInput) -> Vec<GridMark> {
     egui_plot::uniform_grid_spacer(|input| {
-        let step = round_step(input.bounds.1 - input.bounds.0);
+        let step = time_step(input.bounds.1 - input.bounds.0);
         [step, step, step]
     })
 }
@@ -96,14 +107,9 @@ pub(super) fn decade_spacer() -> impl Fn(GridInput) -> Vec<GridMark> {
     })
 }
 
-/// The smallest of 1, 2, 5, 10, … that leaves at most [`MOST_TIMES`] steps in a range.
-fn round_step(range: f64) -> f64 {
-    let least = (range / MOST_TIMES).max(1e-3);
-    let power = 10_f64.powf(least.log10().floor());
-    let factor = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|factor| factor * power >= least * (1.0 - 1e-9));
-    factor.unwrap_or(10.0) * power
+/// A round number of seconds that leaves at most [`MOST_TIMES`] steps in a range.
+fn time_step(range: f64) -> f64 {
+    round_step((range / MOST_TIMES).max(1e-3))
 }
 
 /// A whole power of ten as people write it.
@@ -133,7 +139,7 @@ mod tests {
             (61.0, 20.0),
             (0.0, 1e-3),
         ] {
-            let found = round_step(range);
+            let found = time_step(range);
             assert!((found / step - 1.0).abs() < 1e-9, "{range}: {found}");
         }
     }

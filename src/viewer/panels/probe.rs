@@ -3,7 +3,7 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{count, figure, path::path_ui, row};
+use super::{bound, count, figure, path::path_ui, power::PowerScale, row};
 use crate::viewer::{action::Action, light_range::luminance, state::State, view::LinkEnd};
 
 /// Show the picked point; wishes go into `actions`.
@@ -97,9 +97,9 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             );
             row::figure(
                 ui,
-                "Uncertainty",
-                format!("± {} W/m²", figure(f64::from(probe.uncertainty))),
-                "Estimated error of the irradiance",
+                "Error bound",
+                error_bound(probe.uncertainty, luminance(probe.irradiance)),
+                "Worst case of the irradiance here, relative to it; the real error is far below",
             );
             inspection_rows(ui, state);
         }
@@ -109,17 +109,29 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     }
     object_ui(ui, state);
     if let Some(inspection) = state.inspections.element() {
-        path_ui(ui, &inspection.path, &scene.frame, state.cluster, actions);
+        let power = PowerScale::of(state);
+        path_ui(
+            ui,
+            &inspection.path,
+            &scene.frame,
+            power,
+            state.cluster,
+            actions,
+        );
     }
     ui.horizontal(|ui| {
         if ui
-            .button("Show it")
+            .button("Show object")
             .on_hover_text("Bring the object into view (F)")
             .clicked()
         {
             actions.push(Action::FrameSelected);
         }
-        if ui.button("Clear").on_hover_text("Select nothing").clicked() {
+        if ui
+            .button("Clear selection")
+            .on_hover_text("Esc does the same while nothing runs")
+            .clicked()
+        {
             actions.push(Action::ClearSelection);
         }
     });
@@ -133,7 +145,7 @@ fn inspection_rows(ui: &mut egui::Ui, state: &State) {
                 ui,
                 "Row sum",
                 "…",
-                "The solver answers after this step; pausing answers at once",
+                "The solver answers after this step, or at once when paused",
             );
         }
         return;
@@ -141,15 +153,15 @@ fn inspection_rows(ui: &mut egui::Ui, state: &State) {
     let light = |color: Vec3| format!("{} W/m²", figure(f64::from(luminance(color))));
     row::figure(
         ui,
-        "Over links",
+        "From links",
         light(inspection.linked),
         "Irradiance over all links, at the element's centroid",
     );
     row::figure(
         ui,
-        "By samples",
+        "From shadow rays",
         light(inspection.direct),
-        "Irradiance straight from emitters that are sampled, mean of the element",
+        "Irradiance straight from emitters by shadow rays, mean over the element",
     );
     row::figure(
         ui,
@@ -206,6 +218,15 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
     });
 }
 
+/// An error bound relative to the irradiance that it is of; without either there is nothing to be wrong.
+fn error_bound(error: f32, irradiance: f32) -> String {
+    if error > 0.0 {
+        bound(f64::from(error) / f64::from(irradiance))
+    } else {
+        bound(0.0)
+    }
+}
+
 fn grey(color: Vec3) -> String {
     figure(f64::from(color.x))
 }
@@ -213,4 +234,17 @@ fn grey(color: Vec3) -> String {
 fn rgb(color: Vec3) -> String {
     let [red, green, blue] = color.to_array().map(|channel| figure(f64::from(channel)));
     format!("{red}  {green}  {blue}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_beyond_the_light_itself_is_no_figure() {
+        assert_eq!(error_bound(5.31, 0.25), "over 100 %");
+        assert_eq!(error_bound(0.01, 0.25), "4.00 %");
+        assert_eq!(error_bound(1.0, 0.0), "over 100 %");
+        assert_eq!(error_bound(0.0, 0.0), "0 %");
+    }
 }

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Button};
 
-use super::{bytes, count, figure, row, seconds};
+use super::{bound, bytes, count, figure, row, seconds};
 use crate::{
     solver::StepReport,
     viewer::{
@@ -10,6 +10,7 @@ use crate::{
         change::Change,
         state::{RunStatus, State},
         theme,
+        wording::without_flags,
     },
 };
 
@@ -18,15 +19,15 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     let status = &state.run.status;
     let steps = state.settings.max_steps;
     let step = state.report().map_or(0, |report| report.step);
-    let share = match status {
-        RunStatus::Finished(_) => 1.0,
-        _ => step as f32 / steps.max(step + 1) as f32,
-    };
-    let text = match status {
-        RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
-        RunStatus::Paused => format!("Paused after {}", place(step, steps)),
-        RunStatus::Idle if state.loading.is_some() => "Reading the scene".to_owned(),
-        _ => status.label(),
+    let (share, text) = match &state.loading {
+        Some(loading) => {
+            let progress = loading.progress();
+            (progress.share, progress.text())
+        }
+        None => (
+            run_share(status, step, steps),
+            run_text(status, step, steps),
+        ),
     };
     ui.add(egui::ProgressBar::new(share).text(text).corner_radius(3.0));
     buttons_ui(ui, status, actions);
@@ -38,6 +39,23 @@ pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) 
     }
     change_ui(ui, state);
     figures_ui(ui, state);
+}
+
+/// The part of a run's steps that is done, 0…1.
+fn run_share(status: &RunStatus, step: u32, steps: u32) -> f32 {
+    match status {
+        RunStatus::Finished(_) => 1.0,
+        _ => step as f32 / steps.max(step + 1) as f32,
+    }
+}
+
+/// Where a run stands.
+fn run_text(status: &RunStatus, step: u32, steps: u32) -> String {
+    match status {
+        RunStatus::Running => format!("Computing {}", place(step + 1, steps)),
+        RunStatus::Paused => format!("Paused after {}", place(step, steps)),
+        _ => status.label(),
+    }
 }
 
 /// What the last change of settings did. Its room is always there, so that no slider moves away from the hand.
@@ -74,11 +92,11 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
             button(
                 "Pause",
                 true,
-                "Rest; Continue goes on from there (Space)",
+                "Pause; Continue resumes from there (Space)",
                 Action::PauseContinue,
             );
         } else {
-            let explanation = "Go on from where it stands (Space)";
+            let explanation = "Resume from where the run stands (Space)";
             button(
                 "Continue",
                 status.can_continue(),
@@ -94,9 +112,9 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
             Action::Stop,
         );
         button(
-            "Begin again",
+            "Restart",
             *status != RunStatus::Idle,
-            "Light the scene anew (Ctrl+R)",
+            "Start the run from the beginning (Ctrl+R)",
             Action::Reset,
         );
     });
@@ -126,14 +144,14 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         row(
             "Transported",
             &|report| transported(report).map_or_else(|| "–".to_owned(), share_text),
-            "Estimated part of the light that has found its place over the links of the last step. The rest, residual / \
+            "Estimated part of the light that has been transported over the links of the last step. The rest, residual / \
              (1 − contraction), is still on its way between surfaces. Finer links change the light, too: that is what \
              the error bound tells",
         );
         row(
             "Residual",
             &|report| figure(f64::from(report.residual)),
-            "Change of the last sweep, relative to the total power",
+            "Change of the light by the last iteration, relative to the total power",
         );
         row(
             "Energy balance",
@@ -142,9 +160,9 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
         row(
             "Error bound",
-            &|report| bound_text(report.estimated_error),
-            "The worst case: the intervals of all links together, relative to the mean irradiance. The real error is far \
-             below. 'Measured error' in the panel on the right tells it, once a reference is traced",
+            &|report| bound(f64::from(report.estimated_error)),
+            "Worst case over the intervals of all links, relative to the mean irradiance. The real error is far below: \
+             'Measured error' in the panel on the right shows it once a reference is traced",
         );
         row(
             "Links",
@@ -163,7 +181,7 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
     });
     for note in report.into_iter().flat_map(|report| &report.notes) {
-        ui.colored_label(theme::warning(ui.visuals()), note);
+        ui.colored_label(theme::warning(ui.visuals()), without_flags(note));
     }
 }
 
@@ -182,15 +200,6 @@ fn place(step: u32, steps: u32) -> String {
 fn transported(report: &StepReport) -> Option<f64> {
     let rest = f64::from(report.residual) / (1.0 - f64::from(report.contraction));
     (report.contraction < 1.0 && rest.is_finite()).then(|| (1.0 - rest).max(0.0))
-}
-
-/// A bound of the error as per cent, where it says more than that all may be wrong.
-fn bound_text(bound: f32) -> String {
-    if bound < 1.0 {
-        format!("{} %", figure(f64::from(100.0 * bound)))
-    } else {
-        "over 100 %".to_owned()
-    }
 }
 
 /// A share as per cent. Rounded down: all of it is only what is all of it.
@@ -227,13 +236,6 @@ mod tests {
     fn steps_are_counted_on_when_light_is_refined_after_the_last() {
         assert_eq!(place(5, 5), "step 5 of 5");
         assert_eq!(place(8, 5), "step 8, refining further");
-    }
-
-    #[test]
-    fn a_bound_is_a_figure_only_where_it_bounds() {
-        assert_eq!(bound_text(0.25), "25.0 %");
-        assert_eq!(bound_text(24.99), "over 100 %");
-        assert_eq!(bound_text(f32::INFINITY), "over 100 %");
     }
 
     #[test]

@@ -8,10 +8,7 @@ use super::counts_in;
 use crate::{
     scene::builtin::builtins,
     viewer::{
-        action::Action,
-        loader::SceneSource,
-        state::{Severity, State},
-        theme,
+        action::Action, loader::SceneSource, messages::Severity, state::State, theme,
         view::ViewMode,
     },
 };
@@ -61,12 +58,15 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
 /// What the viewport says while there is nothing to show yet.
 pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
     let text = match (&state.loading, &state.loaded) {
-        (Some(loading), None) => format!("Reading {}…", loading.source().label()),
+        (Some(loading), None) => loading.progress().sentence(&loading.source().label()),
         (_, Some(loaded)) if state.run.snapshot.is_none() && state.run.status.is_busy() => {
             format!("Building the clusters of {}…", loaded.source.label())
         }
         (_, Some(loaded)) if state.staged.is_none() && state.run.snapshot.is_some() => {
-            format!("Handing {} to the graphics adapter…", loaded.source.label())
+            format!(
+                "Uploading {} to the graphics adapter…",
+                loaded.source.label()
+            )
         }
         (_, Some(_)) if lacks_errors(state) => "Tracing the reference at the vertices…".to_owned(),
         _ => return,

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use eframe::egui::{self, DragValue, Slider};
+use eframe::egui::{self, DragValue, Slider, emath::Numeric};
 
 use super::{method::method_ui, row};
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Show the settings; wishes go into `actions`.
-pub fn settings_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let mut settings = state.settings.clone();
     presets_ui(ui, &mut settings);
     ui.add_space(4.0);
@@ -119,7 +119,7 @@ fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
     }
     row::setting(
         ui,
-        "Steps",
+        "Maximum steps",
         "The threshold falls to ε over this many steps. More steps show the first picture earlier.",
         &mut settings.max_steps,
         &default.max_steps,
@@ -127,41 +127,27 @@ fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
     );
 }
 
-fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+fn limits_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     row::section(ui, "Limits and scene", false, |ui| {
         let mut options = state.options.clone();
         let mut time = options.time_limit.map_or(0.0, |limit| limit.as_secs_f64());
         row::setting(
             ui,
             "Time limit",
-            "The run stops after this; continue grants it anew. 0 is no limit.",
+            "The run stops after this many seconds; Continue grants them anew. 0 is no limit.",
             &mut time,
             &0.0,
-            |ui, value| {
-                ui.add(
-                    DragValue::new(value)
-                        .range(0.0..=1e6)
-                        .suffix(" s")
-                        .speed(1.0),
-                )
-            },
+            |ui, value| ui.add(limit(value, 0.0..=1e6, "s", "none").speed(1.0)),
         );
         options.time_limit = (time > 0.0).then(|| Duration::from_secs_f64(time));
         let mut memory = options.memory_limit.map_or(0, |limit| limit >> 20);
         row::setting(
             ui,
             "Memory limit",
-            "The run stops when the solver holds this much. 0 is no limit.",
+            "The run stops when the solver holds this many MiB. 0 is no limit.",
             &mut memory,
             &0,
-            |ui, value| {
-                ui.add(
-                    DragValue::new(value)
-                        .range(0..=1 << 20)
-                        .suffix(" MiB")
-                        .speed(16.0),
-                )
-            },
+            |ui, value| ui.add(limit(value, 0..=1 << 20, "MiB", "none").speed(16.0)),
         );
         options.memory_limit = (memory > 0).then_some(memory << 20);
         row::setting(
@@ -170,7 +156,7 @@ fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             "How many threads compute; 0 takes one for each core. The result is the same.",
             &mut options.threads,
             &0,
-            |ui, value| ui.add(DragValue::new(value).range(0..=256).speed(0.1)),
+            |ui, value| ui.add(limit(value, 0..=256, "", "automatic").speed(0.1)),
         );
         if options != state.options {
             actions.push(Action::Options(options));
@@ -202,7 +188,45 @@ fn limits_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
         if sides != state.scene_options.sides {
             actions.push(Action::Sides(sides));
         }
+        row::setting(
+            ui,
+            "Unit is the metre",
+            "OBJ files do not say what a unit of length is. Powers are in watts where it is the metre, else relative.",
+            &mut state.view.is_in_metres,
+            &false,
+            |ui, value| ui.checkbox(value, ""),
+        );
     });
+}
+
+/// A number that may be dragged and typed, with its unit behind it; 0 stands for what `zero` says, which may be typed, too.
+fn limit<'v, N: Numeric>(
+    value: &'v mut N,
+    range: std::ops::RangeInclusive<N>,
+    unit: &'static str,
+    zero: &'static str,
+) -> DragValue<'v> {
+    DragValue::new(value)
+        .range(range)
+        .custom_formatter(move |value, _| limit_text(value, unit, zero))
+        .custom_parser(move |text| parsed_limit(text, unit, zero))
+}
+
+fn limit_text(value: f64, unit: &str, zero: &str) -> String {
+    if value <= 0.0 {
+        return zero.to_owned();
+    }
+    // Tenths are as fine as limits go.
+    let rounded = (10.0 * value).round() / 10.0;
+    format!("{rounded} {unit}").trim_end().to_owned()
+}
+
+fn parsed_limit(text: &str, unit: &str, zero: &str) -> Option<f64> {
+    let text = text.trim();
+    if text.eq_ignore_ascii_case(zero) {
+        return Some(0.0);
+    }
+    super::number(text.trim_end_matches(unit))
 }
 
 /// A logarithmic slider whose typed value may leave its range, but not go to 0 or below.
@@ -217,4 +241,26 @@ pub(super) fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> S
                 .contains(&value)
                 .then_some(f64::from(value))
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_that_does_not_limit_says_so() {
+        for (value, unit, zero, text) in [
+            (0.0, "s", "none", "none"),
+            (90.0, "s", "none", "90 s"),
+            (0.5, "s", "none", "0.5 s"),
+            (512.0, "MiB", "none", "512 MiB"),
+            (0.0, "", "automatic", "automatic"),
+            (4.0, "", "automatic", "4"),
+        ] {
+            assert_eq!(limit_text(value, unit, zero), text);
+            assert_eq!(parsed_limit(text, unit, zero), Some(value), "{text}");
+        }
+        assert_eq!(parsed_limit("None", "s", "none"), Some(0.0));
+        assert_eq!(parsed_limit("soon", "s", "none"), None);
+    }
 }

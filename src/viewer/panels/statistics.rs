@@ -80,7 +80,12 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 "Of the displayed mesh",
             );
             let rate = report.shadow_rays as f64 / report.solve_s.max(1e-9);
-            row::figure(ui, "Rays a second", count(rate as u64), "");
+            row::figure(
+                ui,
+                "Rays per second",
+                count(rate as u64),
+                "Shadow rays over the time of the solver",
+            );
             row::figure(
                 ui,
                 "Row sums",
@@ -107,7 +112,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
         ui.weak(&state.adapter_name);
     }
     if cfg!(debug_assertions) {
-        ui.weak("Debug build: use --release for full speed.");
+        ui.weak("Debug build: many times slower than a release build.");
     }
 }
 
@@ -121,8 +126,8 @@ fn frame_ui(ui: &mut egui::Ui, state: &State) {
         row::figure(
             ui,
             "CPU per frame",
-            format!("{} ms (most {})", ms(middle), ms(most)),
-            "Time that the window works on a frame, without waiting for the screen; other work on the same cores lengthens it. Middle and largest of the last frames",
+            format!("{} ms (max {})", ms(middle), ms(most)),
+            "Time that the window works on a frame, without waiting for the screen; other work on the same cores lengthens it. Median and maximum of the last frames",
         );
     });
 }

@@ -1,20 +1,25 @@
-//! The line at the bottom: what is going on, in figures, and whether there is something to read.
+//! The line at the bottom: what is going on, in figures, and the newest message.
 
-use eframe::egui::{self, RichText};
+use eframe::egui::{self, Color32, RichText};
 
 use super::{count, figure, seconds};
 use crate::viewer::{
     change::Change,
-    state::{Message, RunStatus, Severity, State},
+    messages::{Message, Severity},
+    panel_state::Side,
+    state::{RunStatus, State},
     theme,
 };
+
+/// Width that the newest message needs at least, in points; figures of the run give way to it. Narrower shows the
+/// beginning of the sentence only.
+const MESSAGE_WIDTH: f32 = 300.0;
 
 /// Show the line.
 pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
     ui.horizontal(|ui| {
         if let Some(loading) = &state.loading {
-            // No spinner: turning it would take the processor from the reading.
-            ui.label(format!("Reading {}", loading.source().label()));
+            ui.label(loading.progress().sentence(&loading.source().label()));
         }
         let color = match &state.run.status {
             RunStatus::Failed(_) => theme::bad(ui.visuals()),
@@ -35,23 +40,19 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
                 count(report.vertices),
                 seconds(report.elapsed_s),
             );
-            ui.label(RichText::new(text).weak());
+            if text_width(ui, &text) + MESSAGE_WIDTH < ui.available_width() {
+                ui.label(RichText::new(text).weak());
+            }
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            messages_button(ui, state);
+            messages_ui(ui, state);
         });
     });
 }
 
-fn messages_button(ui: &mut egui::Ui, state: &mut State) {
-    let unseen = state.messages.unseen();
-    // The worst comes first, the newest of them.
-    let rank = |message: &&Message| match message.severity {
-        Severity::Note => 0,
-        Severity::Warning => 1,
-        Severity::Error => 2,
-    };
-    let Some(worst) = unseen.iter().max_by_key(rank) else {
+/// The newest message that was not seen yet, and how many warnings and errors wait behind it.
+fn messages_ui(ui: &mut egui::Ui, state: &mut State) {
+    let Some((newest, older)) = state.messages.unseen().split_last() else {
         // The panel of the run may be hidden, or scrolled away.
         match state.run.last_change.as_ref().and_then(Change::label) {
             Some(text) => {
@@ -61,23 +62,55 @@ fn messages_button(ui: &mut egui::Ui, state: &mut State) {
         }
         return;
     };
-    let color = match worst.severity {
-        Severity::Note => theme::good(ui.visuals()),
-        Severity::Warning => theme::warning(ui.visuals()),
-        Severity::Error => theme::bad(ui.visuals()),
-    };
-    let mut text = worst.text.clone();
-    if text.chars().count() > 90 {
-        text = text.chars().take(90).chain(['…']).collect();
+    let mut is_clicked = false;
+    if let Some((text, worst)) = waiting(older) {
+        let text = RichText::new(text).color(severity_color(worst, ui.visuals()));
+        let button = egui::Button::new(text).frame(false);
+        is_clicked |= ui.add(button).on_hover_text("Show all messages").clicked();
+        ui.separator();
     }
-    if unseen.len() > 1 {
-        text = format!("{text}  (+{})", unseen.len() - 1);
-    }
-    let button = egui::Button::new(RichText::new(text).color(color)).frame(false);
-    if ui.add(button).on_hover_text("Show all messages").clicked() {
+    let text = RichText::new(&newest.text).color(severity_color(newest.severity, ui.visuals()));
+    let button = egui::Button::new(text).frame(false).truncate();
+    let response = ui.add(button);
+    is_clicked |= response
+        .on_hover_text(format!("{}\n\nClick to show all messages", newest.text))
+        .clicked();
+    if is_clicked {
         state.panels.show_messages = true;
-        state.panels.look = true;
+        state.panels.open_side(Side::Look);
         state.panels.shown = true;
+    }
+}
+
+/// How many warnings and errors there are among messages, and how much the worst matters; `None` without any.
+fn waiting(messages: &[Message]) -> Option<(String, Severity)> {
+    let count_of = |severity: Severity| {
+        let alike = messages
+            .iter()
+            .filter(|message| message.severity == severity);
+        alike.count()
+    };
+    let named = |severity: Severity, one: &str, many: &str| match count_of(severity) {
+        0 => None,
+        1 => Some(format!("1 {one}")),
+        number => Some(format!("{number} {many}")),
+    };
+    let errors = named(Severity::Error, "error", "errors");
+    let warnings = named(Severity::Warning, "warning", "warnings");
+    let worst = match &errors {
+        Some(_) => Severity::Error,
+        None => Severity::Warning,
+    };
+    let parts: Vec<String> = errors.into_iter().chain(warnings).collect();
+    (!parts.is_empty()).then(|| (format!("+ {}", parts.join(", ")), worst))
+}
+
+/// The colour in which a message stands.
+pub(super) fn severity_color(severity: Severity, visuals: &egui::Visuals) -> Color32 {
+    match severity {
+        Severity::Note => theme::good(visuals),
+        Severity::Warning => theme::warning(visuals),
+        Severity::Error => theme::bad(visuals),
     }
 }
 
@@ -87,15 +120,45 @@ fn hint_ui(ui: &mut egui::Ui) {
         "Drag orbits, wheel zooms, click picks; B boxes, Ctrl+F12 picture, F1 all keys",
         "F1 shows all keys",
     ];
-    let font = egui::TextStyle::Body.resolve(ui.style());
     for hint in HINTS {
-        let width = |painter: &egui::Painter| {
-            let text = painter.layout_no_wrap(hint.to_owned(), font.clone(), egui::Color32::GRAY);
-            text.size().x
-        };
-        if width(ui.painter()) < ui.available_width() {
+        if text_width(ui, hint) < ui.available_width() {
             ui.weak(hint);
             return;
         }
+    }
+}
+
+/// Width of a line of body text, in points.
+fn text_width(ui: &egui::Ui, text: &str) -> f32 {
+    let font = egui::TextStyle::Body.resolve(ui.style());
+    let laid_out = ui
+        .painter()
+        .layout_no_wrap(text.to_owned(), font, Color32::GRAY);
+    laid_out.size().x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::viewer::messages::Messages;
+
+    #[test]
+    fn warnings_and_errors_that_wait_are_counted() {
+        let mut messages = Messages::default();
+        assert_eq!(waiting(messages.unseen()), None);
+        messages.push(Severity::Note, "a");
+        assert_eq!(waiting(messages.unseen()), None);
+        messages.push(Severity::Warning, "b");
+        messages.push(Severity::Warning, "c");
+        let told = |messages: &Messages| waiting(messages.unseen());
+        assert_eq!(
+            told(&messages),
+            Some(("+ 2 warnings".to_owned(), Severity::Warning))
+        );
+        messages.push(Severity::Error, "d");
+        assert_eq!(
+            told(&messages),
+            Some(("+ 1 error, 2 warnings".to_owned(), Severity::Error))
+        );
     }
 }

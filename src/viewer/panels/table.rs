@@ -12,7 +12,7 @@ pub fn table_window(ctx: &egui::Context, panels: &mut PanelState, actions: &mut 
     let text = &mut panels.table_text;
     dialog(ctx, "Save errors as CSV", &mut panels.table, |ui| {
         file_field(ui, "File", text);
-        ui.weak("A line for each measured step of each run, with the columns of 'vecrad report'.");
+        ui.weak("A row for each measured step of each run.");
         let path = text.trim();
         let confirmed = confirm(ui, "Save", !path.is_empty(), "Name a file.");
         if confirmed {

@@ -4,6 +4,7 @@ use eframe::egui::{self, DragValue, Slider};
 
 use crate::viewer::{
     action::Action,
+    panel_state::{PanelState, Side},
     state::State,
     view::{ToneMap, ViewMode, ViewSettings},
 };
@@ -22,13 +23,15 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
             range_ui(ui, &mut state.view, state.false_color_range);
         }
         ui.separator();
+        // Where orientation is shown, backs are shown anyway.
+        let has_backs = state.has_backs() && state.view.mode != ViewMode::FaceOrientation;
         let view = &mut state.view;
         ui.toggle_value(&mut view.edges, "Mesh")
             .on_hover_text("Edges of the elements over the light (M)");
         ui.toggle_value(&mut view.clusters.shown, "Clusters")
             .on_hover_text("Boxes of the cluster tree; [ and ] change the level (B)");
         let loaded = state.loaded.as_ref();
-        if loaded.is_none_or(|loaded| loaded.has_backs) {
+        if has_backs {
             ui.toggle_value(&mut view.backs, "Backs").on_hover_text(
                 "Draw the backs of one-sided faces instead of looking through them (K)",
             );
@@ -38,12 +41,35 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
                 .on_hover_text("Textures in detail, lit by the computed light");
         }
         ui.separator();
-        let panels = &mut state.panels;
-        ui.toggle_value(&mut panels.light, "Settings")
-            .on_hover_text("The panel of the run and its settings; Tab hides all but the scene");
-        ui.toggle_value(&mut panels.look, "Details")
-            .on_hover_text("The panel of what is picked, of clusters, links and figures; Tab hides all but the scene");
+        sides_ui(ui, &mut state.panels);
     });
+}
+
+/// Which panels stand beside the scene.
+fn sides_ui(ui: &mut egui::Ui, panels: &mut PanelState) {
+    let window_width = ui.ctx().content_rect().width();
+    let shown = panels.shown_sides(window_width);
+    for (side, label, explanation) in [
+        (
+            Side::Light,
+            "Settings",
+            "The panel of the run and its settings; Ctrl+B hides all but the scene",
+        ),
+        (
+            Side::Look,
+            "Details",
+            "The panel of what is picked, of clusters, links and figures; Ctrl+B hides all but the scene",
+        ),
+    ] {
+        let mut is_shown = shown.contains(&side);
+        let toggle = ui.toggle_value(&mut is_shown, label);
+        if toggle.on_hover_text(explanation).changed() {
+            match is_shown {
+                true => panels.open_side(side),
+                false => panels.close_side(side, window_width),
+            }
+        }
+    }
 }
 
 fn mode_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {

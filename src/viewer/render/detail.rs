@@ -7,7 +7,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::Gpu;
 use crate::{
-    scene::{Appearance, Scene, Texture, TextureId, TriangleId},
+    scene::{Appearance, Scene, Texture, TextureId},
     solver::DisplayMesh,
 };
 
@@ -17,8 +17,27 @@ const MOST_REPEATS: [f32; 2] = [2.0, 16.0];
 /// Textures larger than this are shown smaller: light, not texture, is what is looked at.
 const MAX_SIDE: u32 = 2048;
 
-/// A run of indices with the number of its group.
-pub(super) type DetailRange = (Range<u32>, usize);
+/// Which copies of a triangle the mesh has, in the order in which they are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum FaceCopy {
+    /// The only one, of a one-sided triangle: from behind its back is seen, or nothing.
+    Only,
+    /// The front of a two-sided triangle.
+    Front,
+    /// Its back, which is the other copy turned around.
+    Back,
+}
+
+/// A run of indices that are drawn alike.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct DrawRange {
+    /// Which indices.
+    pub(super) indices: Range<u32>,
+    /// Which copies these triangles are.
+    pub(super) copy: FaceCopy,
+    /// Number of their group of textures.
+    pub(super) group: usize,
+}
 
 /// The groups of a scene's materials. Cheap to clone.
 #[derive(Clone)]
@@ -169,28 +188,40 @@ impl DetailSet {
         }
     }
 
-    /// The indices of a mesh, those of one group together, and where each group lies.
-    pub(super) fn sort_by_detail(
+    /// The indices of a mesh, those that are drawn alike together, and where each run of them lies.
+    pub(super) fn sort_for_drawing(
         &self,
         scene: &Scene,
         mesh: &DisplayMesh,
-    ) -> (Vec<[u32; 3]>, Vec<DetailRange>) {
-        let count = mesh.indices.len();
-        if self.textured.is_empty() || mesh.texcoords.is_empty() {
-            return (mesh.indices.clone(), vec![(0..3 * count as u32, 0)]);
-        }
-        let group = |index: usize| {
-            let triangle = TriangleId(mesh.triangle_of[index]);
-            self.group_of[scene.triangles[triangle.index()].material.index()]
+    ) -> (Vec<[u32; 3]>, Vec<DrawRange>) {
+        let has_details = !self.textured.is_empty() && !mesh.texcoords.is_empty();
+        let kind = |index: usize| {
+            let triangle = &scene.triangles[mesh.triangle_of[index] as usize];
+            let copy = match (mesh.is_back[index], triangle.two_sided) {
+                (true, _) => FaceCopy::Back,
+                (false, true) => FaceCopy::Front,
+                (false, false) => FaceCopy::Only,
+            };
+            let group = match has_details {
+                true => self.group_of[triangle.material.index()],
+                false => 0,
+            };
+            (copy, group)
         };
-        let mut order: Vec<usize> = (0..count).collect();
-        order.sort_by_key(|&index| group(index));
-        let mut ranges: Vec<DetailRange> = Vec::new();
+        let kinds: Vec<(FaceCopy, usize)> = (0..mesh.indices.len()).map(kind).collect();
+        let mut order: Vec<usize> = (0..mesh.indices.len()).collect();
+        order.sort_by_key(|&index| kinds[index]);
+        let mut ranges: Vec<DrawRange> = Vec::new();
         for (place, &index) in order.iter().enumerate() {
             let (start, end) = (3 * place as u32, 3 * place as u32 + 3);
+            let (copy, group) = kinds[index];
             match ranges.last_mut() {
-                Some((range, last)) if *last == group(index) => range.end = end,
-                _ => ranges.push((start..end, group(index))),
+                Some(last) if (last.copy, last.group) == (copy, group) => last.indices.end = end,
+                _ => ranges.push(DrawRange {
+                    indices: start..end,
+                    copy,
+                    group,
+                }),
             }
         }
         let indices = order.iter().map(|&index| mesh.indices[index]).collect();

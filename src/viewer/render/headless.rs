@@ -13,7 +13,7 @@ use crate::{
     solver::Snapshot,
     viewer::{
         camera::Camera,
-        cluster_lines, clusters, light_range,
+        cluster_lines, clusters, exposure, light_range,
         saver::{self, EncodeError},
         theme,
         view::ViewSettings,
@@ -116,7 +116,8 @@ pub fn check(size: [u32; 2], is_cutout: bool) -> Result<(), HeadlessError> {
     }
 }
 
-/// Draw a snapshot at a size in pixels. Automatic exposure and ranges are taken from its light, as in the window.
+/// Draw a snapshot at a size in pixels. Automatic exposure is taken from the pixels and ranges from the light, as in the
+/// window.
 ///
 /// # Errors
 /// See [`HeadlessError`].
@@ -128,7 +129,7 @@ pub fn picture(
 ) -> Result<HeadlessPicture, HeadlessError> {
     let mut renderer = Renderer::new(open_gpu()?);
     let target = Target::new(renderer.gpu(), size)?;
-    let view = exposed(view, subject.snapshot);
+    let view = exposed(&mut renderer, subject, camera, view, size)?;
     let exposure_factor = view.exposure_factor() / subject.scene.radiance_unit;
     with_picture(subject, camera, &view, |picture| {
         renderer.render(&target, picture)
@@ -151,7 +152,7 @@ pub fn cutout(
 ) -> Result<Cutout, HeadlessError> {
     let mut renderer = Renderer::new(open_gpu()?);
     let target = CutoutTarget::new(renderer.gpu(), size)?;
-    let view = exposed(view, subject.snapshot);
+    let view = exposed(&mut renderer, subject, camera, view, size)?;
     let exposure_factor = view.exposure_factor() / subject.scene.radiance_unit;
     with_picture(subject, camera, &view, |picture| {
         renderer.render_cutout(&target, picture)
@@ -159,33 +160,41 @@ pub fn cutout(
     Ok(target.read(renderer.gpu(), view.tone_map, exposure_factor)?)
 }
 
-/// A view with the exposure that the light asks for, where it is automatic.
-fn exposed(view: &ViewSettings, snapshot: &Snapshot) -> ViewSettings {
-    let mut view = view.clone();
-    if view.auto_exposure {
-        view.exposure = light_range::auto_exposure(snapshot).unwrap_or(view.exposure);
-    }
-    view
-}
-
-/// Describe the picture, and draw it.
-fn with_picture(
+/// A view with the exposure that the picture asks for, where it is automatic.
+fn exposed(
+    renderer: &mut Renderer,
     subject: Subject<'_>,
     camera: &Camera,
     view: &ViewSettings,
-    draw: impl FnOnce(&Picture<'_>) -> Result<(), RenderError>,
-) -> Result<(), RenderError> {
+    size: [u32; 2],
+) -> Result<ViewSettings, HeadlessError> {
+    let mut view = view.clone();
+    if view.auto_exposure && view.mode.is_light() && subject.snapshot.is_lit() {
+        let metering = with_picture(subject, camera, &view, |picture| {
+            renderer.measure(size, picture)
+        })?;
+        let metered = metering.wait(renderer.gpu())?;
+        view.exposure = exposure::of(&metered).unwrap_or(view.exposure);
+    }
+    Ok(view)
+}
+
+/// Describe the picture, and draw it.
+fn with_picture<T>(
+    subject: Subject<'_>,
+    camera: &Camera,
+    view: &ViewSettings,
+    draw: impl FnOnce(&Picture<'_>) -> Result<T, RenderError>,
+) -> Result<T, RenderError> {
     let Subject {
         scene,
         snapshot,
         errors,
     } = subject;
+    let shown = clusters::shown(&snapshot.clusters, &view.clusters);
+    let boxes = cluster_lines::boxes(&snapshot.clusters, &shown, &view.clusters);
     let overlay = Overlay {
-        boxes: Arc::new(cluster_lines::boxes(
-            &snapshot.clusters,
-            &clusters::shown(&snapshot.clusters, &view.clusters),
-            &view.clusters,
-        )),
+        boxes: Arc::new(boxes.instances),
         segments: Arc::default(),
     };
     draw(&Picture {

@@ -1,13 +1,25 @@
 //! The lit surfaces: one vertex buffer a quantity, so that a step uploads the light and nothing else.
+//!
+//! Of the two sides of a triangle, one is drawn in a pixel: a two-sided triangle has a copy for each, and a back is drawn
+//! of one-sided ones only.
 
-use super::{DEPTH_FORMAT, Gpu, detail::DetailSet, uploads::Uploads};
+use super::{
+    DEPTH_FORMAT, Gpu,
+    detail::{DetailSet, FaceCopy},
+    meter::METER_FORMAT,
+    uploads::Uploads,
+};
 use crate::viewer::view::{ViewMode, ViewSettings};
 
 /// Pipelines of the surfaces.
 pub(super) struct MeshPass {
-    front_pipeline: wgpu::RenderPipeline,
-    back_pipeline: wgpu::RenderPipeline,
-    edge_pipeline: wgpu::RenderPipeline,
+    front: wgpu::RenderPipeline,
+    /// Fronts in the colour of backs.
+    turned: wgpu::RenderPipeline,
+    back: wgpu::RenderPipeline,
+    edge: wgpu::RenderPipeline,
+    meter: wgpu::RenderPipeline,
+    meter_back: wgpu::RenderPipeline,
 }
 
 impl MeshPass {
@@ -30,9 +42,12 @@ impl MeshPass {
             });
         let build = |kind| pipeline(gpu, &layout, &module, kind);
         Self {
-            front_pipeline: build(Kind::Front),
-            back_pipeline: build(Kind::Back),
-            edge_pipeline: build(Kind::Edge),
+            front: build(Kind::Front),
+            turned: build(Kind::Turned),
+            back: build(Kind::Back),
+            edge: build(Kind::Edge),
+            meter: build(Kind::Meter),
+            meter_back: build(Kind::MeterBack),
         }
     }
 
@@ -43,39 +58,74 @@ impl MeshPass {
         uploads: &Uploads,
         view: &ViewSettings,
     ) {
-        let (Some(mesh), Some(light)) = (uploads.mesh(), uploads.light()) else {
-            return;
+        let shows_orientation = view.mode == ViewMode::FaceOrientation;
+        let front_of = |copy| match (shows_orientation, copy) {
+            (true, FaceCopy::Back) => &self.turned,
+            _ => &self.front,
         };
-        let details = uploads.details();
-        let buffers = [
-            &mesh.positions,
-            &mesh.normals,
-            // Nobody looks at texture coordinates where there are none: any numbers will do.
-            mesh.texcoords.as_ref().unwrap_or(&mesh.positions),
-            &mesh.reflectance,
-            &mesh.emission,
-            light,
-        ];
-        for (slot, buffer) in buffers.into_iter().enumerate() {
-            pass.set_vertex_buffer(slot as u32, buffer.slice(..));
-        }
-        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.set_pipeline(&self.front_pipeline);
-        for (range, detail) in &mesh.ranges {
-            pass.set_bind_group(1, details.bind_group(*detail), &[]);
-            pass.draw_indexed(range.clone(), 0, 0..1);
-        }
-        if view.backs || view.mode == ViewMode::FaceOrientation {
-            pass.set_pipeline(&self.back_pipeline);
-            pass.set_bind_group(1, details.bind_group(0), &[]);
-            let whole = mesh.ranges.last().map_or(0, |(range, _)| range.end);
-            pass.draw_indexed(0..whole, 0, 0..1);
-        }
-        if let (true, Some((edges, count))) = (shows_edges(view.mode, view.edges), &mesh.edges) {
-            pass.set_pipeline(&self.edge_pipeline);
-            pass.set_bind_group(1, details.bind_group(0), &[]);
+        let back = (view.backs || shows_orientation).then_some(&self.back);
+        draw_sides(pass, uploads, front_of, back);
+        if shows_edges(view.mode, view.edges)
+            && let Some((edges, count)) = uploads.mesh().and_then(|mesh| mesh.edges.as_ref())
+        {
+            pass.set_pipeline(&self.edge);
+            pass.set_bind_group(1, uploads.details().bind_group(0), &[]);
             pass.set_index_buffer(edges.slice(..), wgpu::IndexFormat::Uint32);
             pass.draw_indexed(0..*count, 0, 0..1);
+        }
+    }
+
+    /// Draw the luminance of what was uploaded, for metering; group 0 is set.
+    pub(super) fn draw_meter(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        uploads: &Uploads,
+        view: &ViewSettings,
+    ) {
+        let back = view.backs.then_some(&self.meter_back);
+        draw_sides(pass, uploads, |_| &self.meter, back);
+    }
+}
+
+/// Draw each triangle's side that faces the viewer: copies by the pipeline for them, backs of one-sided triangles by
+/// `back` or not at all.
+fn draw_sides<'p>(
+    pass: &mut wgpu::RenderPass<'_>,
+    uploads: &Uploads,
+    front_of: impl Fn(FaceCopy) -> &'p wgpu::RenderPipeline,
+    back: Option<&wgpu::RenderPipeline>,
+) {
+    let (Some(mesh), Some(light)) = (uploads.mesh(), uploads.light()) else {
+        return;
+    };
+    let details = uploads.details();
+    let buffers = [
+        &mesh.positions,
+        &mesh.normals,
+        // Nobody looks at texture coordinates where there are none: any numbers will do.
+        mesh.texcoords.as_ref().unwrap_or(&mesh.positions),
+        &mesh.reflectance,
+        &mesh.emission,
+        light,
+    ];
+    for (slot, buffer) in buffers.into_iter().enumerate() {
+        pass.set_vertex_buffer(slot as u32, buffer.slice(..));
+    }
+    pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+    for range in &mesh.ranges {
+        pass.set_pipeline(front_of(range.copy));
+        pass.set_bind_group(1, details.bind_group(range.group), &[]);
+        pass.draw_indexed(range.indices.clone(), 0, 0..1);
+    }
+    if let Some(back) = back {
+        pass.set_pipeline(back);
+        pass.set_bind_group(1, details.bind_group(0), &[]);
+        let one_sided = mesh
+            .ranges
+            .iter()
+            .filter(|range| range.copy == FaceCopy::Only);
+        for range in one_sided {
+            pass.draw_indexed(range.indices.clone(), 0, 0..1);
         }
     }
 }
@@ -88,10 +138,28 @@ pub(super) fn shows_edges(mode: ViewMode, edges: bool) -> bool {
 /// What a pipeline draws.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
+    /// Fronts, as the mode shows them.
     Front,
+    /// Fronts, as backs are shown.
+    Turned,
+    /// Backs.
     Back,
+    /// Edges of both sides.
     Edge,
+    /// Luminance of fronts.
+    Meter,
+    /// Backs, which are not metered, but hide what is behind them.
+    MeterBack,
 }
+
+/// Backs lie a little behind their triangle: where the front of another one lies on the same plane, cut another way, it
+/// is seen. With less, rounding of depths decides; with more, backs sink behind what stands close to them. Depth is
+/// reversed, so that smaller is farther.
+const BACK_BIAS: wgpu::DepthBiasState = wgpu::DepthBiasState {
+    constant: -16,
+    slope_scale: -1.0,
+    clamp: 0.0,
+};
 
 fn pipeline(
     gpu: &Gpu,
@@ -102,9 +170,14 @@ fn pipeline(
     use wgpu::{BlendComponent, BlendFactor, BlendOperation, PrimitiveTopology};
     let (label, vertex, fragment) = match kind {
         Kind::Front => ("mesh fronts", "vs_main", "fs_main"),
+        Kind::Turned => ("mesh turned", "vs_main", "fs_back"),
         Kind::Back => ("mesh backs", "vs_main", "fs_back"),
         Kind::Edge => ("mesh edges", "vs_edge", "fs_edge"),
+        Kind::Meter => ("mesh meter", "vs_main", "fs_meter"),
+        Kind::MeterBack => ("mesh meter backs", "vs_main", "fs_meter_back"),
     };
+    let is_back = matches!(kind, Kind::Back | Kind::MeterBack);
+    let is_meter = matches!(kind, Kind::Meter | Kind::MeterBack);
     let attributes = [
         wgpu::vertex_attr_array![0 => Float32x3],
         wgpu::vertex_attr_array![1 => Float32x3],
@@ -154,22 +227,25 @@ fn pipeline(
                     PrimitiveTopology::TriangleList
                 },
                 cull_mode: match kind {
-                    Kind::Front => Some(wgpu::Face::Back),
-                    Kind::Back => Some(wgpu::Face::Front),
                     Kind::Edge => None,
+                    _ if is_back => Some(wgpu::Face::Front),
+                    _ => Some(wgpu::Face::Back),
                 },
                 ..Default::default()
             },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(kind != Kind::Edge),
-                // Backs come after fronts: where both lie on one plane, as on two-sided faces, the front stays.
                 depth_compare: Some(wgpu::CompareFunction::Greater),
                 stencil: Default::default(),
-                bias: Default::default(),
+                bias: if is_back {
+                    BACK_BIAS
+                } else {
+                    Default::default()
+                },
             }),
             multisample: wgpu::MultisampleState {
-                count: gpu.sample_count,
+                count: if is_meter { 1 } else { gpu.sample_count },
                 ..Default::default()
             },
             fragment: Some(wgpu::FragmentState {
@@ -177,7 +253,11 @@ fn pipeline(
                 entry_point: Some(fragment),
                 compilation_options: Default::default(),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: gpu.linear_format,
+                    format: if is_meter {
+                        METER_FORMAT
+                    } else {
+                        gpu.linear_format
+                    },
                     blend,
                     write_mask: wgpu::ColorWrites::ALL,
                 })],

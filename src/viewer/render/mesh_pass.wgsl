@@ -80,20 +80,29 @@ fn exposed(radiance: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(clamp(radiance * view.display.y, vec3<f32>(0.0), vec3<f32>(BRIGHTEST)), 1.0);
 }
 
+// With the texture where it shows in detail.
+fn shown_reflectance(surface: Surface) -> vec3<f32> {
+    let place = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
+    let texel = textureSample(reflectance_texture, detail_sampler, place);
+    if (detail.reflectance.w * view.display.w > 0.5) {
+        return detail.reflectance.rgb * texel.rgb;
+    }
+    return surface.reflectance;
+}
+
+fn shown_emission(surface: Surface) -> vec3<f32> {
+    let place = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
+    let texel = textureSample(emission_texture, detail_sampler, place);
+    if (detail.emission.w * view.display.w > 0.5) {
+        return detail.emission.rgb * texel.rgb;
+    }
+    return surface.emission;
+}
+
 @fragment
 fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
-    let place = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
-    let reflecting = textureSample(reflectance_texture, detail_sampler, place);
-    let emitting = textureSample(emission_texture, detail_sampler, place);
-    var reflectance = surface.reflectance;
-    if (detail.reflectance.w * view.display.w > 0.5) {
-        reflectance = detail.reflectance.rgb * reflecting.rgb;
-    }
-    var emission = surface.emission;
-    if (detail.emission.w * view.display.w > 0.5) {
-        emission = detail.emission.rgb * emitting.rgb;
-    }
-    let radiance = emission + reflectance * surface.light / PI;
+    let reflectance = shown_reflectance(surface);
+    let radiance = shown_emission(surface) + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
     switch u32(view.display.x) {
         case 1u: { return exposed(surface.light / PI); }
@@ -111,7 +120,27 @@ fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
     }
 }
 
-// The back of a one-sided face.
+// Bits of the luminance that a light mode shows, before emission scale and exposure: with the sign set where most of it
+// is emitted, 0 where there is none. Read by `Meter`.
+@fragment
+fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
+    let reflectance = shown_reflectance(surface);
+    var emitted = luminance(shown_emission(surface));
+    var reflected = luminance(reflectance * surface.light / PI);
+    if (u32(view.display.x) == 1u) {
+        emitted = 0.0;
+        reflected = luminance(surface.light / PI);
+    }
+    let seen = max(emitted + reflected, 0.0);
+    return vec4<u32>(bitcast<u32>(select(seen, -seen, emitted > reflected)), 0u, 0u, 0u);
+}
+
+@fragment
+fn fs_meter_back(surface: Surface) -> @location(0) vec4<u32> {
+    return vec4<u32>(0u);
+}
+
+// The back of a face.
 @fragment
 fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));

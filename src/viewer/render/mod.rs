@@ -1,4 +1,5 @@
-//! Pictures of a snapshot: surfaces and lines into a linear target, then one tone-mapping pass to display colours.
+//! Pictures of a snapshot: surfaces and lines into a linear target, then one tone-mapping pass to display colours; beside
+//! them the small pictures of luminance that automatic exposure is taken from.
 //!
 //! The same code draws the window's viewport, screenshots and headless pictures. Buffers are uploaded only when the
 //! `Arc` they come from changes, so that a still picture costs nothing.
@@ -8,6 +9,7 @@ mod detail;
 pub mod headless;
 mod line_pass;
 mod mesh_pass;
+mod meter;
 mod readback;
 mod target;
 mod tonemap_pass;
@@ -19,6 +21,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{Vec3, Vec4};
 
 pub use cutout::{Cutout, CutoutTarget};
+pub use meter::{Metered, Metering};
 pub use readback::ReadError;
 pub use target::Target;
 pub use uploads::{Source, Uploads};
@@ -31,6 +34,7 @@ use crate::{
 use detail::DetailSet;
 use line_pass::LinePass;
 use mesh_pass::MeshPass;
+use meter::MeterTarget;
 use tonemap_pass::TonemapPass;
 use uniforms::ViewUniforms;
 
@@ -45,7 +49,7 @@ const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub enum RenderError {
     /// A buffer of the mesh is larger than the adapter takes.
     #[error(
-        "the mesh needs a buffer of {needed_mib} MiB and this graphics adapter takes {limit_mib}; raise the smallest element area, or the mesh tolerance, and begin again"
+        "the mesh needs a buffer of {needed_mib} MiB and this graphics adapter takes {limit_mib}; raise the smallest element area, or the mesh tolerance, and restart"
     )]
     MeshTooLarge {
         /// Size of the largest buffer.
@@ -260,6 +264,20 @@ impl Renderer {
         })
     }
 
+    /// Upload a picture, and draw it as an exposure meter sees it; `size` is that of the picture.
+    ///
+    /// # Errors
+    /// [`RenderError::MeshTooLarge`].
+    pub fn measure(
+        &mut self,
+        size: [u32; 2],
+        picture: &Picture<'_>,
+    ) -> Result<Metering, RenderError> {
+        self.renew(picture, |renderer, uploads| {
+            renderer.meter(size, picture, uploads)
+        })
+    }
+
     /// Upload a picture and draw it without its background.
     ///
     /// # Errors
@@ -275,18 +293,18 @@ impl Renderer {
     }
 
     /// Upload a picture, and draw with what was uploaded.
-    fn renew(
+    fn renew<T>(
         &mut self,
         picture: &Picture<'_>,
-        draw: impl FnOnce(&mut Self, &Uploads),
-    ) -> Result<(), RenderError> {
+        draw: impl FnOnce(&mut Self, &Uploads) -> T,
+    ) -> Result<T, RenderError> {
         // Taken out, so that nothing is held twice while the next is made.
         let empty = Uploads::new(self.uploads.details().clone());
         let mut uploads = std::mem::replace(&mut self.uploads, empty);
         let result = uploads.renew(&self.gpu, &picture.source());
-        draw(self, &uploads);
+        let drawn = draw(self, &uploads);
         self.uploads = uploads;
-        result
+        result.map(|()| drawn)
     }
 
     /// Draw a picture of what was uploaded for it.
@@ -313,6 +331,19 @@ impl Renderer {
             self.draw_linear(&mut encoder, target, background, picture, uploads);
         }
         self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Draw a picture of what was uploaded for it as an exposure meter sees it; `size` is that of the picture.
+    pub fn meter(&mut self, size: [u32; 2], picture: &Picture<'_>, uploads: &Uploads) -> Metering {
+        let target = MeterTarget::new(&self.gpu, size);
+        let mut encoder = self.begin(size, picture);
+        {
+            let mut pass = target.begin(&mut encoder);
+            pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+            self.mesh_pass.draw_meter(&mut pass, uploads, picture.view);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        Metering::begin(&self.gpu, &target)
     }
 
     /// Hand over what changes with every picture.

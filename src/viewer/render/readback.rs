@@ -1,6 +1,6 @@
 //! Pictures back from the adapter: display colours, and linear radiance.
 
-use std::time::Duration;
+use std::{sync::mpsc, time::Duration};
 
 use glam::Vec4;
 use image::{Rgb32FImage, RgbaImage};
@@ -62,59 +62,108 @@ fn read_texture(
     texture: &wgpu::Texture,
     pixel_bytes: u32,
 ) -> Result<Vec<u8>, ReadError> {
-    let failed = |error: &dyn std::fmt::Display| {
-        let said = gpu.complaint.get().cloned();
-        ReadError(said.unwrap_or_else(|| error.to_string()))
-    };
-    let (width, height) = (texture.width(), texture.height());
-    let row = width * pixel_bytes;
-    let stride = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("picture read back"),
-        size: u64::from(stride) * u64::from(height),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout: wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(stride),
-                rows_per_image: None,
-            },
-        },
-        texture.size(),
-    );
-    let submission = gpu.queue.submit([encoder.finish()]);
-    let (sender, receiver) = std::sync::mpsc::channel();
-    buffer
-        .slice(..)
-        .map_async(wgpu::MapMode::Read, move |mapped| {
-            // Nobody waits after a time-out.
-            let _ = sender.send(mapped);
+    Readback::begin(gpu, texture, pixel_bytes).wait(gpu)
+}
+
+/// A texture on its way back.
+pub(super) struct Readback {
+    buffer: wgpu::Buffer,
+    submission: wgpu::SubmissionIndex,
+    mapped: mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
+    /// Bytes of a row, without and with padding.
+    row: [u32; 2],
+}
+
+impl Readback {
+    /// Ask for the texture as it is after what was submitted so far.
+    pub(super) fn begin(gpu: &Gpu, texture: &wgpu::Texture, pixel_bytes: u32) -> Self {
+        let (width, height) = (texture.width(), texture.height());
+        let row = width * pixel_bytes;
+        let stride = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("picture read back"),
+            size: u64::from(stride) * u64::from(height),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
         });
-    gpu.device
-        .poll(wgpu::PollType::Wait {
-            submission_index: Some(submission),
-            timeout: Some(PATIENCE),
-        })
-        .map_err(|error| failed(&error))?;
-    receiver
-        .recv_timeout(PATIENCE)
-        .map_err(|error| failed(&error))?
-        .map_err(|error| failed(&error))?;
-    let mapped = buffer
-        .slice(..)
-        .get_mapped_range()
-        .map_err(|error| failed(&error))?;
-    let mut bytes = Vec::with_capacity(row as usize * height as usize);
-    for padded in mapped.chunks_exact(stride as usize) {
-        bytes.extend_from_slice(&padded[..row as usize]);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(stride),
+                    rows_per_image: None,
+                },
+            },
+            texture.size(),
+        );
+        let submission = gpu.queue.submit([encoder.finish()]);
+        let (sender, mapped) = mpsc::channel();
+        buffer
+            .slice(..)
+            .map_async(wgpu::MapMode::Read, move |outcome| {
+                // Nobody waits after a time-out.
+                let _ = sender.send(outcome);
+            });
+        Self {
+            buffer,
+            submission,
+            mapped,
+            row: [row, stride],
+        }
     }
-    Ok(bytes)
+
+    /// The rows, if they are there.
+    pub(super) fn poll(&self, gpu: &Gpu) -> Option<Result<Vec<u8>, ReadError>> {
+        if let Err(error) = gpu.device.poll(wgpu::PollType::Poll) {
+            return Some(Err(failure(gpu, &error)));
+        }
+        match self.mapped.try_recv() {
+            Ok(outcome) => Some(self.rows(gpu, outcome)),
+            Err(mpsc::TryRecvError::Empty) => None,
+            Err(error) => Some(Err(failure(gpu, &error))),
+        }
+    }
+
+    /// Wait for the rows.
+    pub(super) fn wait(self, gpu: &Gpu) -> Result<Vec<u8>, ReadError> {
+        gpu.device
+            .poll(wgpu::PollType::Wait {
+                submission_index: Some(self.submission.clone()),
+                timeout: Some(PATIENCE),
+            })
+            .map_err(|error| failure(gpu, &error))?;
+        let outcome = self
+            .mapped
+            .recv_timeout(PATIENCE)
+            .map_err(|error| failure(gpu, &error))?;
+        self.rows(gpu, outcome)
+    }
+
+    /// The rows without padding.
+    fn rows(
+        &self,
+        gpu: &Gpu,
+        outcome: Result<(), wgpu::BufferAsyncError>,
+    ) -> Result<Vec<u8>, ReadError> {
+        outcome.map_err(|error| failure(gpu, &error))?;
+        let mapped = self
+            .buffer
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|error| failure(gpu, &error))?;
+        let [row, stride] = self.row.map(|bytes| bytes as usize);
+        let rows = mapped.chunks_exact(stride);
+        Ok(rows.flat_map(|padded| &padded[..row]).copied().collect())
+    }
+}
+
+/// What the device complained of first, or this error.
+fn failure(gpu: &Gpu, error: &dyn std::fmt::Display) -> ReadError {
+    let said = gpu.complaint.get().cloned();
+    ReadError(said.unwrap_or_else(|| error.to_string()))
 }
 
 /// The value of a half float.

@@ -99,14 +99,7 @@ impl Target {
                     store,
                 },
             })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
-                stencil_ops: None,
-            }),
+            depth_stencil_attachment: Some(depth_attachment(&self.depth_view)),
             ..Default::default()
         })
     }
@@ -132,7 +125,21 @@ impl Target {
     }
 }
 
-fn texture(
+/// Depths that are needed only while a picture is drawn, infinitely far to begin with.
+pub(super) fn depth_attachment(
+    view: &wgpu::TextureView,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: wgpu::LoadOp::Clear(0.0),
+            store: wgpu::StoreOp::Discard,
+        }),
+        stencil_ops: None,
+    }
+}
+
+pub(super) fn texture(
     gpu: &Gpu,
     label: &str,
     [width, height]: [u32; 2],

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{
     BoxInstance, Gpu, RenderError,
-    detail::{DetailRange, DetailSet},
+    detail::{DetailSet, DrawRange},
     line_pass::Instances,
     mesh_pass::shows_edges,
 };
@@ -186,7 +186,7 @@ pub(super) struct MeshBuffers {
     pub(super) reflectance: wgpu::Buffer,
     pub(super) emission: wgpu::Buffer,
     pub(super) indices: wgpu::Buffer,
-    pub(super) ranges: Vec<DetailRange>,
+    pub(super) ranges: Vec<DrawRange>,
     /// Made when edges are first shown.
     pub(super) edges: Option<(wgpu::Buffer, u32)>,
 }
@@ -195,7 +195,7 @@ impl MeshBuffers {
     fn new(gpu: &Gpu, source: &Source<'_>, details: &DetailSet) -> Self {
         let mesh = source.mesh;
         let vertices = |label, bytes: &[u8]| gpu.buffer(label, bytes, wgpu::BufferUsages::VERTEX);
-        let (indices, ranges) = details.sort_by_detail(source.scene, mesh);
+        let (indices, ranges) = details.sort_for_drawing(source.scene, mesh);
         Self {
             source: mesh.clone(),
             positions: vertices("positions", bytemuck::cast_slice(&mesh.positions)),
