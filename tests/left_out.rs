@@ -170,7 +170,8 @@ fn on_the_outside_of_a_hull_no_element_is_spent() {
         assert!((emission.x - 0.5).abs() < 1e-6, "vertex {index}");
     }
     let (kept, with) = solve(&scene, draft(Keep::ALL));
-    assert!(with.elements >= 2 * report.elements);
+    // Nothing stands before the outside, so it is not divided there, either.
+    assert!(with.elements >= report.elements + 192);
     // The one is exact, the other as good as rays and links at draft are: 2.0 % too bright.
     assert_same_power(&lean, &kept, 0.025);
 }

@@ -12,7 +12,7 @@ use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
     export::{ColorOptions, ToneMap as ExportToneMap},
-    scene::{Material, Scene, SceneBuilder, SceneOptions, builtin::find_builtin},
+    scene::{Material, Scene, SceneBuilder, SceneOptions, Sides, builtin::find_builtin},
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
@@ -44,7 +44,12 @@ fn scene() -> Arc<Scene> {
             builder.push_triangle(triangle.map(|corner| corners[corner]), material);
         }
     }
-    Arc::new(builder.finish(&SceneOptions::default()).expect("two walls"))
+    // Both copies of a two-sided face would be needed.
+    let options = SceneOptions {
+        sides: Sides::One,
+        ..SceneOptions::default()
+    };
+    Arc::new(builder.finish(&options).expect("two walls"))
 }
 
 /// The scene's own triangles under even light.

@@ -57,7 +57,7 @@ impl SceneFacts {
         let emits = |surface: &&crate::scene::Surface| surface.emission.max_element() > 0.0;
         Self {
             name: scene.name.clone(),
-            triangles: scene.triangles.len(),
+            triangles: scene.face_count,
             patches: scene.triangles.len() + two_sided,
             materials: scene.materials.len(),
             textures: scene.textures.len(),

@@ -13,12 +13,15 @@ use crate::scene::{Scene, SizeClasses};
 /// is coarse where nearly all surfaces emit; larger, and a sky of emitting faces takes the elements of what it lights.
 const EMITTERS_SHARE: f64 = 10.0;
 
+/// Emission that is above the mean by no more than this share is not told from the mean: where all emit alike, all count.
+const SLACK: f64 = 1e-3;
+
 /// Weights of patches.
 pub struct Importance {
     /// By patch: how much an error of its irradiance shows, 0…1, as the square of a factor: 1 but for emitters, whose own
     /// light hides what they reflect.
     weights: Vec<f32>,
-    /// By patch: the share of its area that counts in means over the scene, 0…1; 0 of emitters, unless all emit.
+    /// By patch: the share of its area that counts in means over the scene, 0…1; 0 of emitters that are brighter than the mean.
     measures: Vec<f32>,
     /// Sum of what counts, in square frame units.
     pub area: f64,
@@ -29,31 +32,32 @@ impl Importance {
     pub(super) fn new(scene: &Scene, patches: &[Patch]) -> Self {
         let emitted =
             |patch: &Patch| f64::from(luminance(patch.emission.extend(0.0))) * std::f64::consts::PI;
-        let area_of = |emitters: bool| -> f64 {
-            let chosen = patches
-                .iter()
-                .filter(|patch| (emitted(patch) > 0.0) == emitters);
-            chosen.map(|patch| f64::from(patch.area)).sum()
-        };
-        let (emitting, others) = (area_of(true), area_of(false));
+        let whole: f64 = patches.iter().map(|patch| f64::from(patch.area)).sum();
         let power: f64 = patches
             .iter()
             .map(|patch| emitted(patch) * f64::from(patch.area))
             .sum();
         // The mean irradiance if all light arrives.
-        let received = power / (emitting + others).max(f64::MIN_POSITIVE);
+        let received = power / whole.max(f64::MIN_POSITIVE);
+        // What emits no more than that is seen by what it reflects, too.
+        let emits = |patch: &Patch| emitted(patch) > (1.0 + SLACK) * received;
+        let emitting: f64 = patches
+            .iter()
+            .filter(|patch| emits(patch))
+            .map(|patch| f64::from(patch.area))
+            .sum();
+        let others = (whole - emitting).max(0.0);
         let least = (EMITTERS_SHARE * others / emitting.max(f64::MIN_POSITIVE)).min(1.0);
-        let all_emit = others <= 0.0;
-        let weight = |patch: &Patch| match emitted(patch) {
-            emitted if emitted > 0.0 && !all_emit => least * received / (received + emitted),
-            _ => 1.0,
+        let weight = |patch: &Patch| match emits(patch) {
+            true => least * received / (received + emitted(patch)),
+            false => 1.0,
         };
         let weights: Vec<f64> = patches.iter().map(weight).collect();
         let edges: Vec<f64> = patches
             .iter()
             .map(|patch| longest_edge_squared(scene.corners(patch.triangle)))
             .collect();
-        let counts = |patch: &Patch| all_emit || emitted(patch) <= 0.0;
+        let counts = |patch: &Patch| !emits(patch);
         let sized = patches.iter().zip(&edges);
         let faces = sized.clone().filter(|(patch, _)| counts(patch));
         let faces = faces.map(|(patch, &squared)| (squared, f64::from(patch.area)));

@@ -183,6 +183,7 @@ impl SceneBuilder {
             return Err(no_faces(&vanished));
         }
         let overlaps = self.drop_repeated_faces(&corner_of, &positions);
+        let face_count = self.faces.len();
         self.spare_textures();
         let mut triangles = self.triangles(&corner_of, &positions, options);
         self.resolve_overlaps(
@@ -197,6 +198,7 @@ impl SceneBuilder {
         let mut scene = Scene {
             name: self.source.name,
             files: self.source.files,
+            face_count,
             frame,
             positions,
             triangles: triangles.list,

@@ -32,6 +32,10 @@ const NORMAL_CELLS: f64 = 64.0;
 /// Cells of planes per unit of their distance from the origin, likewise.
 const DISTANCE_CELLS: f64 = 8.0;
 
+/// Triangles that each triangle of a plane overlaps at most, on average. What lies in so many layers is a heap in which
+/// nothing is anyone's back: it is left as it is. Fewer gives up on doubled meshes, more takes long on heaps.
+const MOST_LAYERS: usize = 64;
+
 /// Cells with so many triangles or fewer compare all pairs.
 const FEW: usize = 16;
 
@@ -182,7 +186,7 @@ fn overlapping(
         )
     };
     let mut pairs = Vec::new();
-    let mut compare = |a: &Plate, b: &Plate| {
+    let compare = |a: &Plate, b: &Plate, pairs: &mut Vec<[u32; 2]>| {
         if a.overlaps(b, planes) {
             pairs.push([a.triangle.min(b.triangle), a.triangle.max(b.triangle)]);
         }
@@ -191,7 +195,7 @@ fn overlapping(
         for (index, a) in members.iter().enumerate() {
             for b in &members[index + 1..] {
                 if planes[*a as usize].agrees(&planes[*b as usize]) {
-                    compare(&plate(*a, axes(*a)), &plate(*b, axes(*a)));
+                    compare(&plate(*a, axes(*a)), &plate(*b, axes(*a)), &mut pairs);
                 }
             }
         }
@@ -223,13 +227,17 @@ fn overlapping(
         }
     }
     entries.sort_unstable();
+    let most = MOST_LAYERS * plates.len();
     for entries in entries.chunk_by(|a, b| a.0 == b.0) {
         for (index, &(place, a)) in entries.iter().enumerate() {
+            if pairs.len() > most {
+                return Vec::new();
+            }
             let a = &plates[a as usize];
             for &(_, b) in &entries[index + 1..] {
                 let b = &plates[b as usize];
                 if a.meets(b) && cell(a.min.max(b.min)) == place {
-                    compare(a, b);
+                    compare(a, b, &mut pairs);
                 }
             }
         }

@@ -104,11 +104,12 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
     };
     let count = scene.triangles.len();
     let squares: Vec<f64> = (0..count).into_par_iter().map(longest).collect();
-    let areas = scene
+    let areas: Vec<f64> = scene
         .surfaces
         .iter()
-        .map(|surface| f64::from(surface.area_vector.length()));
-    let whole = SizeClasses::new(squares.iter().copied().zip(areas)).area;
+        .map(|surface| f64::from(surface.area_vector.length()))
+        .collect();
+    let whole = SizeClasses::new(squares.iter().copied().zip(areas.iter().copied())).area;
     // By the lower end along an axis, so that those which may touch a box are found by search.
     let mut cutters: Vec<(Vec3, Vec3, usize)> = (0..count)
         .filter(|&index| squares[index] > LEAST_CUTTER * whole)
@@ -119,7 +120,8 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
         .collect();
     cutters.sort_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.2.cmp(&b.2)));
     let lines_on = |&(min, max, index): &(Vec3, Vec3, usize)| {
-        if squares[index] <= LEAST_CUT * whole {
+        let height = 2.0 * areas[index] / squares[index].sqrt();
+        if squares[index] <= LEAST_CUT * whole || height * NEEDLE < squares[index].sqrt() {
             return None;
         }
         let slack = tolerance(min.abs().max(max.abs()).as_dvec3()) as f32;
@@ -261,6 +263,13 @@ struct Corner {
     edges: u8,
 }
 
+/// Grid of the coordinates in the plane of a face that is cut, frame units. Much finer, and rounding shows; coarser, and
+/// points that differ fall together.
+const GRID: f64 = 1.0 / 65_536.0;
+
+/// A face that is so much longer than it is high is not cut: its parts would be thinner still.
+const NEEDLE: f64 = 400.0;
+
 /// Stands for a point where two lines cross, which is not made yet.
 const UNMADE: u32 = u32::MAX;
 
@@ -359,21 +368,26 @@ impl Points {
         let corners = ids.map(|id| scene.positions[id as usize].as_dvec3());
         let plane = Plane::of(corners);
         let mut triangulation = ConstrainedDelaunayTriangulation::<Corner>::new();
+        let mut handles = HashMap::new();
         // The outline.
         for (corner, &id) in ids.iter().enumerate() {
             let at = plane.flat(corners[corner]);
             let edges = On::Corner(corner).edges();
-            let _ = triangulation.insert(Corner {
+            let corner = Corner {
                 at,
                 point: id,
                 edges,
-            });
+            };
+            handles.insert(id, triangulation.insert(corner).ok());
         }
         for (edge, key) in edges_of(ids).into_iter().enumerate() {
             for &(_, point) in on_edges.get(&key).into_iter().flatten() {
                 let at = plane.flat(self.positions[point as usize].as_dvec3());
                 let edges = On::Edge(edge).edges();
-                let _ = triangulation.insert(Corner { at, point, edges });
+                let corner = Corner { at, point, edges };
+                handles
+                    .entry(point)
+                    .or_insert_with(|| triangulation.insert(corner).ok());
             }
         }
         // The lines.
@@ -396,22 +410,23 @@ impl Points {
                     ids[nearest.unwrap_or(0)]
                 });
                 let at = plane.flat(self.positions[point as usize].as_dvec3());
-                triangulation
-                    .insert(Corner {
-                        at,
-                        point,
-                        edges: on.edges(),
-                    })
-                    .ok()
+                let corner = Corner {
+                    at,
+                    point,
+                    edges: on.edges(),
+                };
+                *handles
+                    .entry(point)
+                    .or_insert_with(|| triangulation.insert(corner).ok())
             });
-            if let [Some(from), Some(to)] = ends {
-                if from != to {
-                    triangulation.add_constraint_and_split(from, to, |at| Corner {
-                        at: DVec2::new(at.x, at.y),
-                        point: UNMADE,
-                        edges: 0,
-                    });
-                }
+            if let [Some(from), Some(to)] = ends
+                && from != to
+            {
+                triangulation.add_constraint_and_split(from, to, |at| Corner {
+                    at: DVec2::new(at.x, at.y),
+                    point: UNMADE,
+                    edges: 0,
+                });
             }
         }
         let faces: Vec<[Corner; 3]> = triangulation
@@ -470,12 +485,16 @@ impl Plane {
         plane
     }
 
+    /// On a grid, so that rounding, such as that of a scene far from the origin, does not decide between the two ways to
+    /// divide a rectangle. Coordinates that are common do not lie between two of its points.
     fn flat(&self, place: DVec3) -> DVec2 {
         let offset = place - self.origin;
-        DVec2::from_array(self.axes.map(|axis| offset.dot(axis)))
+        let at = DVec2::from_array(self.axes.map(|axis| offset.dot(axis)));
+        (at / GRID + 0.37).floor()
     }
 
     fn place(&self, at: DVec2) -> DVec3 {
+        let at = (at + 0.13) * GRID;
         self.origin + self.axes[0] * at.x + self.axes[1] * at.y
     }
 

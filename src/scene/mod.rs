@@ -165,6 +165,8 @@ pub struct Scene {
     /// The files that it comes from: the OBJ file, then MTL files and pictures that were found, those that no face shows
     /// included. Empty for generated scenes.
     pub files: Vec<PathBuf>,
+    /// Triangles before faces were cut where others cross or cover them.
+    pub face_count: usize,
     /// How positions relate to the file's coordinates.
     pub frame: Frame,
     /// Vertex positions in frame units, equal positions merged; all finite.

@@ -474,6 +474,7 @@ mod tests {
                 triangle: TriangleId(number),
                 material: MaterialId(0),
                 radiosity,
+                texture: Vec3::ONE,
             });
         }
 

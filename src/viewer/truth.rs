@@ -191,7 +191,7 @@ impl Truth {
         let newest = self.progress.errors.values().next_back();
         SceneComparison {
             scene: scene.name.clone(),
-            triangles: scene.triangles.len(),
+            triangles: scene.face_count,
             reference: ReferenceFacts {
                 surfaces: self.progress.surfaces,
                 points: self.progress.points,

@@ -67,7 +67,7 @@ fn compare_on(
     let mut meshes = None;
     let mut comparison = SceneComparison {
         scene: scene.name.clone(),
-        triangles: scene.triangles.len(),
+        triangles: scene.face_count,
         reference: truth.facts.clone(),
         runs: Vec::new(),
     };

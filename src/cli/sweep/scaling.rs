@@ -58,7 +58,7 @@ pub(super) fn scale(session: &mut Session<'_>) -> Result<()> {
         if let Some(truth) = session.trace(&scene) {
             let run = runs::solve(session, &scene, &truth, &configuration)?.trajectory;
             sizes.push(Size {
-                cost: SizeCost::of(scene.triangles.len(), &run, truth.facts.noise_floor),
+                cost: SizeCost::of(scene.face_count, &run, truth.facts.noise_floor),
                 reference: truth.facts.clone(),
                 run,
             });

@@ -178,7 +178,7 @@ impl Trial {
         };
         Some(Comparison {
             scene: self.scene.name.clone(),
-            triangles: self.scene.triangles.len(),
+            triangles: self.scene.face_count,
             left_out: self.left_out.clone(),
             plan_s: self.plan_s,
             noise: lit_of(RESEEDED).map(|other| difference(&other.light, &whole.light)),

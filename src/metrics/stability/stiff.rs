@@ -106,7 +106,9 @@ fn white_maze(cancel: &Cancel) -> Result<Finding, Trouble> {
     let settings = SolveSettings::draft();
     let lit = solve(stability::maze(0.999), &one_sided(), &settings, cancel)?;
     let is_named = |report: &StepReport| {
-        let is_settled = report.residual <= settings.tolerance;
+        // Coarse steps settle to a tolerance as coarse as their links.
+        let tolerance = settings.tolerance * report.epsilon / settings.epsilon;
+        let is_settled = report.residual <= tolerance;
         is_settled || report.notes.iter().any(|note| note.contains("settled"))
     };
     let unnamed = lit.reports.iter().filter(|report| !is_named(report));

@@ -259,8 +259,9 @@ mod tests {
     #[test]
     fn a_room_has_the_triangles_that_are_asked_for() {
         for wanted in [1, 1_022, 4_096, 8_621, 16_385] {
-            let scene = room_of(wanted).finish(&SceneOptions::default()).unwrap();
-            assert_eq!(scene.triangles.len(), wanted.max(FEWEST));
+            let builder = room_of(wanted);
+            assert_eq!(builder.faces.len(), wanted.max(FEWEST));
+            let scene = builder.finish(&SceneOptions::default()).unwrap();
             assert!(scene.has_emitter() && scene.warnings.is_empty(), "{wanted}");
         }
     }

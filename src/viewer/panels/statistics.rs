@@ -14,7 +14,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
             row::figure(
                 ui,
                 "Triangles",
-                count(scene.triangles.len() as u64),
+                count(scene.face_count as u64),
                 "Of the scene as read",
             );
             row::figure(ui, "Materials", count(scene.materials.len() as u64), "");
