@@ -8,7 +8,10 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
-use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+use spade::{
+    ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _,
+    handles::FixedVertexHandle,
+};
 
 use super::{Appearance, Scene, SizeClasses, Surface, Triangle, TriangleId};
 
@@ -368,34 +371,30 @@ impl Points {
         let corners = ids.map(|id| scene.positions[id as usize].as_dvec3());
         let plane = Plane::of(corners);
         let mut triangulation = ConstrainedDelaunayTriangulation::<Corner>::new();
-        let mut handles = HashMap::new();
+        // By place on the grid: what falls together is one corner.
+        let mut handles: HashMap<[i64; 2], Option<FixedVertexHandle>> = HashMap::new();
+        let mut insert = |triangulation: &mut ConstrainedDelaunayTriangulation<Corner>, corner| {
+            let Corner { at, .. } = corner;
+            let handle = handles.entry([at.x as i64, at.y as i64]);
+            *handle.or_insert_with(|| triangulation.insert(corner).ok())
+        };
         // The outline.
-        for (corner, &id) in ids.iter().enumerate() {
+        for (corner, &point) in ids.iter().enumerate() {
             let at = plane.flat(corners[corner]);
             let edges = On::Corner(corner).edges();
-            let corner = Corner {
-                at,
-                point: id,
-                edges,
-            };
-            handles.insert(id, triangulation.insert(corner).ok());
+            insert(&mut triangulation, Corner { at, point, edges });
         }
         for (edge, key) in edges_of(ids).into_iter().enumerate() {
             for &(_, point) in on_edges.get(&key).into_iter().flatten() {
                 let at = plane.flat(self.positions[point as usize].as_dvec3());
                 let edges = On::Edge(edge).edges();
-                let corner = Corner { at, point, edges };
-                handles
-                    .entry(point)
-                    .or_insert_with(|| triangulation.insert(corner).ok());
+                insert(&mut triangulation, Corner { at, point, edges });
             }
         }
-        // The lines.
+        // The lines, in pieces between their crossings.
+        let mut ends: Vec<[Corner; 2]> = Vec::new();
         for line in lines.into_iter().flatten() {
-            if triangulation.num_vertices() > MOST_CORNERS {
-                break;
-            }
-            let ends = line.map(|(place, on)| {
+            ends.push(line.map(|(place, on)| {
                 let corner = match on {
                     On::Corner(corner) => Some(ids[corner]),
                     On::Edge(edge) => {
@@ -410,23 +409,42 @@ impl Points {
                     ids[nearest.unwrap_or(0)]
                 });
                 let at = plane.flat(self.positions[point as usize].as_dvec3());
-                let corner = Corner {
+                let edges = on.edges();
+                Corner { at, point, edges }
+            }));
+        }
+        for (number, &[from, to]) in ends.iter().enumerate() {
+            let others = ends
+                .iter()
+                .enumerate()
+                .filter(|&(other, _)| other != number);
+            let crossings =
+                others.filter_map(|(_, &[a, b])| crossing_on_grid([from.at, to.at], [a.at, b.at]));
+            let mut along: Vec<Corner> = crossings
+                .map(|at| Corner {
                     at,
-                    point,
-                    edges: on.edges(),
-                };
-                *handles
-                    .entry(point)
-                    .or_insert_with(|| triangulation.insert(corner).ok())
-            });
-            if let [Some(from), Some(to)] = ends
-                && from != to
-            {
-                triangulation.add_constraint_and_split(from, to, |at| Corner {
-                    at: DVec2::new(at.x, at.y),
                     point: UNMADE,
                     edges: 0,
-                });
+                })
+                .collect();
+            along.sort_by(|a, b| {
+                let share = |corner: &Corner| (corner.at - from.at).dot(to.at - from.at);
+                share(a).total_cmp(&share(b))
+            });
+            let pieces = std::iter::once(from).chain(along).chain([to]);
+            let mut before = None;
+            for corner in pieces {
+                if triangulation.num_vertices() > MOST_CORNERS {
+                    break;
+                }
+                let handle = insert(&mut triangulation, corner);
+                if let (Some(a), Some(b)) = (before, handle)
+                    && a != b
+                    && triangulation.can_add_constraint(a, b)
+                {
+                    triangulation.add_constraint(a, b);
+                }
+                before = handle;
             }
         }
         let faces: Vec<[Corner; 3]> = triangulation
@@ -454,6 +472,16 @@ impl Points {
         };
         Parts(parts.into_iter().filter(is_sound).collect())
     }
+}
+
+/// The point of the grid where two lines cross; `None` where they do not.
+fn crossing_on_grid([from, to]: [DVec2; 2], [a, b]: [DVec2; 2]) -> Option<DVec2> {
+    let (own, other) = (to - from, b - a);
+    let area = own.perp_dot(other);
+    let share = (a - from).perp_dot(other) / area;
+    let of_other = (a - from).perp_dot(own) / area;
+    let is_inside = |share: f64| (0.0..=1.0).contains(&share);
+    (is_inside(share) && is_inside(of_other)).then(|| (from + own * share).round())
 }
 
 /// The point on an edge that is nearest to a place.

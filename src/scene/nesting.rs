@@ -268,10 +268,10 @@ impl Points {
 /// From coordinates of the frame to two across the rays and one along them. The rays run along no edge and in no plane of
 /// usual scenes.
 fn across() -> DMat3 {
-    let along = DVec3::new(0.531_7, 0.611_3, 0.586_1).normalize();
+    let along = DVec3::new(0.531_7, 0.611_3, 0.586_1).normalize_or_zero();
     let first = DVec3::new(0.713_3, -0.217_7, -0.331_1)
         .reject_from(along)
-        .normalize();
+        .normalize_or_zero();
     DMat3::from_cols(first, along.cross(first), along).transpose()
 }
 

@@ -529,7 +529,7 @@ mod tests {
         let positions = builder.positions.clone();
         for face in &mut builder.faces {
             let [a, b, c] = face.corners.map(|corner| positions[corner as usize]);
-            let normal = -(b - a).cross(c - a).normalize();
+            let normal = -(b - a).cross(c - a).normalize_or_zero();
             face.normals = Some([normal.as_vec3(); 3]);
         }
         expect(&cuboids, "ioo", 3);

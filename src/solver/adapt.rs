@@ -120,7 +120,8 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
     let squared = longest_edge_squared(hierarchy.mesh.corners(leaf)) as f32;
     // The area of a right isosceles triangle with that edge.
     let area = squared * 0.25;
-    hierarchy.share_of_area(leaf, area) > LARGEST_SHARE && area > 4.0 * limits.min_area
+    let own = hierarchy.mesh.elements[leaf].area_vector.length();
+    hierarchy.share_of_area(leaf, area) > LARGEST_SHARE && own > 4.0 * limits.min_area
 }
 
 /// Leaves between whose corners the light that they found over links bends, as [`DirectField::adapt`] has it.

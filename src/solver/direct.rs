@@ -83,7 +83,7 @@ impl Lights {
         let (emitters, panels) = panels(emitters);
         Self {
             brightest: brightest(&emitters),
-            tree: LightTree::new(emitters, panels),
+            tree: LightTree::new(&emitters, &panels),
             is_sampled,
         }
     }

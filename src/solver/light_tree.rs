@@ -85,10 +85,10 @@ struct Item {
 
 impl LightTree {
     /// The tree over emitters of which those of each panel follow each other.
-    pub(super) fn new(emitters: Vec<Emitter>, panels: Vec<Panel>) -> Self {
+    pub(super) fn new(emitters: &[Emitter], panels: &[Panel]) -> Self {
         let mut growth = Growth {
-            emitters: &emitters,
-            panels: &panels,
+            emitters,
+            panels,
             order: Vec::with_capacity(emitters.len()),
             panel_order: Vec::with_capacity(panels.len()),
             nodes: Vec::new(),
@@ -498,7 +498,7 @@ mod tests {
 
         fn tree(&self) -> LightTree {
             let (emitters, panels) = panels(&self.0);
-            LightTree::new(emitters, panels)
+            LightTree::new(&emitters, &panels)
         }
     }
 

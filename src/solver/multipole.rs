@@ -246,7 +246,7 @@ fn enclosing_cone(one: (Vec3, f32), other: (Vec3, f32)) -> (Vec3, f32) {
         return wide;
     }
     let angle = 0.5 * (between + wide.1 + narrow.1);
-    if !(angle < PI) {
+    if angle >= PI || angle.is_nan() {
         return (wide.0, PI);
     }
     let turn = angle - wide.1;
