@@ -1,7 +1,5 @@
 //! Closed rooms of sheets in bright surroundings: inside it is dark, however the sheets meet.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 mod boxes;
 
 use boxes::{cuboid, mean_irradiance, rectangle, solved};

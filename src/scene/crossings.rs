@@ -4,7 +4,10 @@
 //! (discontinuities of the value itself: Heckbert 1992; Lischinski, Tampieri & Greenberg 1992). Large faces are cut by
 //! large faces; where small ones cross, elements are small enough.
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    collections::{BTreeMap, HashMap},
+    panic::{AssertUnwindSafe, catch_unwind},
+};
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -52,7 +55,11 @@ pub(super) fn cut_crossings(scene: &mut Scene) {
     let mut parts: Vec<Parts> = Vec::with_capacity(scene.triangles.len());
     for index in 0..scene.triangles.len() {
         parts.push(match is_cut(index) {
-            true => points.parts(scene, index, lines.get(&index), &on_edges),
+            // Of what the library gives up on with a panic, the face stays whole.
+            true => catch_unwind(AssertUnwindSafe(|| {
+                points.parts(scene, index, lines.get(&index), &on_edges)
+            }))
+            .unwrap_or_default(),
             false => Parts::default(),
         });
     }
@@ -370,6 +377,9 @@ impl Points {
         let ids = scene.triangles[index].corners;
         let corners = ids.map(|id| scene.positions[id as usize].as_dvec3());
         let plane = Plane::of(corners);
+        if !plane.is_wide() {
+            return Parts::default();
+        }
         let mut triangulation = ConstrainedDelaunayTriangulation::<Corner>::new();
         // By place on the grid: what falls together is one corner.
         let mut handles: HashMap<[i64; 2], Option<FixedVertexHandle>> = HashMap::new();
@@ -511,6 +521,14 @@ impl Plane {
         };
         plane.corners = [a, b, c].map(|corner| plane.flat(corner));
         plane
+    }
+
+    /// Whether the triangle is more than a line on the grid.
+    fn is_wide(&self) -> bool {
+        let [a, b, c] = self.corners;
+        let longest = [a - b, b - c, c - a].map(DVec2::length);
+        let longest = longest.into_iter().fold(0.0, f64::max);
+        (b - a).perp_dot(c - a) > 8.0 * longest
     }
 
     /// On a grid, so that rounding, such as that of a scene far from the origin, does not decide between the two ways to
