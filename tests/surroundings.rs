@@ -88,7 +88,7 @@ fn a_tiny_lamp_lights_a_huge_ground() {
 /// A black box over a floor under a sky of five faces: below its middle, it hides its form factor of the sky.
 #[test]
 fn even_light_from_all_around_casts_shadows_and_gives_no_more_than_it_can() {
-    for (half, reflectance) in [(20.0, 0.0)] {
+    for (half, reflectance) in [(20.0, 0.0), (25.0, 0.0)] {
         let mut builder = SceneBuilder::default();
         let floor = paint(&mut builder, 0.0, 0.0);
         let body = paint(&mut builder, reflectance, 0.0);
