@@ -341,7 +341,7 @@ impl Hierarchy {
     }
 
     /// Whether no other surface stands above the plane of an element within so many of its radii of it. Of surfaces that are
-    /// larger than [`LARGE`] times that, their parts that are near do not count: they cast no small shadow.
+    /// larger than `LARGE` times that, their parts that are near do not count: they cast no small shadow.
     pub fn is_empty_above(&self, element: usize, radii: f32) -> bool {
         let at = &self.mesh.elements[element];
         let normal = self.patch_of(element).normal;

@@ -32,6 +32,10 @@ const MOST_LINES: usize = 128;
 /// Corners of the parts of a face at most: lines that cross each other make more.
 const MOST_CORNERS: usize = 512;
 
+/// Lines in a scene at most, the longest, unless it has more faces than that: cuts multiply no clutter in which everything
+/// crosses everything. Fewer leave rooms of many sheets uncut, more let what crosses outweigh the scene.
+const MOST_LINES_IN_ALL: usize = 1 << 11;
+
 /// What is nearer than this lies in one place, frame units: half of the distance that rays keep from their ends.
 const SAME_PLACE: f64 = 5e-5;
 
@@ -149,13 +153,33 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
             let is_wanted = |[(_, a), (_, b)]: &Line| a.edges() & b.edges() == 0;
             found.extend(line.filter(is_wanted));
         }
-        let length = |[(from, _), (to, _)]: &Line| from.distance_squared(*to);
-        found.sort_by(|a, b| length(b).total_cmp(&length(a)));
+        found.sort_by(|a, b| squared_length(b).total_cmp(&squared_length(a)));
         found.truncate(MOST_LINES);
         (!found.is_empty()).then_some((index, found))
     };
-    let found: Vec<(usize, Vec<Line>)> = cutters.par_iter().filter_map(lines_on).collect();
+    let mut found: Vec<(usize, Vec<Line>)> = cutters.par_iter().filter_map(lines_on).collect();
+    keep_longest(&mut found, MOST_LINES_IN_ALL.max(count));
     found.into_iter().collect()
+}
+
+fn squared_length([(from, _), (to, _)]: &Line) -> f64 {
+    from.distance_squared(*to)
+}
+
+/// Keep no more than so many lines of all triangles together; those of each are sorted, the longest first.
+fn keep_longest(found: &mut Vec<(usize, Vec<Line>)>, most: usize) {
+    let mut lengths: Vec<f64> = found
+        .iter()
+        .flat_map(|(_, lines)| lines.iter().map(squared_length))
+        .collect();
+    if lengths.len() <= most {
+        return;
+    }
+    let (_, &mut least, _) = lengths.select_nth_unstable_by(most, |a, b| b.total_cmp(a));
+    for (_, lines) in &mut *found {
+        lines.truncate(lines.partition_point(|line| squared_length(line) > least));
+    }
+    found.retain(|(_, lines)| !lines.is_empty());
 }
 
 fn shared_corners(scene: &Scene, a: usize, b: usize) -> usize {
@@ -423,6 +447,7 @@ impl Points {
                 Corner { at, point, edges }
             }));
         }
+        let mut constraints: Vec<[FixedVertexHandle; 2]> = Vec::new();
         for (number, &[from, to]) in ends.iter().enumerate() {
             let others = ends
                 .iter()
@@ -450,11 +475,16 @@ impl Points {
                 let handle = insert(&mut triangulation, corner);
                 if let (Some(a), Some(b)) = (before, handle)
                     && a != b
-                    && triangulation.can_add_constraint(a, b)
                 {
-                    triangulation.add_constraint(a, b);
+                    constraints.push([a, b]);
                 }
                 before = handle;
+            }
+        }
+        // After all points: among constraints the library does not always find the place of a point.
+        for [a, b] in constraints {
+            if triangulation.can_add_constraint(a, b) {
+                triangulation.add_constraint(a, b);
             }
         }
         let faces: Vec<[Corner; 3]> = triangulation

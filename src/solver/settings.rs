@@ -149,12 +149,12 @@ impl SolveSettings {
 /// larger, and steps pass in which nothing changes. The presets start at 0.06 to 0.12.
 const COARSEST_THRESHOLD: f32 = 1.0;
 
-/// Thresholds below this count as this where steps are counted: from [`COARSEST_THRESHOLD`] a threshold of 0 is never
+/// Thresholds below this count as this where steps are counted: from `COARSEST_THRESHOLD` a threshold of 0 is never
 /// reached by halving.
 const FINEST_THRESHOLD: f32 = 1e-4;
 
 impl SolveSettings {
-    /// Steps of a solve from its beginning: `max_steps`, or as many as lead from [`COARSEST_THRESHOLD`] to `epsilon`
+    /// Steps of a solve from its beginning: `max_steps`, or as many as lead from `COARSEST_THRESHOLD` to `epsilon`
     /// where these are fewer.
     pub fn step_count(&self) -> u32 {
         let span = COARSEST_THRESHOLD / self.epsilon.max(FINEST_THRESHOLD);
