@@ -192,7 +192,6 @@ fn light_comes_from_where_lamps_are_painted() {
         (false, Direct::Linked),
         (true, Direct::Sampled),
         (true, Direct::Linked),
-        (true, Direct::Auto),
     ] {
         let scene = painted_room(has_speck);
         let shown = solver(&scene, direct).snapshot();

@@ -428,9 +428,8 @@ impl OracleFlag {
 /// `--direct`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DirectFlag {
-    /// Whichever suits each emitter
-    Auto,
     /// Shadow rays from every vertex
+    #[value(alias = "auto")]
     Sampled,
     /// Over links: the paper
     Linked,
@@ -439,7 +438,6 @@ pub enum DirectFlag {
 impl DirectFlag {
     fn direct(self) -> Direct {
         match self {
-            Self::Auto => Direct::Auto,
             Self::Sampled => Direct::Sampled,
             Self::Linked => Direct::Linked,
         }

@@ -15,7 +15,7 @@ use super::{
     contact::is_beyond,
     cover::vertex_places,
     direct::{DirectLight, Receiver},
-    reconstruct::INSET,
+    reconstruct::inset,
 };
 use crate::{
     geometry::RayTree,
@@ -50,9 +50,10 @@ struct Moved {
 impl Beyond {
     /// Where light of the corners of a leaf is evaluated; `corners` are where they are.
     pub(super) fn places(&self, element: &Element, corners: [Vec3; 3]) -> [Vec3; 3] {
+        let usual = inset(element, corners);
         [0, 1, 2].map(|side| {
             let moved = self.moved.get(&element.vertices[side]);
-            let inset = moved.map_or(INSET, |moved| moved.inset);
+            let inset = moved.map_or(usual, |moved| moved.inset);
             corners[side].lerp(element.centroid, inset)
         })
     }
@@ -166,12 +167,14 @@ fn before_wall(
     leaf: usize,
 ) -> (Option<Moved>, u64) {
     let (at, mesh) = (hierarchy.mesh.position(vertex), &hierarchy.mesh);
-    let place = |inset: f32| at.lerp(mesh.elements[leaf].centroid, inset);
-    let (is_dark, mut ray_count) = is_beyond(rays, hierarchy, leaf, place(INSET));
+    let element = &mesh.elements[leaf];
+    let place = |inset: f32| at.lerp(element.centroid, inset);
+    let usual = inset(element, mesh.corners(leaf));
+    let (is_dark, mut ray_count) = is_beyond(rays, hierarchy, leaf, place(usual));
     if !is_dark {
         return (None, ray_count);
     }
-    for inset in INSETS {
+    for inset in INSETS.into_iter().filter(|&further| further > usual) {
         let place = place(inset);
         let (is_beyond, shot) = is_beyond(rays, hierarchy, leaf, place);
         ray_count += shot;

@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Cancel, Solver, reconstruct::INSET};
+use super::{Cancel, Solver, reconstruct::inset};
 use crate::{
     geometry::RayTree,
     hierarchy::{Element, Hierarchy, Mesh},
@@ -155,10 +155,11 @@ fn probe(
 
 /// Where an element is probed: its corners, a little inside, and its centroid.
 fn places(hierarchy: &Hierarchy, element: usize) -> [Vec3; 4] {
-    let centroid = hierarchy.mesh.elements[element].centroid;
-    let [a, b, c] = hierarchy.mesh.corners(element);
-    let [a, b, c] = [a, b, c].map(|corner| corner.lerp(centroid, INSET));
-    [a, b, c, centroid]
+    let corners = hierarchy.mesh.corners(element);
+    let element = &hierarchy.mesh.elements[element];
+    let inset = inset(element, corners);
+    let [a, b, c] = corners.map(|corner| corner.lerp(element.centroid, inset));
+    [a, b, c, element.centroid]
 }
 
 /// Of an element that lies within a solid in part, the probed places that do not; nothing of others.

@@ -9,7 +9,7 @@ use super::{
     Cancel,
     adapt::{DirectField, Limits, vertex_share_roots},
     direct::{DirectLight, Receiver, Tally},
-    reconstruct::INSET,
+    reconstruct::inset,
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy};
 
@@ -305,8 +305,9 @@ pub(super) fn vertex_places(
     let receiver = |(vertex, choice): (usize, Option<Choice>)| {
         let (_, leaf) = choice?;
         let patch = hierarchy.patch_of(leaf as usize);
-        let centroid = mesh.elements[leaf as usize].centroid;
-        let point = mesh.position(vertex as u32).lerp(centroid, INSET);
+        let element = &mesh.elements[leaf as usize];
+        let inset = inset(element, mesh.corners(leaf as usize));
+        let point = mesh.position(vertex as u32).lerp(element.centroid, inset);
         let normal = normals[vertex].try_normalize().unwrap_or(patch.normal);
         Some((
             vertex as u32,

@@ -14,14 +14,30 @@ use super::{
     contact::carry_over,
 };
 use crate::{
-    geometry::Vectors4,
-    hierarchy::{Hierarchy, Kind, NodeId},
+    geometry::{RAY_OFFSET, Vectors4},
+    hierarchy::{Element, Hierarchy, Kind, NodeId},
     transport::{Kernel, Link, LinkStore, Sights, self_irradiance},
 };
 
 /// Corners are moved this share of the way to the centroid before light is evaluated there: exactly on an edge, a
 /// neighbour at an angle would be seen edge-on, or from within the object that stands on it.
 pub(super) const INSET: f32 = 0.02;
+
+/// Distance from its edges at which light of an element is evaluated at least, if it is so wide: what is nearer than
+/// [`RAY_OFFSET`] a ray does not see, and a wall stands on many an edge.
+const CLEARANCE: f32 = 2.0 * RAY_OFFSET;
+
+/// Share of the way to the centroid at which light of the corners of an element is evaluated; `corners` are where they are.
+pub(super) fn inset(element: &Element, [a, b, c]: [Vec3; 3]) -> f32 {
+    let longest = (a - b).length().max((b - c).length()).max((c - a).length());
+    // From the centroid to an edge is a third of the height above that.
+    let distance = 2.0 / 3.0 * element.area_vector.length() / longest.max(f32::MIN_POSITIVE);
+    if distance * INSET >= CLEARANCE {
+        INSET
+    } else {
+        (CLEARANCE / distance.max(CLEARANCE)).min(1.0)
+    }
+}
 
 /// Patches of the clusters whose leaves are visited by one task; fewer in small scenes.
 const TASK_PATCHES: u32 = 256;

@@ -36,10 +36,10 @@ pub enum Oracle {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direct {
-    /// As measuring found best: sampled, whatever the emitters are.
+    /// Shadow rays from every vertex, spread over all emitters by the light that they give there. It was once chosen by
+    /// emitter; reports of then say `auto`.
     #[default]
-    Auto,
-    /// Shadow rays from every vertex, spread over all emitters by the light that they give there.
+    #[serde(alias = "auto")]
     Sampled,
     /// Through links, as all other light (the paper's way).
     Linked,
@@ -115,7 +115,7 @@ impl SolveSettings {
         Self {
             method: Method::Bounded,
             oracle: Oracle::Interval,
-            direct: Direct::Auto,
+            direct: Direct::Sampled,
             push: Push::Combined,
             epsilon: 0.005,
             samples: 4,

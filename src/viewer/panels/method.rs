@@ -103,11 +103,6 @@ pub(super) fn method_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSe
                         value,
                         &[
                             (
-                                Direct::Auto,
-                                "Automatic",
-                                "As measuring found best: sampled, whatever the emitters are",
-                            ),
-                            (
                                 Direct::Sampled,
                                 "Shadow rays",
                                 "From every vertex to every light: sharp shadows",
