@@ -115,6 +115,36 @@ impl Solver {
         Some(())
     }
 
+    /// Look at some elements, however small, and at all that lies on them: rays from there told that they lie within a
+    /// solid.
+    pub(super) fn probe_within(&mut self, elements: &[usize], cancel: &Cancel) -> Option<()> {
+        if elements.is_empty() || self.rays.is_clear() {
+            return Some(());
+        }
+        let mesh = &self.hierarchy.mesh;
+        let mut pending = elements.to_vec();
+        let mut leaves = Vec::new();
+        while let Some(element) = pending.pop() {
+            pending.extend(mesh.elements[element].children());
+            if mesh.elements[element].is_leaf() {
+                leaves.push(element);
+            }
+        }
+        let probed: Vec<(u8, u64)> = leaves
+            .par_iter()
+            .map(|&leaf| match cancel.is_cancelled() {
+                true => (Element::UNPROBED, 0),
+                false => probe(Some(&self.scene), &self.rays, &self.hierarchy, leaf),
+            })
+            .collect();
+        cancel.proceed()?;
+        for (leaf, (covered, shot)) in leaves.into_iter().zip(probed) {
+            self.hierarchy.mesh.elements[leaf].covered = covered;
+            self.ray_count += shot;
+        }
+        Some(())
+    }
+
     /// Elements in contact that are no larger are not divided, frame units.
     fn least_contact(&self) -> f32 {
         // The same in all steps, whose tolerances fall.

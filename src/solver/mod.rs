@@ -252,7 +252,8 @@ impl Solver {
             true => Arc::new(RayTree::new(&self.scene)),
             false => self.rays.clone(),
         };
-        let (closures, shot) = prober::closures(
+        let probed = prober::closures(
+            &self.scene,
             &self.hierarchy,
             &rays,
             &self.closures,
@@ -260,9 +261,9 @@ impl Solver {
             self.settings.seed,
             cancel,
         )?;
-        self.closures = closures;
-        self.ray_count += shot;
-        Some(())
+        self.closures = probed.closures;
+        self.ray_count += probed.ray_count;
+        self.probe_within(&probed.within, cancel)
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.

@@ -11,6 +11,7 @@ use super::{
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Element, Hierarchy},
+    scene::Scene,
 };
 
 /// Share of all rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and open places
@@ -65,6 +66,8 @@ struct Met {
     hits: f32,
     /// Rays that count.
     rays: f32,
+    /// Rays that began within a solid.
+    within: f32,
 }
 
 impl Met {
@@ -80,6 +83,9 @@ impl Met {
 
     /// The closure of each of `sharing` cells, by what their rays met and what those of their neighbourhood did.
     fn closure(self, around: Self, sharing: usize) -> Closure {
+        if self.rays == 0.0 {
+            return Closure::BURIED;
+        }
         // Of cells that share their rays it is known no better than by a few of their own.
         let rays = if sharing > 1 {
             LEAST_CELL_RAYS as f32
@@ -95,6 +101,7 @@ impl Met {
         Self {
             hits: self.hits + other.hits,
             rays: self.rays + other.rays,
+            within: self.within + other.within,
         }
     }
 }
@@ -114,18 +121,28 @@ fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure
     }
 }
 
-/// Closures of all cells for coarse links or for others, and the rays shot; `None` when cancelled. The cells are those of
-/// what is `known`, or, where nothing is, the leaves of the mesh as it is now.
+/// What is found about the cells of a mesh.
+pub(super) struct Probed {
+    pub closures: Closures,
+    /// Cells that lie within a solid, in part or as a whole, so far as rays told.
+    pub within: Vec<usize>,
+    pub ray_count: u64,
+}
+
+/// Closures of all cells for coarse links or for others; `None` when cancelled. The cells are those of what is `known`, or,
+/// where nothing is, the leaves of the mesh as it is now.
 pub(super) fn closures(
+    scene: &Scene,
     hierarchy: &Hierarchy,
     rays: &RayTree,
     known: &Closures,
     is_coarse: bool,
     seed: u64,
     cancel: &Cancel,
-) -> Option<(Closures, u64)> {
+) -> Option<Probed> {
     let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
     let prober = Prober {
+        scene,
         hierarchy,
         rays,
         seed,
@@ -151,15 +168,24 @@ pub(super) fn closures(
         false => Closure::CLOSED,
     };
     let mut of: Vec<Closure> = elements.iter().map(untold).collect();
-    for (&cell, closure) in open.into_iter().flatten().zip(found.into_iter().flatten()) {
+    let mut within = Vec::new();
+    let cells = open.into_iter().flatten();
+    for (&cell, (closure, is_within)) in cells.zip(found.into_iter().flatten()) {
         of[cell] = closure;
+        if is_within {
+            within.push(cell);
+        }
     }
-    let closures = Closures::new(hierarchy, of, is_coarse);
-    Some((closures, (looked + probed) as u64))
+    Some(Probed {
+        closures: Closures::new(hierarchy, of, is_coarse),
+        within,
+        ray_count: (looked + probed) as u64,
+    })
 }
 
 /// Shoots the rays of closures. When cancelled, what it finds is incomplete.
 struct Prober<'a> {
+    scene: &'a Scene,
     hierarchy: &'a Hierarchy,
     rays: &'a RayTree,
     seed: u64,
@@ -212,9 +238,9 @@ impl Prober<'_> {
         (open.map(|(group, _)| group.as_slice()).collect(), shot)
     }
 
-    /// The closures of all cells of some groups, group by group, and the rays spent on them. Where there are many cells,
-    /// neighbours share their rays.
-    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<Closure>>, usize) {
+    /// The closures of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
+    /// them. Where there are many cells, neighbours share their rays.
+    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(Closure, bool)>>, usize) {
         let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
         let cells = || groups.iter().copied().flatten();
         let (cell_count, whole): (usize, f32) = (cells().count(), cells().map(area).sum());
@@ -246,9 +272,13 @@ impl Prober<'_> {
             let met: Vec<Met> = group.chunks(sharing).map(look).collect();
             let mut closures = Vec::with_capacity(met.len());
             pooled(&met, Met::default(), sharing, &mut closures);
+            let is_within = met
+                .iter()
+                .flat_map(|met| std::iter::repeat_n(met.within > 0.0, sharing));
             let parts = group.chunks(sharing).zip(closures);
             parts
                 .flat_map(|(part, closure)| std::iter::repeat_n(closure, part.len()))
+                .zip(is_within)
                 .collect()
         });
         let shot = groups.iter().flat_map(|group| group.chunks(sharing));
@@ -257,7 +287,8 @@ impl Prober<'_> {
     }
 
     /// What some cosine-weighted rays from an element meet; `first` numbers them within the element. Of an element that
-    /// lies within a solid in part it is what its open places see: its links are scaled to that.
+    /// lies within a solid in part it is what its open places see: its links are scaled to that. A ray that meets the
+    /// inside of a solid began there, and does not count.
     fn probe(&self, element: usize, count: u32, first: u32) -> Met {
         let mut random = Random::new(self.seed, (u64::from(first) << 32) | element as u64);
         let shift = random.uniform_2d();
@@ -277,8 +308,16 @@ impl Prober<'_> {
             let hit = self.rays.closest(origin, direction, Some(patch.triangle));
             let is_lit =
                 hit.is_some_and(|hit| self.hierarchy.patch_met(hit.triangle, direction).is_some());
+            let is_within = hit.is_some_and(|hit| {
+                self.scene.triangles[hit.triangle.index()].bounds_solid
+                    && self.hierarchy.side_met(hit.triangle, direction).is_none()
+            });
             met.hits += f32::from(u8::from(is_lit));
-            met.rays += 1.0;
+            if is_within {
+                met.within += 1.0;
+            } else {
+                met.rays += 1.0;
+            }
         }
         met
     }
