@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::{
     Cancel, Solver,
     adapt::{Limits, vertex_share_roots},
+    anderson::Anderson,
     beyond::Beyond,
     contact::carry_over,
     direct::Receiver,
@@ -53,9 +54,12 @@ const LEAST_INDIRECT: f32 = 0.1;
 /// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
 const MOST_ROUNDS: u32 = 64;
 
-/// Rays are asked again until that changes no vertex by more than this share of the scene's mean. Larger leaves light in
-/// closed rooms, where each round takes away what walls absorb.
-const SETTLED: f32 = 1e-5;
+/// Rays are asked again until that changes no vertex by more than this part of the tolerance of sweeps, times the scene's
+/// mean. Larger leaves light in closed rooms, where each round takes away what walls absorb; smaller takes time.
+const SETTLED: f32 = 0.1;
+
+/// Rounds that are remembered to accelerate them. Fewer take longer in white rooms, more gain nothing.
+const DEPTH: usize = 3;
 
 /// What a ray met.
 #[derive(Clone, Copy)]
@@ -66,6 +70,24 @@ enum Met {
     Back,
     /// A leaf, with the shares that its first two corners have in the light there.
     Leaf(u32, [f32; 2]),
+}
+
+/// What a leaf sends, from the light at its corners.
+#[derive(Clone, Copy, Default)]
+struct Sender {
+    vertices: [u32; 3],
+    reflectance: Vec4,
+    emitted: Vec4,
+}
+
+impl Sender {
+    /// Radiosity where the first two corners have these shares, of irradiance `received` at vertices and linear between
+    /// them.
+    fn radiosity(&self, [a, b]: [f32; 2], received: &[Vec4]) -> Vec4 {
+        let [first, second, third] = self.vertices.map(|vertex| received[vertex as usize]);
+        let irradiance = first * a + second * b + third * (1.0 - a - b);
+        self.emitted + self.reflectance * irradiance
+    }
 }
 
 /// A vertex that rays look at.
@@ -109,8 +131,9 @@ impl Solver {
         let limits = self.direct_limits(1.0);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
+        let senders = self.senders();
         self.shoot(&mut looks, |_| looking, cancel)?;
-        self.ask(&mut looks, &received);
+        ask(&mut looks, &senders, &received);
         looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
         let edges = edges(&self.hierarchy);
         let is_corner = in_corners(&edges, self.hierarchy.mesh.vertices.len(), &looks, limits);
@@ -122,25 +145,30 @@ impl Solver {
                 false => look.found.rays,
             };
             self.shoot(&mut looks, more, cancel)?;
-            self.ask(&mut looks, &received);
+            ask(&mut looks, &senders, &received);
         }
-        self.gathered = self.settled_factors(&mut looks, &edges, &linked, &direct, cancel)?;
+        let light = [&linked, &direct].map(Vec::as_slice);
+        self.gathered =
+            self.settled_factors(&mut looks, &senders, &edges, light, received, cancel)?;
         Some(())
     }
 
-    /// Ask what rays met for its light, correct the light at the vertices, and ask again until nothing changes. Returns
-    /// factors by vertex.
+    /// Correct the light at the vertices by what rays found where `received` was, ask them again, and so on until nothing
+    /// changes. Returns factors by vertex.
     fn settled_factors(
         &self,
         looks: &mut [Look],
+        senders: &[Sender],
         edges: &[[usize; 2]],
-        linked: &[Vec4],
-        direct: &[Vec4],
+        [linked, direct]: [&[Vec4]; 2],
+        mut received: Vec<Vec4>,
         cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.hierarchy.mesh;
         let tells = |element: &Element, side| !element.is_covered(side);
-        let mut received: Vec<Vec4> = Vec::new();
+        let most = SETTLED * self.settings.tolerance * self.mean_irradiance;
+        let areas = mesh.areas_about_vertices();
+        let mut acceleration = Anderson::new(DEPTH);
         let mut round = 0;
         loop {
             cancel.proceed()?;
@@ -156,14 +184,12 @@ impl Solver {
             let change = changes
                 .map(|(new, old)| luminance((new - old).abs()))
                 .fold(0.0, f32::max);
-            let is_first = received.is_empty();
-            received = corrected;
             round += 1;
-            let is_settled = !is_first && change <= SETTLED * self.mean_irradiance;
-            if is_settled || round >= MOST_ROUNDS {
+            if change <= most || round >= MOST_ROUNDS {
                 return Some(factors);
             }
-            self.ask(looks, &received);
+            received = acceleration.next(&areas, &received, &corrected);
+            ask(looks, senders, &received);
         }
     }
 
@@ -256,30 +282,41 @@ impl Solver {
         Met::Leaf(leaf as u32, [a, b])
     }
 
-    /// Count the radiosity of what rays met, of irradiance `received` at vertices and linear between them.
-    fn ask(&self, looks: &mut [Look], received: &[Vec4]) {
-        let radiosity = |met: &Met| match *met {
-            Met::Nothing => Some(Vec4::ZERO),
-            Met::Back => None,
-            Met::Leaf(leaf, [a, b]) => {
-                let vertices = self.hierarchy.mesh.elements[leaf as usize].vertices;
-                let shares = [a, b, 1.0 - a - b];
-                let irradiance: Vec4 = vertices
-                    .into_iter()
-                    .zip(shares)
-                    .map(|(vertex, share)| received[vertex as usize] * share)
-                    .sum();
-                let radiosity = self.radiosity_under(leaf as usize, irradiance);
-                Some(radiosity.with_w(0.0))
+    /// What each element sends over links if it is a leaf.
+    fn senders(&self) -> Vec<Sender> {
+        let elements = &self.hierarchy.mesh.elements;
+        let sender = |index: usize| {
+            let emitted = self.radiosity_under(index, Vec4::ZERO).with_w(0.0);
+            let lit = self.radiosity_under(index, Vec4::ONE).with_w(0.0);
+            Sender {
+                vertices: elements[index].vertices,
+                reflectance: lit - emitted,
+                emitted,
             }
         };
-        looks.par_iter_mut().with_min_len(64).for_each(|look| {
-            look.found = Gathered::default();
-            for met in &look.met {
-                look.found.count(radiosity(met));
-            }
-        });
+        (0..elements.len())
+            .into_par_iter()
+            .map(|index| match elements[index].is_leaf() {
+                true => sender(index),
+                false => Sender::default(),
+            })
+            .collect()
     }
+}
+
+/// Count the radiosity of what rays met, of irradiance `received` at vertices.
+fn ask(looks: &mut [Look], senders: &[Sender], received: &[Vec4]) {
+    let radiosity = |met: &Met| match *met {
+        Met::Nothing => Some(Vec4::ZERO),
+        Met::Back => None,
+        Met::Leaf(leaf, shares) => Some(senders[leaf as usize].radiosity(shares, received)),
+    };
+    looks.par_iter_mut().with_min_len(64).for_each(|look| {
+        look.found = Gathered::default();
+        for met in &look.met {
+            look.found.count(radiosity(met));
+        }
+    });
 }
 
 /// Vertices at the ends of the edges of leaves; inner edges come twice.
