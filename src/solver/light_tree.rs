@@ -160,10 +160,9 @@ impl LightTree {
 
     /// Irradiance at a receiver without occlusion; `cut` becomes where it comes from, in the order of the tree.
     pub(super) fn unoccluded(&self, receiver: &Receiver, cut: &mut Vec<Arriving>) -> Vec4 {
-        let tolerance = match self.emitters.len() {
-            ..=FEW_EMITTERS => 0.0,
-            _ => CUT_TOLERANCE * self.rough_irradiance(receiver),
-        };
+        // Where nothing arrives it is 0, and what is behind the receiver or faces away is passed over all the same.
+        let tolerance = (self.emitters.len() > FEW_EMITTERS)
+            .then(|| CUT_TOLERANCE * self.rough_irradiance(receiver));
         cut.clear();
         let (mut sum, mut until) = (Vec4::ZERO, 0.0);
         let mut add = |target: Target, irradiance: Vec4| {
@@ -175,7 +174,7 @@ impl LightTree {
         while let Some(node) = self.nodes.get(at) {
             let index = at;
             at = node.next as usize;
-            if tolerance > 0.0 {
+            if let Some(tolerance) = tolerance {
                 let Some(sight) = node.light.sight(receiver) else {
                     continue;
                 };
