@@ -3,12 +3,12 @@
 
 mod boxes;
 
-use std::f32::consts::PI;
+use std::{f32::consts::PI, f64::consts::TAU};
 
-use boxes::{cuboid, solved};
+use boxes::{cuboid, mean_irradiance, solved};
 use glam::{DVec3, Vec3};
 use vecrad::{
-    scene::{Material, SceneBuilder, Sides},
+    scene::{Material, MaterialId, SceneBuilder, Sides},
     solver::{Direct, Snapshot, SolveSettings},
 };
 
@@ -140,4 +140,55 @@ fn share_of_face(point: Vec3, low: Vec3, high: Vec3) -> f32 {
         ((width / distance).atan() - distance / slant * (width / slant).atan()) / (2.0 * PI)
     };
     half(high.x - point.x) + half(point.x - low.x)
+}
+
+/// A closed ring about an axis, of many small triangles.
+fn ring(builder: &mut SceneBuilder, centre: DVec3, axis: usize, paint: MaterialId) {
+    const AROUND: u32 = 32;
+    const ACROSS: u32 = 16;
+    let turn = |step: u32, of: u32| TAU * f64::from(step % of) / f64::from(of);
+    let corner = |around: u32, across: u32| {
+        let (sine, cosine) = turn(around, AROUND).sin_cos();
+        let (height, inward) = turn(across, ACROSS).sin_cos();
+        let distance = 0.6 + 0.2 * inward;
+        let mut place = [0.0; 3];
+        place[axis] = 0.2 * height;
+        place[(axis + 1) % 3] = distance * cosine;
+        place[(axis + 2) % 3] = distance * sine;
+        centre + DVec3::from_array(place)
+    };
+    let corners: Vec<u32> = (0..AROUND * ACROSS)
+        .map(|index| builder.push_position(corner(index / ACROSS, index % ACROSS)))
+        .collect();
+    let at =
+        |around: u32, across: u32| corners[(around % AROUND * ACROSS + across % ACROSS) as usize];
+    for (around, across) in (0..AROUND).flat_map(|a| (0..ACROSS).map(move |b| (a, b))) {
+        let [a, b, c, d] =
+            [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| at(around + x, across + y));
+        builder.push_triangle([a, b, c], paint);
+        builder.push_triangle([a, c, d], paint);
+    }
+}
+
+#[test]
+fn what_lies_within_fine_solids_takes_no_light_from_the_room_about_them() {
+    let (emitted, reflectance) = (0.1, 0.9);
+    let mut builder = SceneBuilder::default();
+    let material = Material::plain("glowing", Vec3::splat(reflectance), Vec3::splat(emitted));
+    let paint = builder.push_material(material);
+    let room = [DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 2.0, 1.0)];
+    cuboid(&mut builder, room[0], room[1], true, paint);
+    for axis in 0..3 {
+        ring(&mut builder, DVec3::Y, axis, paint);
+    }
+    let snapshot = solved(builder, Sides::One, SolveSettings::draft());
+    let is_wall = |at: Vec3, _: Vec3| (at - Vec3::Y).abs().max_element() > 0.999;
+    let (mean, _, most) = mean_irradiance(&snapshot, is_wall);
+    let expected = f64::from(PI * emitted / (1.0 - reflectance));
+    // Of the light that falls on the rings a part would be lost at each of ten bounces.
+    assert!(
+        (mean / expected - 1.0).abs() < 0.025,
+        "{mean} of {expected}"
+    );
+    assert!(f64::from(most) < 1.025 * expected, "{most} of {expected}");
 }

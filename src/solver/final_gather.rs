@@ -285,20 +285,21 @@ impl Solver {
     /// What each element sends over links if it is a leaf.
     fn senders(&self) -> Vec<Sender> {
         let elements = &self.hierarchy.mesh.elements;
-        let sender = |index: usize| {
-            let emitted = self.radiosity_under(index, Vec4::ZERO).with_w(0.0);
-            let lit = self.radiosity_under(index, Vec4::ONE).with_w(0.0);
-            Sender {
-                vertices: elements[index].vertices,
-                reflectance: lit - emitted,
-                emitted,
-            }
+        let sender = |index: usize| Sender {
+            vertices: elements[index].vertices,
+            reflectance: self.hierarchy.reflectance_of(index).extend(0.0),
+            emitted: self.radiosity_under(index, Vec4::ZERO).with_w(0.0),
         };
         (0..elements.len())
             .into_par_iter()
-            .map(|index| match elements[index].is_leaf() {
-                true => sender(index),
-                false => Sender::default(),
+            .map(|index| {
+                let element = &elements[index];
+                let sends = element.is_leaf() && !element.is_buried();
+                if sends {
+                    sender(index)
+                } else {
+                    Sender::default()
+                }
             })
             .collect()
     }

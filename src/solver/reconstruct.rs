@@ -27,6 +27,10 @@ pub(super) const INSET: f32 = 0.02;
 /// [`RAY_OFFSET`] a ray does not see, and a wall stands on many an edge.
 const CLEARANCE: f32 = 2.0 * RAY_OFFSET;
 
+/// But never further than this share of the way to the centroid. More, and small elements show light of another place; less,
+/// and narrow ones along walls show light of beyond.
+const MOST_INSET: f32 = 0.2;
+
 /// Share of the way to the centroid at which light of the corners of an element is evaluated; `corners` are where they are.
 pub(super) fn inset(element: &Element, [a, b, c]: [Vec3; 3]) -> f32 {
     let longest = (a - b).length().max((b - c).length()).max((c - a).length());
@@ -35,7 +39,7 @@ pub(super) fn inset(element: &Element, [a, b, c]: [Vec3; 3]) -> f32 {
     if distance * INSET >= CLEARANCE {
         INSET
     } else {
-        (CLEARANCE / distance.max(CLEARANCE)).min(1.0)
+        (CLEARANCE / distance.max(f32::MIN_POSITIVE)).min(MOST_INSET)
     }
 }
 
