@@ -66,6 +66,8 @@ pub struct App {
     keeps_view: bool,
     /// Whether a control had the keyboard focus at the end of the last frame.
     had_focus: bool,
+    /// Size of the window in the last frame, points.
+    size: egui::Vec2,
 }
 
 impl App {
@@ -127,6 +129,7 @@ impl App {
             title: None,
             keeps_view: false,
             had_focus: false,
+            size: egui::Vec2::ZERO,
         };
         if let Some(up) = options.camera.up {
             app.state.rig.target.up = up;
@@ -203,6 +206,12 @@ impl eframe::App for App {
         dropping::hover_ui(&ctx);
         if self.state.loading.is_some() {
             ctx.request_repaint_after(PROGRESS);
+        }
+        // Bars that wrap take the height that they needed in the frame before.
+        let size = ctx.content_rect().size();
+        if size != self.size {
+            self.size = size;
+            ctx.request_repaint();
         }
         focus::ring_ui(&ctx);
         self.had_focus = focus::is_anywhere(&ctx);
