@@ -85,30 +85,40 @@ impl Solver {
             .held_leaves()
             .filter(|&leaf| elements[leaf].covered == Element::UNPROBED)
             .collect();
+        let is_looked_at = |leaf: usize| {
+            let element = &elements[leaf];
+            let above = elements.get(element.parent as usize);
+            let whole = elements[element.patch as usize].area_vector.length();
+            element.area_vector.length() > LOOKED_AT * least
+                || above.is_some_and(|parent| match parent.covered {
+                    Element::UNPROBED => whole > LOOKED_AT * least,
+                    covered => covered != 0,
+                })
+        };
+        let (wanted, spared): (Vec<usize>, Vec<usize>) =
+            fresh.into_iter().partition(|&leaf| is_looked_at(leaf));
+        self.probe_leaves(&wanted, cancel)?;
+        for leaf in spared {
+            self.hierarchy.mesh.elements[leaf].covered = 0;
+        }
+        Some(())
+    }
+
+    /// Find out which of some leaves lie within solids.
+    fn probe_leaves(&mut self, leaves: &[usize], cancel: &Cancel) -> Option<()> {
         let mut triangles = self.scene.triangles.iter();
         let solids = triangles
             .any(|triangle| triangle.bounds_solid)
             .then_some(&*self.scene);
-        let probed: Vec<(u8, u64)> = fresh
+        let probed: Vec<(u8, u64)> = leaves
             .par_iter()
-            .map(|&leaf| {
-                let element = &elements[leaf];
-                let above = elements.get(element.parent as usize);
-                let whole = elements[element.patch as usize].area_vector.length();
-                let may_be = element.area_vector.length() > LOOKED_AT * least
-                    || above.is_some_and(|parent| match parent.covered {
-                        Element::UNPROBED => whole > LOOKED_AT * least,
-                        covered => covered != 0,
-                    });
-                if may_be && !cancel.is_cancelled() {
-                    probe(solids, &self.rays, &self.hierarchy, leaf)
-                } else {
-                    (0, 0)
-                }
+            .map(|&leaf| match cancel.is_cancelled() {
+                true => (0, 0),
+                false => probe(solids, &self.rays, &self.hierarchy, leaf),
             })
             .collect();
         cancel.proceed()?;
-        for (leaf, (covered, shot)) in fresh.into_iter().zip(probed) {
+        for (&leaf, (covered, shot)) in leaves.iter().zip(probed) {
             self.hierarchy.mesh.elements[leaf].covered = covered;
             self.ray_count += shot;
         }
@@ -130,19 +140,7 @@ impl Solver {
                 leaves.push(element);
             }
         }
-        let probed: Vec<(u8, u64)> = leaves
-            .par_iter()
-            .map(|&leaf| match cancel.is_cancelled() {
-                true => (Element::UNPROBED, 0),
-                false => probe(Some(&self.scene), &self.rays, &self.hierarchy, leaf),
-            })
-            .collect();
-        cancel.proceed()?;
-        for (leaf, (covered, shot)) in leaves.into_iter().zip(probed) {
-            self.hierarchy.mesh.elements[leaf].covered = covered;
-            self.ray_count += shot;
-        }
-        Some(())
+        self.probe_leaves(&leaves, cancel)
     }
 
     /// Elements in contact that are no larger are not divided, frame units.

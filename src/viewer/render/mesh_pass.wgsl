@@ -80,23 +80,21 @@ fn exposed(radiance: vec3<f32>) -> vec4<f32> {
     return vec4<f32>(clamp(radiance * view.display.y, vec3<f32>(0.0), vec3<f32>(BRIGHTEST)), 1.0);
 }
 
-// With the texture where it shows in detail.
-fn shown_reflectance(surface: Surface) -> vec3<f32> {
-    let place = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
-    let texel = textureSample(reflectance_texture, detail_sampler, place);
-    if (detail.reflectance.w * view.display.w > 0.5) {
-        return detail.reflectance.rgb * texel.rgb;
+// A colour of the surface, with its texture where that shows in detail.
+fn in_detail(map: texture_2d<f32>, paint: vec4<f32>, mean: vec3<f32>, texcoord: vec2<f32>) -> vec3<f32> {
+    let texel = textureSample(map, detail_sampler, vec2<f32>(texcoord.x, 1.0 - texcoord.y));
+    if (paint.w * view.display.w > 0.5) {
+        return paint.rgb * texel.rgb;
     }
-    return surface.reflectance;
+    return mean;
+}
+
+fn shown_reflectance(surface: Surface) -> vec3<f32> {
+    return in_detail(reflectance_texture, detail.reflectance, surface.reflectance, surface.texcoord);
 }
 
 fn shown_emission(surface: Surface) -> vec3<f32> {
-    let place = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
-    let texel = textureSample(emission_texture, detail_sampler, place);
-    if (detail.emission.w * view.display.w > 0.5) {
-        return detail.emission.rgb * texel.rgb;
-    }
-    return surface.emission;
+    return in_detail(emission_texture, detail.emission, surface.emission, surface.texcoord);
 }
 
 @fragment
