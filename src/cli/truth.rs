@@ -83,13 +83,14 @@ impl Truth {
             seed,
             ..MatrixSettings::default()
         };
-        let solution = solve_matrix(scene, &RayTree::new(scene), &settings, cancel)?;
+        let rays = RayTree::new(scene);
+        let solution = solve_matrix(scene, &rays, &settings, cancel)?;
         let patches: HashMap<(TriangleId, bool), &MatrixPatch> = solution
             .patches
             .iter()
             .map(|patch| ((patch.triangle, patch.is_back), patch))
             .collect();
-        let (chosen, surfaces) = sample_points(scene, MATRIX_POINTS, seed);
+        let (chosen, surfaces) = sample_points(scene, &rays, MATRIX_POINTS, seed);
         let (mut points, mut probes) = (Vec::new(), Vec::new());
         let patch_of = |point: &ReferencePoint| patches.get(&(point.triangle, point.is_back));
         for patch in chosen.iter().filter_map(patch_of) {

@@ -114,7 +114,7 @@ pub struct PathTracer {
 impl PathTracer {
     /// Choose the points. `rays` is the ray tree of the scene.
     pub fn new(scene: Arc<Scene>, rays: Arc<RayTree>, settings: PathSettings) -> Self {
-        let (points, surfaces) = sample_points(&scene, settings.point_count, settings.seed);
+        let (points, surfaces) = sample_points(&scene, &rays, settings.point_count, settings.seed);
         Self {
             emitters: Emitters::new(&scene),
             sums: vec![Sums::default(); points.len()],

@@ -6,14 +6,14 @@
 //! area: what lies within reach of the objects, and the surroundings. Both have half of the points, so that plain means
 //! over all points are means of both groups.
 
-use std::{collections::HashMap, fmt};
+use std::{cell::LazyCell, collections::HashMap, fmt};
 
 use glam::{DVec3, Vec2, Vec3};
 use serde::Serialize;
 
-use super::ReferencePoint;
+use super::{ReferencePoint, emitters::Emitters};
 use crate::{
-    geometry::{Random, low_discrepancy_2d, triangle_point},
+    geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     scene::{DisjointSets, Scene, TriangleId},
 };
 
@@ -60,9 +60,24 @@ const REACH: f64 = 8.0;
 /// Surroundings count for this part at most.
 const SURROUNDINGS_SHARE: f64 = 0.5;
 
+/// Where this part of all points would lie near the objects anyway, there are no surroundings. Smaller, and too few points
+/// are left for the objects; larger, and means over a room are no longer those over its area.
+const ENOUGH_SHARE: f64 = 0.125;
+
+/// What lies near the objects receives this part of what their lamps emit at least. Smaller, and the ceiling behind a lamp
+/// is all that is looked at; larger, and the reach of a lamp that shines past its object grows without end.
+const LEAST_LIGHT: f64 = 0.25;
+
+/// Rays that tell where the light of lamps lands.
+const LIGHT_RAYS: u32 = 256;
+
+/// Their stream of random numbers, apart from those of points.
+const LIGHT_STREAM: u64 = 1 << 63;
+
 /// Choose `count` points, not yet lit; fewer where there is no surface. The same for the same seed.
 pub fn sample_points(
     scene: &Scene,
+    rays: &RayTree,
     count: u32,
     seed: u64,
 ) -> (Vec<ReferencePoint>, SampledSurfaces) {
@@ -84,7 +99,7 @@ pub fn sample_points(
     };
     let mut drawn = draw(scene, &whole(&all), count, &mut Random::new(seed, u64::MAX));
     drawn.retain(counts);
-    let region = ObjectRegion::find(scene, &counted);
+    let region = ObjectRegion::find(scene, &counted, || light_paths(scene, rays, seed));
     let groups = match &region {
         None => vec![(drawn, whole(&counted), count)],
         Some(region) => {
@@ -305,6 +320,26 @@ fn typical_size(components: &[Component]) -> f64 {
     quantile(|_| 1.0).min(quantile(|piece| piece.1))
 }
 
+/// Where some light of the emitters starts and where it lands, each of the same power.
+fn light_paths(scene: &Scene, rays: &RayTree, seed: u64) -> Vec<[DVec3; 2]> {
+    let emitters = Emitters::new(scene);
+    let mut random = Random::new(seed, LIGHT_STREAM);
+    let path = |index: u32| {
+        let square = low_discrepancy_2d(index, random.uniform_2d());
+        let choice = (f64::from(index) + 0.5) / f64::from(LIGHT_RAYS);
+        let from = emitters.sample(scene, choice, square)?;
+        let front = scene.surfaces[from.triangle.index()]
+            .area_vector
+            .normalize_or_zero();
+        let is_back = scene.triangles[from.triangle.index()].two_sided && random.uniform() < 0.5;
+        let direction = cosine_direction(if is_back { -front } else { front }, random.uniform_2d());
+        let hit = rays.closest(from.position, direction, Some(from.triangle))?;
+        let to = from.position + direction * hit.distance;
+        Some([from.position.as_dvec3(), to.as_dvec3()])
+    };
+    (0..LIGHT_RAYS).filter_map(path).collect()
+}
+
 /// The box around the objects of a scene and what is within their reach.
 struct ObjectRegion {
     min: DVec3,
@@ -314,14 +349,19 @@ struct ObjectRegion {
 }
 
 impl ObjectRegion {
-    /// The region, where more than [`SURROUNDINGS_SHARE`] of the area that counts lies beyond.
-    fn find(scene: &Scene, counted: &[Side]) -> Option<Self> {
+    /// The region, where most of the area that counts lies beyond.
+    fn find(
+        scene: &Scene,
+        counted: &[Side],
+        light_paths: impl FnOnce() -> Vec<[DVec3; 2]>,
+    ) -> Option<Self> {
         let components = components(scene);
         let total: f64 = counted
             .iter()
             .map(|side| area_of(scene, side.triangle))
             .sum();
         let mut reach = REACH * typical_size(&components);
+        let light = LazyCell::new(light_paths);
         loop {
             let region = Self::around(&components, reach);
             if components
@@ -332,12 +372,11 @@ impl ObjectRegion {
             }
             let (inside, _) = region.split(scene, counted);
             let area: f64 = inside.iter().map(|piece| piece.area).sum();
-            if area >= (1.0 - SURROUNDINGS_SHARE) * total {
+            if area >= ENOUGH_SHARE * total {
                 return None;
             }
-            // A lamp that hangs high above the ground has nothing in its reach but light.
             let size = reach / REACH;
-            if area >= size * size {
+            if area >= size * size && region.holds_light(&light) {
                 return Some(region);
             }
             reach = (2.0 * reach).max(f64::MIN_POSITIVE);
@@ -358,6 +397,16 @@ impl ObjectRegion {
 
     fn contains(&self, point: DVec3) -> bool {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
+    }
+
+    /// Whether what the lamps within emit lands there, as far as it lands anywhere: a lamp that hangs high above the ground
+    /// has nothing in its reach but light.
+    fn holds_light(&self, paths: &[[DVec3; 2]]) -> bool {
+        let own = paths.iter().filter(|[from, _]| self.contains(*from));
+        let (landed, all) = own.fold((0, 0), |(landed, all), [_, to]| {
+            (landed + u32::from(self.contains(*to)), all + 1)
+        });
+        f64::from(landed) >= LEAST_LIGHT * f64::from(all)
     }
 
     /// The parts of the sides inside and outside.
@@ -460,7 +509,8 @@ mod tests {
                 ..SceneOptions::default()
             };
             let scene = self.0.finish(&options).unwrap();
-            let (points, surfaces) = sample_points(&scene, COUNT, 1);
+            let rays = RayTree::new(&scene);
+            let (points, surfaces) = sample_points(&scene, &rays, COUNT, 1);
             assert_eq!(points.len(), COUNT as usize);
             for point in &points {
                 assert!((point.barycentric.element_sum() - 1.0).abs() < 1e-5);
@@ -484,7 +534,8 @@ mod tests {
                 .unwrap()
                 .scene(&SceneOptions::default())
                 .unwrap();
-            let (points, surfaces) = sample_points(&scene, COUNT, 7);
+            let rays = RayTree::new(&scene);
+            let (points, surfaces) = sample_points(&scene, &rays, COUNT, 7);
             assert_eq!(surfaces, SampledSurfaces::default(), "{name}");
             assert_eq!(points.len(), COUNT as usize);
             assert!(points.iter().all(|point| point.emission == Vec3::ZERO));
@@ -561,6 +612,25 @@ mod tests {
         // On the ground alone there would be one in 80,000.
         let lit = near(&scene, &points, DVec3::ZERO, 4.0);
         assert!(lit > 1500, "{lit}");
+    }
+
+    #[test]
+    fn a_tiny_lamp_in_a_room_leaves_means_over_the_area() {
+        let mut maker = Maker::new();
+        for half in [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 5.0) {
+            for (n, turned) in [(half, true), (-half, false)] {
+                let u = DVec3::new(half.y, half.z, half.x);
+                let v = DVec3::new(half.z, half.x, half.y);
+                let (first, second) = if turned { (v, u) } else { (u, v) };
+                maker.grid(n - u - v, 2.0 * first, 2.0 * second, 1, GREY);
+            }
+        }
+        let (x, z) = (DVec3::X, DVec3::Z);
+        maker.grid(DVec3::Y * 4.99, x * 1e-3, z * 1e-3, 1, LIGHT);
+        let (scene, points, surfaces) = maker.sample();
+        assert_eq!(surfaces.reach, None);
+        let by_lamp = near(&scene, &points, DVec3::Y * 5.0, 1.0);
+        assert!(by_lamp < COUNT as usize / 100, "{by_lamp}");
     }
 
     #[test]

@@ -38,6 +38,10 @@ const HIDDEN_TOLERANCE: f32 = 4.0;
 /// divides without end where a lamp touches a surface; larger misses the light about a lamp far smaller than the scene.
 const SMOOTH_SHARE: f32 = 1e-6;
 
+/// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance: it is
+/// then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
+const BEND_SCALE: f32 = 30.0;
+
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
 
@@ -345,7 +349,13 @@ impl DirectField {
             return 0.0;
         }
         let centre = centre_of(hierarchy, element);
-        let at_centre = luminance(self.lights.unoccluded(&centre, &mut Vec::new()));
+        // What is off by far less than the tolerance tells as much.
+        let brightest_corner = corners.into_iter().fold(0.0, f32::max);
+        let scale = brightest_corner.max(BEND_SCALE * limits.tolerance / weight);
+        let at_centre = self
+            .lights
+            .unoccluded(&centre, Some(scale), &mut Vec::new());
+        let at_centre = luminance(at_centre);
         (at_centre - corners.iter().sum::<f32>() / 3.0).abs() * weight
     }
 

@@ -26,6 +26,7 @@ impl Solver {
             + self.links.memory_bytes()
             + self.closures.memory_bytes()
             + size_of_val(self.linked.as_slice())
+            + size_of_val(self.sending.as_slice())
             + size_of_val(self.leaves.as_slice())
             + size_of_val(self.gathered.as_slice())
             + self.direct.as_ref().map_or(0, DirectField::memory_bytes)

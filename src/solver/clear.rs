@@ -45,7 +45,7 @@ impl Lights {
                 normal: patch.normal,
                 triangle: patch.triangle,
             };
-            luminance(self.unoccluded(&receiver, &mut sums))
+            luminance(self.unoccluded(&receiver, None, &mut sums))
         };
         let corners = Vec3::from_array(Vec3::AXES.map(&mut light));
         let bend = PLACES

@@ -31,11 +31,6 @@ const SURPLUS: f32 = 0.1;
 /// colour, more of what lies far off.
 const NEIGHBOURS: u32 = 16;
 
-/// Sums of form factors that are too large by so little that they must be multiplied by more than this are treated as
-/// those that are too small: both are noise. Smaller, and what counts too much is taken for dark; larger, and light is
-/// lost on average (up to 0.2 % at `normal` with 1).
-const SLIGHT: f32 = 0.8;
-
 /// How much of a cell's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Closure {
@@ -111,14 +106,14 @@ impl Closure {
 /// darker.
 fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
     let color = light.truncate();
-    if factor <= SLIGHT || light.w <= 0.0 {
+    if factor <= 1.0 || light.w <= 0.0 {
         return (color * factor).extend(light.w);
     }
     let seen = color / light.w;
     let is_darker = luminance(nearby.extend(0.0)) < luminance(seen.extend(0.0));
     let missing = if is_darker { nearby } else { seen };
     let whole = color + missing * ((factor - 1.0) * light.w);
-    whole.max(Vec3::ZERO).extend(light.w)
+    whole.extend(light.w)
 }
 
 /// Closures of the cells of a mesh: of its leaves as they were before light was known.
@@ -193,6 +188,26 @@ impl Solver {
     /// `bounds_rows`.
     pub(super) fn scale_to_closure(&self, irradiance: &mut [Vec4], bounds_rows: bool) {
         let elements = &self.hierarchy.mesh.elements;
+        let factors = self.closure_factors(irradiance);
+        irradiance
+            .par_iter_mut()
+            .zip(elements.par_iter().zip(factors))
+            .with_min_len(1024)
+            .for_each(|(value, (element, factor))| {
+                let Some(factor) = factor else { return };
+                let most = if bounds_rows && value.w > 0.0 {
+                    1.0 / value.w
+                } else {
+                    f32::INFINITY
+                };
+                let nearby = self.closures.nearby(&self.power, element.patch as usize);
+                *value = multiplied(*value, factor.min(most), nearby);
+            });
+    }
+
+    /// What irradiance of each leaf must be multiplied by, given the sums of form factors in `w`; `None` for other elements.
+    pub(super) fn closure_factors(&self, irradiance: &[Vec4]) -> Vec<Option<f32>> {
+        let elements = &self.hierarchy.mesh.elements;
         let cell_count = self.closures.of.len();
         let cell = |index| self.closures.cell(&self.hierarchy, index);
         // Area and sum of form factors times area, by cell.
@@ -210,24 +225,16 @@ impl Solver {
             let sum = &mut sums[cell(index)];
             *sum = (sum.0 + area, sum.1 + weighted);
         }
-        irradiance
-            .par_iter_mut()
-            .zip(elements)
-            .enumerate()
+        (0..elements.len())
+            .into_par_iter()
             .with_min_len(1024)
-            .filter(|(_, (_, element))| element.is_leaf())
-            .for_each(|(index, (value, _))| {
+            .map(|index| {
                 let cell = cell(index);
-                let factor = self.closures.of(cell).factor_for(value.w, sums[cell]);
-                let most = if bounds_rows && value.w > 0.0 {
-                    1.0 / value.w
-                } else {
-                    f32::INFINITY
-                };
-                let patch = elements[index].patch as usize;
-                let nearby = self.closures.nearby(&self.power, patch);
-                *value = multiplied(*value, factor.min(most), nearby);
-            });
+                let closure = self.closures.of(cell);
+                let is_leaf = elements[index].is_leaf();
+                is_leaf.then(|| closure.factor_for(irradiance[index].w, sums[cell]))
+            })
+            .collect()
     }
 }
 

@@ -187,7 +187,8 @@ impl Lights {
         if samples.is_empty() {
             return;
         }
-        light.exact = self.unoccluded(receiver, cut);
+        let known = (light.tried > 0).then(|| luminance(light.exact));
+        light.exact = self.unoccluded(receiver, known, cut);
         light.tried = samples.end.max(light.tried);
         if rays.is_clear() {
             light.arrive_whole();
@@ -249,9 +250,14 @@ impl Lights {
         }
     }
 
-    /// Irradiance without occlusion; `cut` becomes where it comes from.
-    pub(super) fn unoccluded(&self, receiver: &Receiver, cut: &mut Vec<Arriving>) -> Vec4 {
-        self.tree.unoccluded(receiver, cut)
+    /// As [`LightTree::unoccluded`].
+    pub(super) fn unoccluded(
+        &self,
+        receiver: &Receiver,
+        scale: Option<f32>,
+        cut: &mut Vec<Arriving>,
+    ) -> Vec4 {
+        self.tree.unoccluded(receiver, scale, cut)
     }
 }
 

@@ -180,7 +180,7 @@ impl Solver {
         self.scale_to_closure(&mut image, bounds_rows);
         cancel.proceed()?;
         Some(Sweep {
-            sent: self.leaf_sum(|leaf| self.power.elements[leaf]) + self.sampled_power(),
+            sent: self.leaf_sum(|leaf| self.radiosity(leaf)) + self.sampled_power(),
             returned: returned(&image),
             returned_unscaled,
             arrived: self.leaf_sum(|leaf| image[leaf] + direct[leaf]),

@@ -158,11 +158,17 @@ impl LightTree {
         [node + 1, self.nodes[node + 1].next as usize]
     }
 
-    /// Irradiance at a receiver without occlusion; `cut` becomes where it comes from, in the order of the tree.
-    pub(super) fn unoccluded(&self, receiver: &Receiver, cut: &mut Vec<Arriving>) -> Vec4 {
+    /// Irradiance at a receiver without occlusion; `cut` becomes where it comes from, in the order of the tree. Errors are
+    /// relative to a luminance: that of all light at the receiver, where `None`.
+    pub(super) fn unoccluded(
+        &self,
+        receiver: &Receiver,
+        scale: Option<f32>,
+        cut: &mut Vec<Arriving>,
+    ) -> Vec4 {
         // Where nothing arrives it is 0, and what is behind the receiver or faces away is passed over all the same.
         let tolerance = (self.emitters.len() > FEW_EMITTERS)
-            .then(|| CUT_TOLERANCE * self.rough_irradiance(receiver));
+            .then(|| CUT_TOLERANCE * scale.unwrap_or_else(|| self.rough_irradiance(receiver)));
         cut.clear();
         let (mut sum, mut until) = (Vec4::ZERO, 0.0);
         let mut add = |target: Target, irradiance: Vec4| {
@@ -605,7 +611,7 @@ mod tests {
             let (mut cut, mut sizes, mut worst, mut squares) = (Vec::new(), 0, 0.0_f32, 0.0);
             let receivers = receivers(400);
             for receiver in &receivers {
-                let found = tree.unoccluded(receiver, &mut cut);
+                let found = tree.unoccluded(receiver, None, &mut cut);
                 sizes += cut.len();
                 let parts = tree.emitters.iter().map(|emitter| {
                     let part = point_irradiance(receiver.point, receiver.normal, emitter.corners);
@@ -637,7 +643,7 @@ mod tests {
                 .filter(|receiver| receiver.point.z < 2.0)
                 .collect();
             let sizes = receivers.iter().map(|receiver| {
-                tree.unoccluded(receiver, &mut cut);
+                tree.unoccluded(receiver, None, &mut cut);
                 cut.len()
             });
             sizes.sum::<usize>() / receivers.len()
@@ -653,7 +659,7 @@ mod tests {
             let tree = lamps.tree();
             for receiver in receivers(20) {
                 let mut cut = Vec::new();
-                tree.unoccluded(&receiver, &mut cut);
+                tree.unoccluded(&receiver, None, &mut cut);
                 for part in cut.iter().step_by(7) {
                     let Target::Node(node) = part.target else {
                         continue;
@@ -727,7 +733,7 @@ mod tests {
             normal: Vec3::Z,
             triangle: TriangleId(u32::MAX),
         };
-        let found = luminance(tree.unoccluded(&receiver, &mut cut));
+        let found = luminance(tree.unoccluded(&receiver, None, &mut cut));
         let one = point_irradiance(Vec3::ZERO, Vec3::Z, lamps.0[0].corners)
             + point_irradiance(Vec3::ZERO, Vec3::Z, lamps.0[1].corners);
         assert!((found / (5000.0 * one) - 1.0).abs() < 1e-3);

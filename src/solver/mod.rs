@@ -6,6 +6,7 @@
 
 mod adapt;
 mod anderson;
+mod balance;
 mod beyond;
 mod border;
 mod budget;
@@ -130,6 +131,8 @@ pub struct Solver {
     direct: Option<DirectField>,
     /// Linked irradiance of every element, scaled so that form factors add to the closure; `w` is their raw sum.
     linked: Vec<Vec4>,
+    /// By element, what its radiosity is multiplied by before links carry it (see [`balance`]); 1 without links.
+    sending: Vec<f32>,
     /// Part of the view of each piece of surface that lit surfaces fill.
     closures: Closures,
     leaves: Vec<LeafLight>,
@@ -196,6 +199,7 @@ impl Solver {
             links: LinkStore::default(),
             direct: None,
             linked: vec![Vec4::ZERO; hierarchy.mesh.elements.len()],
+            sending: vec![1.0; hierarchy.mesh.elements.len()],
             leaves: Vec::new(),
             gathered: Vec::new(),
             mean_irradiance: 0.0,
@@ -286,6 +290,7 @@ impl Solver {
         self.estimate_mean();
         report.epsilon = self.refine(fineness, cancel)?;
         self.probe_contacts(cancel)?;
+        self.balance(cancel)?;
         // Links that are coarse err by more than light that has not quite settled.
         let tolerance = self.settings.tolerance * fineness;
         self.iterate(&mut report, tolerance, cancel)?;
@@ -378,7 +383,7 @@ impl Solver {
             .map_or(Vec4::ZERO, |field| field.element(&self.hierarchy, element))
     }
 
-    /// Radiosity that a leaf sends over links, and in `w` 1: nothing where it lies within a solid.
+    /// Radiosity of a leaf but for emission that is sampled, and in `w` 1: nothing where it lies within a solid.
     fn radiosity(&self, element: usize) -> Vec4 {
         self.radiosity_under(element, self.linked[element] + self.direct_of(element))
     }
@@ -408,7 +413,9 @@ impl Solver {
     /// Bring the source tables up to date with the irradiance of the leaves.
     fn pull(&mut self) {
         let mut power = std::mem::take(&mut self.power);
-        power.pull(&self.hierarchy, |leaf| self.radiosity(leaf));
+        power.pull(&self.hierarchy, |leaf| {
+            self.radiosity(leaf) * self.sending[leaf]
+        });
         self.power = power;
     }
 
@@ -471,13 +478,14 @@ impl Solver {
         }
     }
 
-    /// Elements inherit the linked irradiance of the one that was divided, and have colours of their own.
+    /// Elements inherit the linked irradiance, and the factor of what they send, of the one that was divided, and have colours of their own.
     fn extend_to_new_elements(&mut self) {
         self.hierarchy
             .color_new_elements(&self.scene, &self.relighting.appearances);
         for index in self.linked.len()..self.hierarchy.mesh.elements.len() {
             let parent = self.hierarchy.mesh.elements[index].parent;
             self.linked.push(self.linked[parent as usize]);
+            self.sending.push(self.sending[parent as usize]);
         }
     }
 

@@ -277,7 +277,7 @@ impl Solver {
         let scale = |light: &mut Vec4| *light *= ratio.extend(1.0);
         self.linked.iter_mut().for_each(scale);
         self.pull();
-        let sent = self.leaf_sum(|leaf| self.power.elements[leaf]) + self.sampled_power();
+        let sent = self.leaf_sum(|leaf| self.radiosity(leaf)) + self.sampled_power();
         if sent > CEILING_SLACK * self.most_power() {
             self.linked.fill(Vec4::ZERO);
             self.pull();
