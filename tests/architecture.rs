@@ -5,7 +5,7 @@
 use std::{fs, path::Path};
 
 /// From the top of the house to its foundation's users; a room may import those before it.
-const ROOMS: [&str; 10] = [
+const ROOMS: [&str; 11] = [
     "scene",
     "geometry",
     "hierarchy",
@@ -13,6 +13,7 @@ const ROOMS: [&str; 10] = [
     "solver",
     "reference",
     "metrics",
+    "experiments",
     "export",
     "worker",
     "viewer",

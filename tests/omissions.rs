@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use vecrad::{
-    metrics::omissions::{Comparison, Exhibit, Trial, exhibits},
+    experiments::omissions::{Comparison, Exhibit, Trial, exhibits},
     solver::{Cancel, SolveSettings},
 };
 

@@ -21,7 +21,7 @@ use vecrad::{
         app::App,
         loader::SceneSource,
         messages::Severity,
-        state::RunStatus,
+        run::RunStatus,
         view::{ClusterCut, ClusterRequest, LinkEnd, ViewMode, ViewRequest},
     },
     worker::{Effect, StopReason},

@@ -23,11 +23,11 @@ use vecrad::{
         action::Action,
         app::App,
         camera::AxisView,
+        faults::Faults,
         loader::SceneSource,
         messages::Severity,
         panels::figure,
-        start::Faults,
-        state::RunStatus,
+        run::RunStatus,
         view::{ToneMap, ViewMode, ViewRequest},
     },
 };

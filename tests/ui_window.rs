@@ -18,11 +18,11 @@ use vecrad::{
         Options,
         action::{Action, Scale},
         app::App,
+        faults::Faults,
         loader::SceneSource,
         messages::Severity,
         render::headless,
-        start::Faults,
-        state::RunStatus,
+        run::RunStatus,
         view::ViewMode,
     },
 };

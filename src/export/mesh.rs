@@ -3,13 +3,12 @@
 use std::{
     f32::consts::FRAC_1_PI,
     io::{self, Write},
-    path::Path,
 };
 
 use glam::Vec3;
 
-use super::{ColorOptions, glb::write_glb, ply::write_ply};
-use crate::{scene::Frame, solver::Snapshot};
+use super::ColorOptions;
+use crate::solver::Snapshot;
 
 /// Which axis of the scene points up. Coordinates are never turned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -51,65 +50,6 @@ impl Default for MeshOptions {
             up: UpAxis::default(),
             emission_scale: 1.0,
             radiance_unit: 1.0,
-        }
-    }
-}
-
-/// A file format of lit meshes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MeshFormat {
-    /// Binary PLY.
-    Ply,
-    /// Binary glTF 2.0.
-    Glb,
-}
-
-/// The name of a file tells no format.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the exported file must end in .ply or .glb: {0}")]
-pub struct UnknownMeshFormat(String);
-
-impl MeshFormat {
-    /// All, in the order in which they are offered.
-    pub const ALL: [Self; 2] = [Self::Ply, Self::Glb];
-
-    /// How names of such files end, without the dot.
-    pub const fn extension(self) -> &'static str {
-        match self {
-            Self::Ply => "ply",
-            Self::Glb => "glb",
-        }
-    }
-
-    /// The format that the name of a file asks for.
-    ///
-    /// # Errors
-    /// Where it ends otherwise.
-    pub fn of(path: &Path) -> Result<Self, UnknownMeshFormat> {
-        let ends_in = |format: &Self| {
-            path.extension()
-                .is_some_and(|extension| extension.eq_ignore_ascii_case(format.extension()))
-        };
-        Self::ALL
-            .into_iter()
-            .find(ends_in)
-            .ok_or_else(|| UnknownMeshFormat(path.display().to_string()))
-    }
-
-    /// Write the display mesh of a snapshot.
-    ///
-    /// # Errors
-    /// Those of `out`, and one sentence where the mesh does not fit into the format.
-    pub fn write(
-        self,
-        out: &mut dyn Write,
-        snapshot: &Snapshot,
-        frame: &Frame,
-        options: &MeshOptions,
-    ) -> io::Result<()> {
-        match self {
-            Self::Ply => write_ply(out, snapshot, frame, options),
-            Self::Glb => write_glb(out, snapshot, frame, options),
         }
     }
 }
@@ -183,17 +123,6 @@ pub(super) mod tests {
             mesh: Arc::new(mesh),
             light: Arc::new(light),
             ..Snapshot::default()
-        }
-    }
-
-    #[test]
-    fn the_name_of_a_file_tells_its_format() {
-        let of = |name: &str| MeshFormat::of(Path::new(name));
-        assert_eq!(of("a/lit.PLY"), Ok(MeshFormat::Ply));
-        assert_eq!(of("lit.ply.glb"), Ok(MeshFormat::Glb));
-        for name in ["lit.obj", "glb", "lit.", ".ply"] {
-            let said = of(name).unwrap_err().to_string();
-            assert!(said.contains(".ply or .glb") && said.ends_with(name));
         }
     }
 

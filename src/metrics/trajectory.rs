@@ -164,7 +164,7 @@ fn median(values: Vec<f64>) -> f64 {
 }
 
 /// The middle value, or the lower of two.
-pub(super) fn middle(mut values: Vec<f64>) -> Option<f64> {
+pub fn middle(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len().saturating_sub(1) / 2;
     values.get(middle).copied()

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::coplanar::Overlaps;
 use super::crossings::cut_crossings;
-use super::emission::cured;
 use super::means::TextureAverages;
 use super::nesting;
 use super::orientation::{Evidence, Facing, Regions};
 use super::overlay::{self, DOUBLED};
+use super::ranges::{self, finite_non_negative, limited_reflectance};
 use super::sidedness::{self, Shells};
 use super::texture::MAX_SAMPLES;
 use super::{
@@ -46,9 +46,16 @@ impl Default for SceneOptions {
     fn default() -> Self {
         Self {
             sides: Sides::Auto,
-            max_reflectance: 0.98,
+            max_reflectance: ranges::DEFAULT_MAX_REFLECTANCE,
             mtl_color_is_srgb: false,
         }
+    }
+}
+
+impl SceneOptions {
+    /// The largest reflectance, within 0…1.
+    pub(super) fn reflectance_limit(&self) -> f32 {
+        self.max_reflectance.clamp(0.0, 1.0)
     }
 }
 
@@ -173,7 +180,7 @@ impl SceneBuilder {
             return Err(no_faces(&unusable));
         }
         self.sanitise_textures();
-        let losing = self.limit_reflecting_textures(options.max_reflectance.clamp(0.0, 1.0));
+        let losing = self.limit_reflecting_textures(options.reflectance_limit());
         self.sanitise_materials(options, losing);
         let radiance_unit = self.scale_emission();
         let frame = self.frame();
@@ -210,7 +217,7 @@ impl SceneBuilder {
             objects: object_ranges(&self.objects, self.faces.len()),
             warnings: self.warnings,
             spared: self.spared,
-            max_reflectance: options.max_reflectance.clamp(0.0, 1.0),
+            max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
             radiance_unit,
         };
@@ -390,7 +397,7 @@ impl SceneBuilder {
     fn sanitise_textures(&mut self) {
         for texture in &mut self.textures {
             for pixel in &mut texture.pixels {
-                *pixel = pixel.map(cured);
+                *pixel = pixel.map(finite_non_negative);
             }
         }
         let textures = &self.textures;
@@ -527,17 +534,11 @@ impl SceneBuilder {
             self.materials
                 .push(Material::plain("", Vec3::splat(0.5), Vec3::ZERO));
         }
-        let max = options.max_reflectance.clamp(0.0, 1.0);
-        let mut cured = Vec::new();
+        let max = options.reflectance_limit();
+        let mut corrected = Vec::new();
         for material in &mut self.materials {
-            let reflectance = material.reflectance.map(|x| {
-                if x.is_finite() {
-                    x.clamp(0.0, max)
-                } else {
-                    0.0
-                }
-            });
-            let emission = material.emission.map(super::emission::cured);
+            let reflectance = limited_reflectance(material.reflectance, max);
+            let emission = material.emission.map(finite_non_negative);
             if material.reflectance.cmpgt(Vec3::splat(max)).any() {
                 clamped.push(material.name.clone());
             }
@@ -546,7 +547,7 @@ impl SceneBuilder {
                     .cmpne(material.reflectance.min(Vec3::splat(max)))
                     .any()
             {
-                cured.push(material.name.clone());
+                corrected.push(material.name.clone());
             }
             material.reflectance = reflectance;
             material.emission = emission;
@@ -559,7 +560,7 @@ impl SceneBuilder {
                 ),
             ),
             (
-                cured,
+                corrected,
                 "reflectance or emission that was negative or not finite was brought into range"
                     .to_owned(),
             ),
@@ -663,7 +664,7 @@ impl SceneBuilder {
         averages: &TextureAverages,
         options: &SceneOptions,
     ) -> Vec<Surface> {
-        let max = options.max_reflectance.clamp(0.0, 1.0);
+        let max = options.reflectance_limit();
         self.faces
             .par_iter()
             .map(|face| {

@@ -3,7 +3,10 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Material, MaterialId, Scene, Surface, TriangleId, emission::limited};
+use super::{
+    Material, MaterialId, Scene, Surface, TriangleId,
+    ranges::{limited_emission, limited_reflectance},
+};
 
 /// How a material reflects and emits, without its name and its textures. Linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,18 +26,11 @@ impl Appearance {
         }
     }
 
-    /// With reflectance from 0 to the most there may be, and emission in range.
-    fn within(self, most: f32) -> Self {
-        let bounded = |x: f32| {
-            if x.is_finite() {
-                x.clamp(0.0, most)
-            } else {
-                0.0
-            }
-        };
+    /// Reflectance and emission brought into their ranges.
+    fn within(self, max_reflectance: f32) -> Self {
         Self {
-            reflectance: self.reflectance.map(bounded),
-            emission: limited(self.emission),
+            reflectance: limited_reflectance(self.reflectance, max_reflectance),
+            emission: limited_emission(self.emission),
         }
     }
 }

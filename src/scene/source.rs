@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::encoding::DecodedText;
 use super::lines::split_keyword;
-use super::obj::ReadError;
+use super::read_error::ReadError;
 
 /// Length and time of change, by which a change is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

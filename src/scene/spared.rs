@@ -7,7 +7,7 @@
 use glam::Vec2;
 use glam::Vec3;
 
-use super::emission::cured;
+use super::ranges::finite_non_negative;
 use super::{Face, SceneBuilder, Texture, TextureId};
 
 /// Pixels that differ by no more than this share of the first are of one colour: means of equal pixels are rounded.
@@ -77,7 +77,7 @@ impl SceneBuilder {
                     Fate::Kept => continue,
                     Fate::Unused => self.spared.unused_textures += 1,
                     Fate::Constant(of_texture) => {
-                        *color = (*color * of_texture).map(cured);
+                        *color = (*color * of_texture).map(finite_non_negative);
                         self.spared.constant_textures += 1;
                     }
                 }

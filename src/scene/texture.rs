@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel, Primitive, Rgba};
 
-use super::emission::cured;
+use super::ranges::finite_non_negative;
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -90,13 +90,13 @@ impl Texture {
             DynamicImage::ImageRgba32F(pixels) => {
                 // What is no number hides nothing.
                 let share = |alpha: f32| if alpha < 1.0 { alpha.max(0.0) } else { 1.0 };
-                return covered(&pixels, name, role, cured, share);
+                return covered(&pixels, name, role, finite_non_negative, share);
             }
             DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_) => {
                 averaged(&picture.into_rgb16(), |pixel| color_of(pixel.0, word)).into_texture(name)
             }
             DynamicImage::ImageRgb32F(pixels) => {
-                averaged(&pixels, |pixel| color_of(pixel.0, cured)).into_texture(name)
+                averaged(&pixels, |pixel| color_of(pixel.0, finite_non_negative)).into_texture(name)
             }
             // Takes no copy where it is of this kind already.
             _ => averaged(&picture.into_rgb8(), |pixel| color_of(pixel.0, byte)).into_texture(name),

@@ -44,6 +44,11 @@ impl SceneSource {
         }
     }
 
+    /// Title of the window that shows it.
+    pub fn window_title(&self) -> String {
+        format!("{} – vecrad", self.label())
+    }
+
     /// The file, where there is one.
     pub fn path(&self) -> Option<&Path> {
         match self {

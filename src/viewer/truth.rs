@@ -5,7 +5,7 @@
 
 use std::{collections::BTreeMap, io, sync::Arc};
 
-use super::{state::Run, view::ViewMode};
+use super::{run::Run, view::ViewMode};
 use crate::{
     geometry::RayTree,
     metrics::{ErrorMeasures, ReferenceFacts, SceneComparison, Trajectory},

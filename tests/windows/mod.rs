@@ -9,7 +9,7 @@ use egui_kittest::Harness;
 use vecrad::{
     solver::SolveSettings,
     viewer::{
-        Options, action::Action, app::App, loader::SceneSource, start::Faults, state::RunStatus,
+        Options, action::Action, app::App, faults::Faults, loader::SceneSource, run::RunStatus,
     },
 };
 

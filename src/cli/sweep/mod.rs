@@ -6,7 +6,7 @@
 mod baselines;
 mod error_time;
 mod omissions;
-mod plan;
+mod run_flags;
 mod runs;
 mod scaling;
 mod session;
@@ -21,7 +21,7 @@ use clap::{Args, builder::PossibleValuesParser};
 use super::{
     Outcome, Reference, SceneFlags, SettingFlags, UsageError, flags::seconds, solve::Interruption,
 };
-use plan::PlanFlags;
+use run_flags::RunFlags;
 use session::{Session, Source};
 
 /// Flags of `vecrad report`.
@@ -46,9 +46,9 @@ pub struct ReportArguments {
     /// No progress line
     #[arg(long, short, help_heading = "Output")]
     pub quiet: bool,
-    /// Plan
+    /// Runs
     #[command(flatten)]
-    pub plan: PlanFlags,
+    pub runs: RunFlags,
     /// Scene
     #[command(flatten)]
     pub scene_flags: SceneFlags,

@@ -11,10 +11,10 @@ use serde::Serialize;
 use super::session::Session;
 use crate::{
     cli::{output::write_whole, report::Machine},
-    export::write_csv,
-    metrics::omissions::{
+    experiments::omissions::{
         Comparison, Exhibit, Row, Trial, exhibits, omissions_markdown, overhead_markdown,
     },
+    export::write_csv,
     solver::SolveSettings,
 };
 
@@ -40,8 +40,8 @@ struct Report<'a> {
 pub(super) fn compare(session: &mut Session<'_>) -> Result<()> {
     let settings = session.arguments.setting_flags.settings();
     let is_meant = |exhibit: &Exhibit, word: &str| exhibit.name.contains(word);
-    let plan = &session.arguments.plan;
-    let chosen = plan.chosen(exhibits().to_vec(), is_meant, "scene of the plan")?;
+    let flags = &session.arguments.runs;
+    let chosen = flags.chosen(exhibits().to_vec(), is_meant, "scene of the plan")?;
     let mut comparisons = Vec::new();
     for exhibit in &chosen {
         if session.is_interrupted() {
@@ -72,7 +72,7 @@ fn compare_on(
         session.note_cut();
         return Ok(None);
     };
-    let repeats = session.arguments.plan.repeats;
+    let repeats = session.arguments.runs.repeats;
     for round in 0..repeats.max(ROUNDS) {
         if round >= repeats && trial.seconds() > PATIENCE {
             break;

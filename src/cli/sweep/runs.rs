@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context as _, Result, bail};
 
 use super::{
-    plan::Configuration,
+    run_flags::Configuration,
     session::{Session, Truth},
 };
 use crate::{
@@ -46,7 +46,7 @@ pub(super) fn solve(
     configuration: &Configuration,
 ) -> Result<SolverRun> {
     let (mut runs, mut meshes) = (Vec::new(), None);
-    for _ in 0..session.arguments.plan.repeats {
+    for _ in 0..session.arguments.runs.repeats {
         if session.is_interrupted() {
             break;
         }

@@ -25,7 +25,7 @@ use crate::{
     worker::RunOptions,
 };
 
-/// Time of a run where none is given: enough for 2 % on most scenes, and not yet a coffee break for a whole plan.
+/// Time of a run where none is given: enough for 2 % on most scenes, and still minutes for a whole report.
 const USUAL_TIME_LIMIT: Duration = Duration::from_secs(60);
 
 /// How often an interruption is looked for.

@@ -6,11 +6,7 @@ use super::{bound, bytes, count, figure, row, seconds};
 use crate::{
     solver::StepReport,
     viewer::{
-        action::Action,
-        change::Change,
-        state::{RunStatus, State},
-        theme,
-        wording::without_flags,
+        action::Action, run::Change, run::RunStatus, state::State, theme, wording::without_flags,
     },
 };
 

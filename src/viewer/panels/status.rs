@@ -4,10 +4,11 @@ use eframe::egui::{self, Color32, RichText};
 
 use super::{count, figure, seconds};
 use crate::viewer::{
-    change::Change,
     messages::{Message, Severity},
     panel_state::Side,
-    state::{RunStatus, State},
+    run::Change,
+    run::RunStatus,
+    state::State,
     theme,
 };
 

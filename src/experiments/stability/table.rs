@@ -100,7 +100,7 @@ fn figure(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::stability::Finding;
+    use crate::experiments::stability::Finding;
 
     fn outcome(failure: Option<String>, claims: Vec<Claim>) -> Outcome {
         Outcome {

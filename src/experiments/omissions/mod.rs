@@ -15,9 +15,9 @@ use std::{f64::consts::PI, sync::Arc, time::Instant};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::{MeshLookup, trajectory::middle};
 use crate::{
     geometry::RayTree,
+    metrics::{MeshLookup, middle},
     reference::{PathSettings, PathTracer, ReferencePoint},
     scene::Scene,
     solver::{Cancel, Keep, LeftOut, Omission, SolveSettings, Solver, StepReport},

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{CUT_SHORT_MARK, Trajectory, digits, error_text, grouped};
+use crate::metrics::{CUT_SHORT_MARK, Trajectory, digits, error_text, grouped};
 
 /// Cost of one run on a scene of some size. Field names are the header of the table of figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -83,7 +83,7 @@ pub const COST_KINDS: [CostKind; 4] = [
 
 /// The exponent b of the power law `y = a x^b` that fits points best in the logarithms of both; `None` where fewer
 /// than two different positive x are known.
-pub fn fitted_exponent(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+fn fitted_exponent(points: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     let logs: Vec<(f64, f64)> = points
         .filter(|(x, y)| *x > 0.0 && *y > 0.0)
         .map(|(x, y)| (x.ln(), y.ln()))

@@ -1,7 +1,7 @@
 //! What is run on a scene: which methods, oracles, thresholds and sample counts, and which baselines.
 //!
-//! The first of each list is the base; the others are tried one at a time, so that a plan grows as the sum of its
-//! lists. `--full` asks for their product.
+//! The first of each list is the base; the others are tried one at a time, so that the number of runs is the sum of the
+//! lengths of the lists. `--full` asks for their product.
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
@@ -14,24 +14,24 @@ use crate::{
     solver::{Method, Oracle, SolveSettings},
 };
 
-/// Flags of the plan.
+/// Flags that say what is run.
 #[derive(Clone, Debug, Args)]
-pub struct PlanFlags {
+pub struct RunFlags {
     /// Methods to run [default: all, the one of the settings first]
-    #[arg(long, value_enum, value_delimiter = ',', help_heading = "Plan")]
+    #[arg(long, value_enum, value_delimiter = ',', help_heading = "Runs")]
     pub methods: Vec<MethodFlag>,
     /// Oracles to run [default: both, the one of the settings first]
-    #[arg(long, value_enum, value_delimiter = ',', help_heading = "Plan")]
+    #[arg(long, value_enum, value_delimiter = ',', help_heading = "Runs")]
     pub oracles: Vec<OracleFlag>,
     /// Thresholds to run, each with the mesh and the samples of the nearest preset [default: that of the settings, and
     /// those of the other presets]
-    #[arg(long, value_name = "E", value_delimiter = ',', value_parser = above_zero, help_heading = "Plan")]
+    #[arg(long, value_name = "E", value_delimiter = ',', value_parser = above_zero, help_heading = "Runs")]
     pub epsilons: Vec<f32>,
     /// Sample counts of the samples oracle to run [default: that of the settings, and 16]
-    #[arg(long, value_name = "P", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Plan")]
+    #[arg(long, value_name = "P", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Runs")]
     pub sample_counts: Vec<u32>,
     /// Run every combination, not one change at a time
-    #[arg(long, help_heading = "Plan")]
+    #[arg(long, help_heading = "Runs")]
     pub full: bool,
     /// Baselines to run beside the solver
     #[arg(
@@ -39,25 +39,25 @@ pub struct PlanFlags {
         value_enum,
         value_delimiter = ',',
         default_value = "bake,jacobi",
-        help_heading = "Plan"
+        help_heading = "Runs"
     )]
     pub baselines: Vec<Baseline>,
     /// Maximum paths per vertex of the bake
-    #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(1..=1 << 24), help_heading = "Plan")]
+    #[arg(long, value_name = "N", default_value = "4096", value_parser = clap::value_parser!(u32).range(1..=1 << 24), help_heading = "Runs")]
     pub max_spp: u32,
     /// Triangles of the rooms in the scaling suite [default: 1022 to 1000000, about fourfold each]
-    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1_000..=16_000_000), help_heading = "Plan")]
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1_000..=16_000_000), help_heading = "Runs")]
     pub sizes: Vec<u32>,
     /// Cases of the stability suite to try, or scenes of the plan suite: groups, or parts of names [default: all]
     #[arg(
         long,
         value_name = "NAME",
         value_delimiter = ',',
-        help_heading = "Plan"
+        help_heading = "Runs"
     )]
     pub cases: Vec<String>,
     /// Repetitions of each run, of whose times the median is taken; best odd; at least 3 for quick scenes of the plan suite
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=99), help_heading = "Plan")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=99), help_heading = "Runs")]
     pub repeats: u32,
 }
 
@@ -72,7 +72,7 @@ pub enum Baseline {
     None,
 }
 
-/// A solver run of the plan.
+/// A solver run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Configuration {
     /// What to call it.
@@ -84,7 +84,7 @@ pub(super) struct Configuration {
 /// Sample pairs beside those of the settings: enough that max − min seldom misses much.
 const MANY_SAMPLES: u32 = 16;
 
-impl PlanFlags {
+impl RunFlags {
     /// Those of a suite's cases that one of `--cases` means; all where none is given.
     ///
     /// # Errors
@@ -141,7 +141,7 @@ struct Lists {
 }
 
 impl Lists {
-    fn new(flags: &PlanFlags, base: &SolveSettings) -> Self {
+    fn new(flags: &RunFlags, base: &SolveSettings) -> Self {
         let presets = [
             SolveSettings::draft(),
             SolveSettings::normal(),
@@ -324,23 +324,23 @@ mod tests {
     #[derive(Parser)]
     struct Line {
         #[command(flatten)]
-        plan: PlanFlags,
+        runs: RunFlags,
         #[command(flatten)]
         settings: SettingFlags,
     }
 
-    fn plan(arguments: &[&str]) -> Vec<Configuration> {
+    fn runs(arguments: &[&str]) -> Vec<Configuration> {
         let line = Line::try_parse_from([&["test"], arguments].concat()).unwrap();
-        line.plan.configurations(&line.settings)
+        line.runs.configurations(&line.settings)
     }
 
     fn labels(arguments: &[&str]) -> Vec<String> {
-        let labels = plan(arguments).into_iter().map(|run| run.label);
+        let labels = runs(arguments).into_iter().map(|run| run.label);
         labels.collect()
     }
 
     #[test]
-    fn the_usual_plan_changes_one_thing_at_a_time() {
+    fn the_usual_runs_change_one_thing_at_a_time() {
         assert_eq!(
             labels(&[]),
             [
@@ -355,14 +355,14 @@ mod tests {
                 "bounded, ε = 0.002",
             ]
         );
-        let usual = plan(&[]);
+        let usual = runs(&[]);
         assert_eq!(usual[0].settings, SolveSettings::normal());
         assert_eq!(usual[7].settings, SolveSettings::draft());
         assert_eq!(usual[8].settings, SolveSettings::finest());
     }
 
     #[test]
-    fn lists_restrict_the_plan() {
+    fn lists_restrict_the_runs() {
         let few = [
             "--methods",
             "single",
@@ -378,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_plan_is_the_product() {
+    fn full_runs_are_the_product() {
         let lists = [
             "--full",
             "--methods",
@@ -387,12 +387,12 @@ mod tests {
             "0.1,0.05",
         ];
         // Two methods, two thresholds, and the interval once or samples twice.
-        assert_eq!(plan(&lists).len(), 12);
+        assert_eq!(runs(&lists).len(), 12);
     }
 
     #[test]
     fn a_threshold_brings_its_mesh_but_no_flag_that_was_given() {
-        let runs = plan(&["--epsilons", "0.005,0.06", "--min-area", "0.5"]);
+        let runs = runs(&["--epsilons", "0.005,0.06", "--min-area", "0.5"]);
         let coarse = &runs[runs.len() - 1].settings;
         let draft = SolveSettings::draft();
         assert!((coarse.mesh_tolerance - 2.0 * draft.mesh_tolerance).abs() < 1e-6);
