@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::Triangle;
 use super::coplanar::reach;
-use super::sidedness::Shells;
+use super::shells::Shells;
 
 /// Points of a shell that are asked where they lie, where there are few shells; odd, so that a majority is never a tie.
 /// Fewer mistake an object that pokes out of a wall for one beyond it, more take longer.

@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::ahead::parse_ahead;
-use super::build::{BuildError, Face, SceneBuilder, SceneOptions, Source};
+use super::builder::{BuildError, Face, SceneBuilder, Source};
 use super::clean::{FaceNote, ForeignNumber, MAX_LIBRARIES, Mention, Notes, ObjCleaner};
 use super::library::{Defined, Library};
 use super::lines::{Notation, spellings};
 use super::locate::{Missing, SceneFolder};
 use super::mtl::{MtlMaterial, read_mtl};
+use super::options::SceneOptions;
 use super::progress::ReadProgress;
 use super::read_error::ReadError;
 use super::source;

@@ -14,7 +14,7 @@
 
 use glam::Vec3;
 
-use super::sidedness::Shells;
+use super::shells::Shells;
 
 /// Mean cosine between the shading normals of a shell and the normals of its faces, weighted by area, at or below which the
 /// former oppose the winding: half way between normals that tell nothing and those of a mirrored shell. Those of a smooth

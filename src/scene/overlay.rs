@@ -7,9 +7,9 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::build::ShelledTriangles;
 use super::clip::{cut_out, turned_left};
 use super::coplanar::{Overlaps, TOUCHING, TOUCHING_SHARE, in_plane, projected, reach};
+use super::shells::ShelledTriangles;
 use super::{Face, Frame, SceneBuilder, Triangle};
 
 /// Why a face is skipped that lies on earlier ones.

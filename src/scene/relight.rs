@@ -3,37 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{
-    Material, MaterialId, Scene, Surface, TriangleId,
-    ranges::{limited_emission, limited_reflectance},
-};
-
-/// How a material reflects and emits, without its name and its textures. Linear RGB.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Appearance {
-    /// Diffuse reflectance (`Kd`); multiplies the texture.
-    pub reflectance: Vec3,
-    /// Emitted radiance (`Ke`) in units of [`Scene::radiance_unit`]; multiplies the texture.
-    pub emission: Vec3,
-}
-
-impl Appearance {
-    /// That of a material.
-    pub fn of(material: &Material) -> Self {
-        Self {
-            reflectance: material.reflectance,
-            emission: material.emission,
-        }
-    }
-
-    /// Reflectance and emission brought into their ranges.
-    fn within(self, max_reflectance: f32) -> Self {
-        Self {
-            reflectance: limited_reflectance(self.reflectance, max_reflectance),
-            emission: limited_emission(self.emission),
-        }
-    }
-}
+use super::{Appearance, MaterialId, Scene, Surface, TriangleId};
 
 /// Materials that may emit or reflect, though the scene as it was read says that they do not.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -156,7 +126,7 @@ mod tests {
     use glam::{DVec3, Vec2};
 
     use super::*;
-    use crate::scene::{Face, SceneBuilder, SceneOptions, Texture, TextureId};
+    use crate::scene::{Face, Material, SceneBuilder, SceneOptions, Texture, TextureId};
 
     /// A triangle under a grey texture, and one without.
     fn scene() -> Scene {

@@ -13,15 +13,6 @@ use super::{Face, SceneBuilder, Texture, TextureId};
 /// Pixels that differ by no more than this share of the first are of one colour: means of equal pixels are rounded.
 const ALIKE: f32 = 1e-6;
 
-/// Textures that were left out while a scene was read. Of a picture that several materials name, each name counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spared {
-    /// Of one colour, which the material has instead.
-    pub constant_textures: usize,
-    /// Shown by no face.
-    pub unused_textures: usize,
-}
-
 /// What the faces of a material show of its textures.
 #[derive(Clone, Copy, Debug, Default)]
 struct View {
@@ -167,7 +158,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Material, MaterialId, Scene, SceneOptions};
+    use crate::scene::{Material, MaterialId, Scene, SceneOptions, Spared};
 
     /// Four by four pixels, blue but for a red one at the top left.
     fn spotted() -> Texture {

@@ -40,6 +40,15 @@ impl Texture {
     }
 }
 
+/// Textures that were left out while a scene was read. Of a picture that several materials name, each name counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Spared {
+    /// Of one colour, which the material has instead.
+    pub constant_textures: usize,
+    /// Shown by no face.
+    pub unused_textures: usize,
+}
+
 /// Pixels kept of one picture; larger ones are averaged down. Light needs means, and twelve bytes a pixel add up.
 const MAX_PIXELS: usize = 1 << 24;
 

@@ -154,7 +154,7 @@ impl Triangulator {
         let mut kept = 0;
         for start in (0..self.triangles.len()).step_by(3) {
             let corners = [0, 1, 2].map(|corner| polygon[self.triangles[start + corner] as usize]);
-            if !super::build::is_degenerate(corners) {
+            if !super::usable::is_degenerate(corners) {
                 self.triangles.copy_within(start..start + 3, kept);
                 kept += 3;
             }
