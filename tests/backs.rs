@@ -15,7 +15,7 @@ use vecrad::{
     solver::{DisplayMesh, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
-        render::headless::{self, Subject},
+        headless::{self, Subject},
         view::{ToneMap, ViewMode, ViewSettings},
     },
 };

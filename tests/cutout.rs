@@ -16,10 +16,8 @@ use vecrad::{
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
-        render::{
-            Cutout,
-            headless::{self, HeadlessPicture, Subject},
-        },
+        headless::{self, HeadlessPicture, Subject},
+        render::Cutout,
         theme::PICTURE_BACKGROUND,
         view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
     },

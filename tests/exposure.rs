@@ -15,7 +15,7 @@ use vecrad::{
     solver::{Snapshot, VertexLight},
     viewer::{
         camera::Camera,
-        render::headless::{self, Subject},
+        headless::{self, Subject},
         view::{ToneMap, ViewMode, ViewSettings},
     },
 };

@@ -17,10 +17,8 @@ use vecrad::{
     viewer::{
         camera::Camera,
         cluster_lines,
-        render::{
-            Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
-            headless::{self, HeadlessError, HeadlessPicture, Subject},
-        },
+        headless::{self, HeadlessError, HeadlessPicture, Subject},
+        render::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target},
         view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
     },
 };

@@ -107,8 +107,7 @@ fn exit_code_of(error: &anyhow::Error) -> ExitCode {
 /// Whether a graphics adapter or a display was missing.
 #[cfg(feature = "viewer")]
 fn needs_graphics(error: &anyhow::Error) -> bool {
-    error.is::<crate::viewer::ViewerError>()
-        || error.is::<crate::viewer::render::headless::HeadlessError>()
+    error.is::<crate::viewer::ViewerError>() || error.is::<crate::viewer::headless::HeadlessError>()
 }
 
 /// Whether a graphics adapter or a display was missing: this build never asks for one.

@@ -18,8 +18,8 @@ use crate::{
     viewer::{
         CameraRequest,
         camera::UpAxis,
+        headless::{self, Subject},
         loader, opening,
-        render::headless::{self, Subject},
         stderr::StderrCapture,
         view::{ClusterOverlay, ClusterRequest, ToneMap, ViewMode, ViewRequest, ViewSettings},
     },

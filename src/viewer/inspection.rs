@@ -2,14 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{
-    state::State,
-    view::{LinkEnd, LinkOverlay},
-};
-use crate::{
-    hierarchy::NodeId,
-    solver::{Inspection, Subject},
-};
+use super::view::{LinkEnd, LinkOverlay};
+use crate::solver::{Inspection, Subject};
 
 /// What was asked, and what is known.
 #[derive(Default)]
@@ -102,25 +96,12 @@ fn is_same(a: &Subject, b: &Subject) -> bool {
     }
 }
 
-/// What the window wants to know: the picked element, and the selected cluster.
-pub fn wanted(state: &State) -> Vec<Subject> {
-    let element = state.selection.as_ref().and_then(|selection| {
-        Some(Subject::Element {
-            node: NodeId(selection.probe.as_ref()?.element),
-            point: selection.pick.point,
-        })
-    });
-    let cluster = state
-        .cluster
-        .map(|index| Subject::Cluster(NodeId(index as u32)));
-    element.into_iter().chain(cluster).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::hierarchy::NodeId;
 
     fn element(node: u32, x: f32) -> Subject {
         Subject::Element {

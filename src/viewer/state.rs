@@ -20,8 +20,9 @@ use super::{
     view::{ViewMode, ViewSettings},
 };
 use crate::{
+    hierarchy::NodeId,
     scene::{Scene, SceneOptions},
-    solver::{SolveSettings, StepReport},
+    solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
 
@@ -119,6 +120,20 @@ impl State {
             let mut shown = self.shown_clusters.shown.iter().copied();
             self.cluster = shown.rfind(over).or(self.cluster);
         }
+    }
+
+    /// What the solver is asked about: the picked element, and the selected cluster.
+    pub fn subjects(&self) -> Vec<Subject> {
+        let element = self.selection.as_ref().and_then(|selection| {
+            Some(Subject::Element {
+                node: NodeId(selection.probe.as_ref()?.element),
+                point: selection.pick.point,
+            })
+        });
+        let cluster = self
+            .cluster
+            .map(|index| Subject::Cluster(NodeId(index as u32)));
+        element.into_iter().chain(cluster).collect()
     }
 
     /// The scene as it is lit: with lights and materials as they are now.

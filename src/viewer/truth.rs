@@ -5,7 +5,7 @@
 
 use std::{collections::BTreeMap, io, sync::Arc};
 
-use super::{run::Run, view::ViewMode};
+use super::{figures::figure, run::Run, view::ViewMode};
 use crate::{
     geometry::RayTree,
     metrics::{ErrorMeasures, ReferenceFacts, SceneComparison, Trajectory},
@@ -232,7 +232,7 @@ fn name(ordinal: u32, settings: &SolveSettings) -> String {
         Method::Exact => "exact",
         Method::Isotropic => "isotropic",
     };
-    let epsilon = super::panels::figure(f64::from(settings.epsilon));
+    let epsilon = figure(f64::from(settings.epsilon));
     let oracle = match settings.oracle {
         Oracle::Interval => String::new(),
         Oracle::Samples => format!(", p {}", settings.samples),

@@ -152,6 +152,11 @@ impl ViewMode {
             .position(|mode| *mode == self)
             .map_or(0, |index| index as u8)
     }
+
+    /// Whether edges of elements are drawn, over the light or in its place; `edges` are those over the light.
+    pub fn shows_edges(self, edges: bool) -> bool {
+        edges || self == Self::Elements
+    }
 }
 
 /// How exposed radiance becomes a display colour.

@@ -4,28 +4,12 @@ use std::{sync::Arc, time::Duration};
 
 use serde::Serialize;
 
-use super::{Effect, visit::Returned};
+use super::{Effect, Generation, visit::Returned};
 use crate::{
     geometry::RayTree,
     scene::{Appearance, Scene},
     solver::{Inspection, SolveSettings, StepReport, Subject},
 };
-
-/// Which run something belongs to; each start, reset and restart is a new one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Generation(u64);
-
-impl Generation {
-    /// Counts from 1 with the first run.
-    pub fn number(self) -> u64 {
-        self.0
-    }
-
-    /// The run after this one.
-    pub(super) fn next(self) -> Self {
-        Self(self.0 + 1)
-    }
-}
 
 /// How to run, apart from what to compute: nothing here changes a finished result.
 #[derive(Clone, Debug, Default, PartialEq)]

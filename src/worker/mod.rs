@@ -9,6 +9,7 @@
 
 mod controller;
 mod effect;
+mod generation;
 mod message;
 mod outbox;
 mod priority;
@@ -30,7 +31,8 @@ use std::{
 };
 
 pub use effect::{Effect, effect_of_change};
-pub use message::{Event, Generation, RunOptions, StopReason};
+pub use generation::Generation;
+pub use message::{Event, RunOptions, StopReason};
 pub use slot::Slot;
 pub use stepper::{Job, MakeStepper, Stepper};
 pub use trajectory::trajectory;

@@ -1,6 +1,6 @@
 //! What is asked of pictures that are drawn without a window.
 
-use vecrad::viewer::render::headless::HeadlessError;
+use vecrad::viewer::headless::HeadlessError;
 
 /// Steps of 255 by which a rounded half float may be off after the sRGB curve.
 const TOLERANCE: i32 = 2;

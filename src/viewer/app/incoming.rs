@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     super::{
-        inspection, light_range,
+        light_range,
         loader::{Loader, SceneSource},
         messages::Severity,
         stage::Wanted,
@@ -109,7 +109,7 @@ impl App {
 
     /// Ask the solver about what is selected, if it was not asked yet.
     pub(super) fn ask(&mut self) {
-        let wanted = inspection::wanted(&self.state);
+        let wanted = self.state.subjects();
         if let Some(subjects) = self.state.inspections.question(&wanted) {
             self.worker.inspect(subjects);
         }

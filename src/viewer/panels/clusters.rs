@@ -3,7 +3,6 @@
 use eframe::egui::{self, Slider};
 
 use super::{
-    count, figure,
     legend::{Scale, scale_ui},
     power::PowerScale,
     row,
@@ -14,6 +13,7 @@ use crate::{
         action::Action,
         cluster_lines::{MAX_BOXES, RAMP_START},
         clusters::path_to,
+        figures::{count, figure},
         state::State,
         theme,
         view::{ClusterColor, ClusterCut, ClusterOverlay},

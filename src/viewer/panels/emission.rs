@@ -2,8 +2,12 @@
 
 use eframe::egui;
 
-use super::{figure, number, row};
-use crate::viewer::{action::Action, state::State};
+use super::row;
+use crate::viewer::{
+    action::Action,
+    figures::{figure, number},
+    state::State,
+};
 
 /// Show the scale of all emission; a wish goes into `actions`.
 pub fn emission_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {

@@ -3,12 +3,13 @@
 use eframe::egui::{self, Color32, RichText};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use super::{bound, count, figure, plot, row, seconds};
+use super::{plot, row};
 use crate::{
     metrics::{ErrorMeasures, smallest_error},
     solver::StepReport,
     viewer::{
         action::Action,
+        figures::{bound, count, figure, seconds},
         state::State,
         theme,
         truth::{RunRecord, Truth},

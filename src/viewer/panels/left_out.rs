@@ -2,8 +2,7 @@
 
 use eframe::egui;
 
-use super::counts_in;
-use crate::viewer::{state::State, wording::without_flags};
+use crate::viewer::{figures::counts_in, state::State, wording::without_flags};
 
 /// Show the list, where there is one.
 pub fn left_out_ui(ui: &mut egui::Ui, state: &State) {

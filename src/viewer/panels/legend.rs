@@ -3,8 +3,7 @@
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, StrokeKind, pos2, vec2};
 
-use super::count;
-use crate::viewer::{state::State, theme, view::ViewMode};
+use crate::viewer::{figures::count, state::State, theme, view::ViewMode};
 
 /// Marks on a scale at most. More touch each other.
 const MOST_MARKS: usize = 7;

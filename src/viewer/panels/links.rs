@@ -3,11 +3,11 @@
 use eframe::egui::{self, Slider};
 
 use super::{
-    count,
     legend::{Scale, scale_ui},
     row,
 };
 use crate::viewer::{
+    figures::count,
     links,
     state::State,
     view::{LinkColor, LinkEnd, LinkOverlay},

@@ -5,9 +5,13 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{color::color_button, row, seconds, settings::slider};
+use super::{
+    color::color_button,
+    row::{self, slider},
+};
 use crate::viewer::{
     action::Action,
+    figures::seconds,
     materials::{LightControl, Materials},
     state::State,
 };

@@ -1,8 +1,7 @@
 //! Powers as the panels tell them: in watts where the scene's unit of length is known to be the metre, else relative to
 //! the power that leaves all surfaces of the scene.
 
-use super::figure;
-use crate::viewer::state::State;
+use crate::viewer::{figures::figure, state::State};
 
 /// From powers in frame units to text.
 #[derive(Clone, Copy, Debug, PartialEq)]

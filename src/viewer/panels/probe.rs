@@ -3,8 +3,14 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{bound, count, figure, path::path_ui, power::PowerScale, row};
-use crate::viewer::{action::Action, light_range::luminance, state::State, view::LinkEnd};
+use super::{path::path_ui, power::PowerScale, row};
+use crate::viewer::{
+    action::Action,
+    figures::{bound, count, figure},
+    light_range::luminance,
+    state::State,
+    view::LinkEnd,
+};
 
 /// Show the picked point; wishes go into `actions`.
 pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {

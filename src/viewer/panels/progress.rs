@@ -2,11 +2,17 @@
 
 use eframe::egui::{self, Button};
 
-use super::{bound, bytes, count, figure, row, seconds};
+use super::row;
 use crate::{
     solver::StepReport,
     viewer::{
-        action::Action, run::Change, run::RunStatus, state::State, theme, wording::without_flags,
+        action::Action,
+        figures::{bound, bytes, count, figure, seconds},
+        run::Change,
+        run::RunStatus,
+        state::State,
+        theme,
+        wording::without_flags,
     },
 };
 

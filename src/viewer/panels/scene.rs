@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, RichText, text::CCursorRange};
 
-use super::counts_in;
 use crate::{
     scene::builtin::builtins,
     viewer::{
-        action::Action, loader::SceneSource, messages::Severity, state::State, theme,
-        view::ViewMode,
+        action::Action, figures::counts_in, loader::SceneSource, messages::Severity, state::State,
+        theme, view::ViewMode,
     },
 };
 

@@ -2,8 +2,11 @@
 
 use eframe::egui;
 
-use super::{count, figure, left_out, row, seconds};
-use crate::viewer::state::State;
+use super::{left_out, row};
+use crate::viewer::{
+    figures::{count, figure, seconds},
+    state::State,
+};
 
 /// Show the counts.
 pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {

@@ -2,8 +2,8 @@
 
 use eframe::egui::{self, Color32, RichText};
 
-use super::{count, figure, seconds};
 use crate::viewer::{
+    figures::{count, figure, seconds},
     messages::{Message, Severity},
     panel_state::Side,
     run::Change,

@@ -4,6 +4,7 @@ use eframe::egui::{self, DragValue, Slider};
 
 use crate::viewer::{
     action::Action,
+    figures::figure,
     panel_state::{PanelState, Side},
     state::State,
     view::{ToneMap, ViewMode, ViewSettings},
@@ -152,7 +153,7 @@ fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
             DragValue::new(value)
                 .range(0.0..=f32::MAX)
                 .speed(speed)
-                .custom_formatter(|value, _| super::figure(value))
+                .custom_formatter(|value, _| figure(value))
         };
         let label = ui.label("from");
         ui.add(drag(low)).labelled_by(label.id);

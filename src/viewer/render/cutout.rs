@@ -13,7 +13,7 @@ use super::{Gpu, ReadError, Target};
 use crate::{
     export::{neutral, srgb_from_linear},
     viewer::{
-        saver::{self, EncodeError},
+        picture_file::{self, EncodeError},
         view::ToneMap,
     },
 };
@@ -80,7 +80,7 @@ impl Cutout {
     /// See [`EncodeError`].
     pub fn encode(self, path: &Path) -> Result<Vec<u8>, EncodeError> {
         let (display, radiance) = self.into_images();
-        saver::encode(display, Some(radiance), path)
+        picture_file::encode(display, Some(radiance), path)
     }
 
     /// Both as they are encoded.

@@ -6,7 +6,6 @@
 
 mod cutout;
 mod detail;
-pub mod headless;
 mod line_pass;
 mod mesh_pass;
 mod meter;

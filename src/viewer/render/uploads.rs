@@ -8,7 +8,6 @@ use super::{
     BoxInstance, Gpu, RenderError,
     detail::{DetailSet, DrawRange},
     line_pass::Instances,
-    mesh_pass::shows_edges,
 };
 use crate::{
     scene::Scene,
@@ -79,7 +78,7 @@ impl Uploads {
             self.light = Some((wanted, buffer));
         }
         if let Some(mesh) = &mut self.mesh
-            && shows_edges(source.mode, source.edges)
+            && source.mode.shows_edges(source.edges)
         {
             mesh.prepare_edges(gpu);
         }

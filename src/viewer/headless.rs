@@ -6,19 +6,16 @@ use glam::Vec3;
 use image::{DynamicImage, Rgb32FImage, RgbaImage};
 
 use super::{
-    Cutout, CutoutTarget, Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
-};
-use crate::{
-    scene::Scene,
-    solver::Snapshot,
-    viewer::{
-        camera::Camera,
-        cluster_lines, clusters, exposure, light_range,
-        saver::{self, EncodeError},
-        theme,
-        view::ViewSettings,
+    camera::Camera,
+    cluster_lines, clusters, exposure, light_range,
+    picture_file::{self, EncodeError},
+    render::{
+        Cutout, CutoutTarget, Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
     },
+    theme,
+    view::ViewSettings,
 };
+use crate::{scene::Scene, solver::Snapshot};
 
 /// Why there is no headless picture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -54,7 +51,7 @@ impl HeadlessPicture {
     /// See [`EncodeError`].
     pub fn encode(self, path: &Path) -> Result<Vec<u8>, EncodeError> {
         let display = DynamicImage::from(self.display).into_rgb8();
-        saver::encode(display.into(), self.radiance.map(DynamicImage::from), path)
+        picture_file::encode(display.into(), self.radiance.map(DynamicImage::from), path)
     }
 }
 
