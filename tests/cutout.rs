@@ -11,15 +11,15 @@ use glam::{DVec3, Vec3};
 use image::{DynamicImage, Rgba};
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
-    export::{linear_from_srgb, srgb_from_linear},
-    scene::{Material, Scene, SceneBuilder, SceneOptions},
+    export::ToneMap,
+    scene::{Material, Scene, SceneBuilder, SceneOptions, linear_from_srgb, srgb_byte},
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
         headless::{self, HeadlessPicture, Subject},
         render::Cutout,
         theme::PICTURE_BACKGROUND,
-        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+        view::{ClusterOverlay, ViewMode, ViewSettings},
     },
 };
 
@@ -108,7 +108,7 @@ fn laid_over_the_background_it_is_the_opaque_picture() {
         let over = [*r, *g, *b].map(|byte| {
             let front = linear_from_srgb(f32::from(byte) / 255.0);
             let mixed = alpha * front + (1.0 - alpha) * PICTURE_BACKGROUND;
-            (srgb_from_linear(mixed) * 255.0).round() as u8
+            srgb_byte(mixed)
         });
         let [red, green, blue, _] = opaque.display.get_pixel(x, y).0;
         assert_near(over, [red, green, blue], &format!("at {x}, {y}"));

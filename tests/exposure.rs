@@ -11,12 +11,13 @@ use glam::{DVec3, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
+    export::ToneMap,
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
     solver::{Snapshot, VertexLight},
     viewer::{
         camera::Camera,
         headless::{self, Subject},
-        view::{ToneMap, ViewMode, ViewSettings},
+        view::{ViewMode, ViewSettings},
     },
 };
 
@@ -111,7 +112,7 @@ fn before(squares: &(Arc<Scene>, Snapshot), place: f64, distance: f32) -> Camera
 /// Linear value of the pixel in the middle.
 fn middle(picture: &RgbaImage) -> f32 {
     let byte = picture.get_pixel(SIZE[0] / 2, SIZE[1] / 2).0[1];
-    vecrad::export::linear_from_srgb(f32::from(byte) / 255.0)
+    vecrad::scene::linear_from_srgb(f32::from(byte) / 255.0)
 }
 
 /// Whether a linear value is the middle gray that light is exposed to, within a bin, the rounding, and a byte.

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec2, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
-    export::{ColorOptions, ToneMap as ExportToneMap},
+    export::{ColorOptions, ToneMap},
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides, builtin::find_builtin},
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
@@ -19,7 +19,7 @@ use vecrad::{
         cluster_lines,
         headless::{self, HeadlessError, HeadlessPicture, Subject},
         render::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target},
-        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+        view::{ClusterOverlay, ViewMode, ViewSettings},
     },
 };
 
@@ -125,15 +125,15 @@ fn light_has_the_colours_of_the_exported_vertices() {
     let snapshot = snapshot(&scene, irradiance);
     let reflectance = Vec3::new(0.8, 0.1, 0.1);
     let radiance = reflectance * irradiance / std::f32::consts::PI;
-    for (exposure, tone_map, export_tone_map) in [
-        (0.0, ToneMap::None, ExportToneMap::None),
-        (0.0, ToneMap::Neutral, ExportToneMap::Neutral),
-        (2.5, ToneMap::Neutral, ExportToneMap::Neutral),
-        (-3.0, ToneMap::None, ExportToneMap::None),
+    for (exposure, tone_map) in [
+        (0.0, ToneMap::None),
+        (0.0, ToneMap::Neutral),
+        (2.5, ToneMap::Neutral),
+        (-3.0, ToneMap::None),
     ] {
         let export = ColorOptions {
             exposure_ev: exposure,
-            tone_map: export_tone_map,
+            tone_map,
         };
         let mut view = plain(ViewMode::Radiance);
         view.exposure = exposure;
@@ -153,7 +153,7 @@ fn light_modes_show_what_they_say() {
     let snapshot = snapshot(&scene, irradiance);
     let plain_color = ColorOptions {
         exposure_ev: 0.0,
-        tone_map: ExportToneMap::None,
+        tone_map: ToneMap::None,
     };
     let reflectance = Vec3::new(0.8, 0.1, 0.1);
     let over_pi = 1.0 / std::f32::consts::PI;

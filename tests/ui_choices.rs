@@ -16,6 +16,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use vecrad::{
+    export::ToneMap,
     scene::{SceneOptions, Sides},
     solver::SolveSettings,
     viewer::{
@@ -28,7 +29,7 @@ use vecrad::{
         loader::SceneSource,
         messages::Severity,
         run::RunStatus,
-        view::{ToneMap, ViewMode, ViewRequest},
+        view::{ViewMode, ViewRequest},
     },
 };
 use windows::{perform, plates, wait_for, window};

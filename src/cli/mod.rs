@@ -15,6 +15,7 @@ mod scenes;
 mod solve;
 mod sweep;
 mod truth;
+mod values;
 #[cfg(feature = "viewer")]
 mod window;
 

@@ -17,11 +17,11 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::{
-    MeshOptions, UpAxis,
+    MeshOptions,
     mesh::{Light, write_vector},
 };
 use crate::{
-    scene::Frame,
+    scene::{Frame, UpAxis},
     solver::{DisplayMesh, Snapshot},
 };
 

@@ -8,27 +8,7 @@ use std::{
 use glam::Vec3;
 
 use super::ColorOptions;
-use crate::solver::Snapshot;
-
-/// Which axis of the scene points up. Coordinates are never turned.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum UpAxis {
-    /// +Y, as most OBJ files.
-    #[default]
-    Y,
-    /// +Z.
-    Z,
-}
-
-impl UpAxis {
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Y => "+Y",
-            Self::Z => "+Z",
-        }
-    }
-}
+use crate::{scene::UpAxis, solver::Snapshot};
 
 /// What an exported mesh says beside the numbers of the solve.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,8 +8,8 @@ mod plot;
 mod ply;
 mod table;
 
-pub use color::{ColorOptions, ToneMap, linear_from_srgb, neutral, srgb_from_linear};
-pub use mesh::{MeshOptions, UpAxis};
+pub use color::{ColorOptions, ToneMap};
+pub use mesh::MeshOptions;
 pub use mesh_format::{MeshFormat, UnknownMeshFormat};
 pub use plot::{Curve, CurvePlot};
 pub use table::write_csv;

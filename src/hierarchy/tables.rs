@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Subtrees};
 
+use crate::scene::LUMINANCE;
+
 /// Source tables of all nodes.
 #[derive(Clone, Debug, Default)]
 pub struct Tables {
@@ -221,5 +223,5 @@ impl Slices<'_> {
 
 /// Luminance of linear RGB (Rec. 709), by which errors of colours are weighed; `w` does not count.
 pub fn luminance(color: Vec4) -> f32 {
-    color.dot(Vec4::new(0.2126, 0.7152, 0.0722, 0.0))
+    color.dot(LUMINANCE.extend(0.0))
 }

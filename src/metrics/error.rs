@@ -8,7 +8,7 @@
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::reference::{ReferencePoint, luminance};
+use crate::{reference::ReferencePoint, scene::luminance};
 
 /// Stands for the scale of a black reference, so that no figure divides by 0.
 const SMALLEST_SCALE: f64 = 1e-300;

@@ -11,8 +11,8 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     geometry::RayTree,
-    reference::{BakePoint, bake, luminance},
-    scene::{Scene, TriangleId},
+    reference::{BakePoint, bake},
+    scene::{Scene, TriangleId, luminance},
     solver::{DisplayMesh, VertexLight},
 };
 

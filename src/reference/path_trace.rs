@@ -13,13 +13,12 @@ use rayon::prelude::*;
 use super::{
     emitters::Emitters,
     estimator::{Bounce, Estimator, PathPoint},
-    luminance,
     point::ReferencePoint,
     points::{SampledSurfaces, sample_points},
 };
 use crate::{
     geometry::{Random, RayTree, low_discrepancy_2d},
-    scene::Scene,
+    scene::{Scene, luminance},
 };
 
 /// Samples of a group. Fewer lose stratification, more leave too few groups to tell the variance from.

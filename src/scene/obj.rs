@@ -13,6 +13,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use super::ahead::parse_ahead;
 use super::builder::{BuildError, Face, SceneBuilder, Source};
 use super::clean::{FaceNote, ForeignNumber, MAX_LIBRARIES, Mention, Notes, ObjCleaner};
+use super::color::linear_from_srgb;
 use super::library::{Defined, Library};
 use super::lines::{Notation, spellings};
 use super::locate::{Missing, SceneFolder};
@@ -21,10 +22,11 @@ use super::options::SceneOptions;
 use super::progress::ReadProgress;
 use super::read_error::ReadError;
 use super::source;
-use super::texture::{Role, linear_from_srgb};
+use super::texture::Role;
 use super::texture_statement::{TextureReference, TextureStatement};
 use super::triangulate::{Doubt, MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
+use super::whole::folder_of;
 use super::{Material, MaterialId, Scene, Texture, TextureId};
 
 /// Read an OBJ file.
@@ -59,7 +61,7 @@ pub fn read_obj_with_progress(
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     let mut import = Import {
         options,
-        folder: SceneFolder::new(folder_of(path)),
+        folder: SceneFolder::new(folder_of(path).to_owned()),
         builder: SceneBuilder {
             source: Source {
                 name: stem.to_string_lossy().into_owned(),
@@ -79,13 +81,6 @@ pub fn read_obj_with_progress(
     import.models(&models);
     drop(models);
     import.finish(path)
-}
-
-fn folder_of(path: &Path) -> PathBuf {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
-        _ => PathBuf::from("."),
-    }
 }
 
 /// Run the parser over the clean text.

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel, Primitive, Rgba};
 
+use super::color::linear_from_srgb;
 use super::ranges::finite_non_negative;
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
@@ -291,15 +292,6 @@ fn decode(path: &Path) -> image::ImageResult<DynamicImage> {
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
     reader.decode()
-}
-
-/// The sRGB curve backwards, continued beyond 1.
-pub(super) fn linear_from_srgb(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
 }
 
 /// Samples of a triangle at most, its parts together; at this many the mean of a halved texture is good to about a percent.

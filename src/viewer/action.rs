@@ -2,13 +2,12 @@
 
 use std::path::PathBuf;
 
-use super::{
-    camera::{AxisView, UpAxis},
-    loader::SceneSource,
-    materials::Materials,
-    view::ViewMode,
+use super::{camera::AxisView, loader::SceneSource, materials::Materials, view::ViewMode};
+use crate::{
+    scene::{Sides, UpAxis},
+    solver::SolveSettings,
+    worker::RunOptions,
 };
-use crate::{scene::Sides, solver::SolveSettings, worker::RunOptions};
 
 /// One wish, carried out by the window after the panels are drawn.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,9 +4,11 @@ use eframe::egui::{Event, InputState, Key, Modifiers};
 
 use super::{
     action::{Action, Scale},
-    camera::{AxisView, UpAxis},
+    camera::AxisView,
     view::ViewMode,
 };
+
+use crate::scene::UpAxis;
 
 /// Where a binding stands on the key sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,29 +5,6 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Mat4, Quat, Vec2, Vec3, camera::rh};
-use serde::{Deserialize, Serialize};
-
-/// Which axis of the scene points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum UpAxis {
-    /// The habit of OBJ files.
-    #[default]
-    #[serde(rename = "+Y")]
-    Y,
-    /// The habit of Blender and of CAD programs.
-    #[serde(rename = "+Z")]
-    Z,
-}
-
-impl UpAxis {
-    /// The axis as a unit vector.
-    pub const fn vector(self) -> Vec3 {
-        match self {
-            Self::Y => Vec3::Y,
-            Self::Z => Vec3::Z,
-        }
-    }
-}
 
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

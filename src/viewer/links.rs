@@ -2,12 +2,14 @@
 
 use super::{
     cluster_lines::{outline, segment},
-    light_range::luminance,
     render::SegmentInstance,
     theme,
     view::{LinkColor, LinkOverlay},
 };
-use crate::solver::{InspectedLink, Inspection};
+use crate::{
+    scene::luminance,
+    solver::{InspectedLink, Inspection},
+};
 
 /// Magnitudes that the colours of strengths span at most. With fewer, weak links look alike; with more, strong ones do.
 const MOST_MAGNITUDES: f32 = 3.0;

@@ -2,8 +2,12 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{camera::Camera, light_range::luminance, loader::LoadedScene};
-use crate::{geometry::barycentric_in_plane, scene::TriangleId, solver::Snapshot};
+use super::{camera::Camera, loader::LoadedScene};
+use crate::{
+    geometry::barycentric_in_plane,
+    scene::{TriangleId, luminance},
+    solver::Snapshot,
+};
 
 /// A picked point. The light of it is looked up when it is shown, so that it stays current.
 #[derive(Clone, Copy, Debug, PartialEq)]

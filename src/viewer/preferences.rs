@@ -9,8 +9,10 @@ use serde::{Deserialize, Serialize};
 use super::{
     panel_state::PanelState,
     state::State,
-    view::{ToneMap, ViewMode, ViewSettings},
+    view::{ViewMode, ViewSettings},
 };
+
+use crate::export::ToneMap;
 
 /// Where they are kept.
 const KEY: &str = "preferences";

@@ -13,10 +13,9 @@ use super::{
     messages::Severity,
     picture_file::{EncodeError, encode},
     render::{CutoutTarget, Gpu, ReadError, Target},
-    view::ToneMap,
 };
 use crate::{
-    export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    export::{MeshFormat, MeshOptions, ToneMap, UnknownMeshFormat, write_csv},
     metrics::SceneComparison,
     scene::{Frame, folder_of, write_whole},
     solver::Snapshot,

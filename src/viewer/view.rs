@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::export::ToneMap;
+
 pub use super::overlay::{
     ClusterColor, ClusterCut, ClusterOverlay, ClusterRequest, LinkColor, LinkEnd, LinkOverlay,
 };
@@ -157,17 +159,6 @@ impl ViewMode {
     pub fn shows_edges(self, edges: bool) -> bool {
         edges || self == Self::Elements
     }
-}
-
-/// How exposed radiance becomes a display colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ToneMap {
-    /// Highlights are compressed above 0.76, the rest keeps its colour (Khronos PBR Neutral).
-    #[default]
-    Neutral,
-    /// Clipped at 1.
-    None,
 }
 
 /// Everything about the picture but the camera.

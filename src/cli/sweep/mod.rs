@@ -21,7 +21,7 @@ use clap::{Args, builder::PossibleValuesParser};
 use super::{
     Outcome, Reference, SceneFlags, SettingFlags, UsageError, flags::seconds, solve::Interruption,
 };
-use run_flags::RunFlags;
+use run_flags::ReportRunFlags;
 use session::{Session, Source};
 
 /// Flags of `vecrad report`.
@@ -48,7 +48,7 @@ pub struct ReportArguments {
     pub quiet: bool,
     /// Runs
     #[command(flatten)]
-    pub runs: RunFlags,
+    pub runs: ReportRunFlags,
     /// Scene
     #[command(flatten)]
     pub scene_flags: SceneFlags,

@@ -7,22 +7,19 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 
 use crate::{
-    cli::{
-        Preset, SettingFlags, UsageError,
-        flags::{MethodFlag, OracleFlag, at_least_zero},
-    },
+    cli::{Preset, SettingFlags, UsageError, flags::at_least_zero, values::name_of},
     solver::{Method, Oracle, SolveSettings},
 };
 
 /// Flags that say what is run.
 #[derive(Clone, Debug, Args)]
-pub struct RunFlags {
+pub struct ReportRunFlags {
     /// Methods to run [default: all, the one of the settings first]
     #[arg(long, value_enum, value_delimiter = ',', help_heading = "Runs")]
-    pub methods: Vec<MethodFlag>,
+    pub methods: Vec<Method>,
     /// Oracles to run [default: both, the one of the settings first]
     #[arg(long, value_enum, value_delimiter = ',', help_heading = "Runs")]
-    pub oracles: Vec<OracleFlag>,
+    pub oracles: Vec<Oracle>,
     /// Thresholds to run, each with the mesh and the samples of the nearest preset [default: that of the settings, and
     /// those of the other presets]
     #[arg(long, value_name = "E", value_delimiter = ',', value_parser = above_zero, help_heading = "Runs")]
@@ -84,7 +81,7 @@ pub(super) struct Configuration {
 /// Sample pairs beside those of the settings: enough that max − min seldom misses much.
 const MANY_SAMPLES: u32 = 16;
 
-impl RunFlags {
+impl ReportRunFlags {
     /// Those of a suite's cases that one of `--cases` means; all where none is given.
     ///
     /// # Errors
@@ -141,24 +138,24 @@ struct Lists {
 }
 
 impl Lists {
-    fn new(flags: &RunFlags, base: &SolveSettings) -> Self {
+    fn new(flags: &ReportRunFlags, base: &SolveSettings) -> Self {
         let presets = [
             SolveSettings::draft(),
             SolveSettings::normal(),
             SolveSettings::finest(),
         ];
-        let all_methods = MethodFlag::value_variants().iter();
-        let all_oracles = OracleFlag::value_variants().iter();
+        let all_methods = Method::value_variants().iter();
+        let all_oracles = Oracle::value_variants().iter();
         Self {
             methods: given_or(
-                flags.methods.iter().map(|flag| flag.method()),
+                flags.methods.iter().copied(),
                 base.method,
-                all_methods.map(|flag| flag.method()),
+                all_methods.copied(),
             ),
             oracles: given_or(
-                flags.oracles.iter().map(|flag| flag.oracle()),
+                flags.oracles.iter().copied(),
                 base.oracle,
-                all_oracles.map(|flag| flag.oracle()),
+                all_oracles.copied(),
             ),
             epsilons: given_or(
                 flags.epsilons.iter().copied(),
@@ -291,14 +288,7 @@ fn at(flags: &SettingFlags, method: Method, oracle: Oracle, epsilon: f32) -> Sol
 
 /// What tells a run from the others.
 fn label(settings: &SolveSettings, usual_epsilon: f32) -> String {
-    let method = match settings.method {
-        Method::Bounded => "bounded",
-        Method::SixFace => "six-face",
-        Method::Single => "single",
-        Method::Exact => "exact",
-        Method::Isotropic => "isotropic",
-    };
-    let mut label = method.to_owned();
+    let mut label = name_of(&settings.method);
     if settings.oracle == Oracle::Samples {
         label += &format!(", {} samples", settings.samples);
     }
@@ -324,7 +314,7 @@ mod tests {
     #[derive(Parser)]
     struct Line {
         #[command(flatten)]
-        runs: RunFlags,
+        runs: ReportRunFlags,
         #[command(flatten)]
         settings: SettingFlags,
     }

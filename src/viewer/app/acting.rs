@@ -131,7 +131,7 @@ impl App {
             Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
             Action::AutoExposure => state.view.auto_exposure = true,
             Action::ToggleToneMap => {
-                use crate::viewer::view::ToneMap;
+                use crate::export::ToneMap;
                 state.view.tone_map = match state.view.tone_map {
                     ToneMap::Neutral => ToneMap::None,
                     ToneMap::None => ToneMap::Neutral,

@@ -3,13 +3,17 @@
 use eframe::egui;
 
 use super::scene;
-use crate::viewer::{
-    action::{Action, Scale},
-    bindings::{Binding, hint},
-    camera::{AxisView, UpAxis},
-    loader::SceneSource,
-    state::State,
-    view::{ToneMap, ViewMode},
+use crate::{
+    export::ToneMap,
+    scene::UpAxis,
+    viewer::{
+        action::{Action, Scale},
+        bindings::{Binding, hint},
+        camera::AxisView,
+        loader::SceneSource,
+        state::State,
+        view::ViewMode,
+    },
 };
 
 /// Show the bar; wishes go into `actions`.

@@ -4,12 +4,14 @@ use eframe::egui;
 use glam::Vec3;
 
 use super::{path::path_ui, power::PowerScale, row};
-use crate::viewer::{
-    action::Action,
-    figures::{bound, count, figure},
-    light_range::luminance,
-    state::State,
-    view::LinkEnd,
+use crate::{
+    scene::luminance,
+    viewer::{
+        action::Action,
+        figures::{bound, count, figure},
+        state::State,
+        view::LinkEnd,
+    },
 };
 
 /// Show the picked point; wishes go into `actions`.

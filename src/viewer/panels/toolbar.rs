@@ -2,12 +2,15 @@
 
 use eframe::egui::{self, DragValue, Slider};
 
-use crate::viewer::{
-    action::Action,
-    figures::figure,
-    panel_state::{PanelState, Side},
-    state::State,
-    view::{ToneMap, ViewMode, ViewSettings},
+use crate::{
+    export::ToneMap,
+    viewer::{
+        action::Action,
+        figures::figure,
+        panel_state::{PanelState, Side},
+        state::State,
+        view::{ViewMode, ViewSettings},
+    },
 };
 
 /// Width of the exposure's value, for two digits before the point and a sign.

@@ -7,7 +7,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::Gpu;
 use crate::{
-    scene::{Appearance, Scene, Texture, TextureId},
+    scene::{Appearance, Scene, Texture, TextureId, srgb_byte},
     solver::DisplayMesh,
 };
 
@@ -357,14 +357,4 @@ fn halved((width, height, pixels): &(u32, u32, Vec<Vec3>)) -> (u32, u32, Vec<Vec
         }
     }
     (half_width, half_height, half)
-}
-
-fn srgb_byte(linear: f32) -> u8 {
-    let x = linear.clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    };
-    (encoded * 255.0 + 0.5) as u8
 }

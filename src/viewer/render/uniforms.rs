@@ -3,7 +3,7 @@
 use std::num::NonZeroU64;
 
 use super::{super::theme, Picture};
-use crate::viewer::view::{ToneMap, ViewMode};
+use crate::{export::ToneMap, viewer::view::ViewMode};
 
 /// Floats of `View`: a matrix, five vectors, nine ramp colours.
 const FLOAT_COUNT: usize = 16 + 5 * 4 + 9 * 4;
