@@ -11,12 +11,13 @@ use glam::{DVec3, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
+    export::ToneMap,
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
     solver::{DisplayMesh, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
         headless::{self, Subject},
-        view::{ToneMap, ViewMode, ViewSettings},
+        view::{ViewMode, ViewSettings},
     },
 };
 

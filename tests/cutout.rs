@@ -2,11 +2,13 @@
 
 #![cfg(feature = "viewer")]
 
+mod common;
 mod display_scenes;
 mod pictures;
 
 use std::{path::Path, process::Command, sync::Arc};
 
+use common::assert_close;
 use glam::{DVec3, Vec3};
 use image::{DynamicImage, Rgba};
 use pictures::{assert_near, unless_no_adapter};
@@ -157,10 +159,7 @@ fn edges_have_no_fringe_and_radiance_is_multiplied_by_alpha() {
     let fov = Camera::looking(Vec3::Z, Vec3::ZERO, Vec3::Y).fov_y_radians;
     let side = 128.0 * 100.0 / (320.0 * (0.5 * fov).tan());
     let expected = 0.5 * side * side;
-    assert!(
-        (covered / expected - 1.0).abs() < 0.03,
-        "{covered} pixels instead of {expected}"
-    );
+    assert_close(covered, expected, 0.03, "covered pixels");
 }
 
 #[test]

@@ -2,12 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{fmt::Write as _, fs, sync::Arc};
 
+use common::solve;
 use glam::{DMat3, DVec3, Vec3};
 use vecrad::{
     scene::{SceneOptions, read_obj},
-    solver::{Cancel, SolveSettings, Solver},
+    solver::SolveSettings,
 };
 
 /// A room of 4 × 4 × 3 with a lamp under its ceiling and a box on its floor, turned and moved, as an OBJ file.
@@ -59,9 +62,7 @@ fn lit(turned: DMat3, origin: DVec3) -> Vec<(Vec3, Vec3)> {
         max_steps: 1,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene, settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    let snapshot = solver.snapshot();
+    let snapshot = solve(&scene, settings).0.snapshot();
     let positions = snapshot.mesh.positions.iter().copied();
     let irradiance = snapshot.light.irradiance.iter().copied();
     positions.zip(irradiance).collect()

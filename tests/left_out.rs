@@ -2,8 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{f32::consts::PI, path::Path, process::Command, sync::Arc};
 
+use common::{assert_close, solve_validated};
 use glam::{DVec3, Vec3};
 use vecrad::{
     geometry::area_vector,
@@ -32,15 +35,8 @@ fn keep(kept: &[Omission]) -> Keep {
 
 /// The last state and report of a solve whose every step is valid.
 fn solve(scene: &Arc<Scene>, settings: SolveSettings) -> (Snapshot, StepReport) {
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    loop {
-        let report = solver.step(&Cancel::default()).unwrap();
-        solver.hierarchy().validate().unwrap();
-        solver.links().validate(solver.hierarchy()).unwrap();
-        if report.is_final {
-            return (solver.snapshot(), report);
-        }
-    }
+    let (solver, report) = solve_validated(scene, settings);
+    (solver.snapshot(), report)
 }
 
 fn names(snapshot: &Snapshot) -> Vec<&'static str> {
@@ -64,7 +60,7 @@ fn arriving(snapshot: &Snapshot, counts: impl Fn(usize) -> bool) -> f64 {
 
 fn assert_same_power(one: &Snapshot, other: &Snapshot, tolerance: f64) {
     let [one, other] = [one, other].map(|snapshot| arriving(snapshot, |_| true));
-    assert!((one / other - 1.0).abs() < tolerance, "{one} {other}");
+    assert_close(one, other, tolerance, "power");
 }
 
 #[test]
@@ -81,7 +77,7 @@ fn an_empty_closed_room_takes_no_ray_and_few_elements_and_is_exact() {
     assert!(kept.shadow_rays > 10_000 && kept.elements >= 4 * report.elements);
     // Radiance 1 everywhere, so that the irradiance is π; form factors are known to about 1e-3 and scaled to add to 1.
     for light in &lean.light.irradiance {
-        assert!((light.x / PI - 1.0).abs() < 2e-3, "{light}");
+        assert_close(light.x, PI, 2e-3, "irradiance");
     }
 }
 

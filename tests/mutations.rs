@@ -5,11 +5,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+mod spoiled;
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use common::{Chance, assert_promises, case_count, folder, spoil};
+use spoiled::{Chance, assert_promises, case_count, folder, spoil};
 use vecrad::scene::{ReadError, Scene, SceneOptions, Warning, WarningKind, read_obj};
 
 /// An OBJ file that is valid but for what a reader must bear anyway: names without a file, lines of other kinds.
@@ -317,7 +317,7 @@ mod sidecar {
         },
     };
 
-    use super::common::{Chance, case_count, spoil};
+    use super::spoiled::{Chance, case_count, spoil};
 
     #[test]
     fn spoiled_sidecars_are_settings_in_range_or_sentences() {

@@ -2,11 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{sync::Arc, time::Duration};
 
+use common::{finish, step_to_end};
 use glam::{DVec3, Vec3};
 use vecrad::{
-    scene::{Appearance, Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides},
+    scene::{Appearance, Material, MaterialId, Scene, SceneBuilder, Sides},
     solver::{Cancel, Snapshot, SolveSettings, Solver},
     worker::{Event, RunOptions, WorkerHandle},
 };
@@ -35,15 +38,11 @@ fn scene() -> Arc<Scene> {
     square(LAMP, 0.0, 0.25, y, z);
     square(WALL, 2.0, 2.0, z, y);
     square(TARGET, -1.0, 1.0, y, z);
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).unwrap())
+    finish(builder, Sides::One)
 }
 
 fn finished(mut solver: Solver) -> Solver {
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    step_to_end(&mut solver, |_, _| {});
     solver
 }
 

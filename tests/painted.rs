@@ -3,15 +3,17 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{f64::consts::PI, sync::Arc};
 
+use common::{finish, solve_validated};
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
     geometry::RayTree,
     reference::{PathSettings, PathTracer, analytic::point_to_polygon},
     scene::{
-        Appearance, Face, Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, Texture,
-        TextureId,
+        Appearance, Face, Material, MaterialId, Scene, SceneBuilder, Sides, Texture, TextureId,
     },
     solver::{Cancel, Direct, Snapshot, SolveSettings, Solver},
 };
@@ -45,23 +47,12 @@ fn quad(builder: &mut SceneBuilder, material: MaterialId, [corner, u, v]: [DVec3
     }
 }
 
-fn finish(builder: SceneBuilder) -> Arc<Scene> {
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).unwrap())
-}
-
 fn solver(scene: &Arc<Scene>, direct: Direct) -> Solver {
     let settings = SolveSettings {
         direct,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver.hierarchy().validate().unwrap();
-    solver
+    solve_validated(scene, settings).0
 }
 
 /// Mean error of the irradiance at vertices that look along a normal, and that are told, and the error that one in twenty
@@ -147,7 +138,7 @@ fn painted_room(has_speck: bool) -> Arc<Scene> {
     if has_speck {
         speck(&mut builder, DVec3::new(0.05, 0.05, 0.5));
     }
-    finish(builder)
+    finish(builder, Sides::One)
 }
 
 /// Beside the ceiling; looks down.
@@ -308,7 +299,7 @@ fn painted_floor(picture: Texture, has_speck: bool) -> Arc<Scene> {
     if has_speck {
         speck(&mut builder, DVec3::new(0.05, 0.05, 2.0));
     }
-    finish(builder)
+    finish(builder, Sides::One)
 }
 
 /// Irradiance of the wall, by a sum over small squares of the floor.

@@ -2,8 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::f32::consts::PI;
 
+use common::assert_close;
 use glam::{DVec3, Vec3, Vec4};
 use vecrad::{
     hierarchy::{Hierarchy, NodeId, Reading, Tables},
@@ -82,9 +85,6 @@ fn vector_irradiance_pushed_to_a_face_is_equation_12_per_area() {
     for node in [Hierarchy::ROOT, NodeId(1)] {
         let found = kernel.vector_irradiance(node, point).on_face(normal).x;
         // At 900 units the cluster of 71 units saturates by its own form factor, about 0.001.
-        assert!(
-            (found / exact - 1.0).abs() < 5e-3,
-            "{node:?}: {found} {exact}"
-        );
+        assert_close(found, exact, 5e-3, format_args!("{node:?}"));
     }
 }

@@ -2,8 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{f32::consts::PI, sync::Arc};
 
+use common::{prepare, solve, step_to_end};
 use glam::{DVec3, Vec3};
 use vecrad::{
     geometry::area_vector,
@@ -89,9 +92,7 @@ fn two_lamps() -> Arc<Scene> {
 }
 
 fn solved(scene: &Arc<Scene>, settings: SolveSettings) -> Solver {
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver
+    solve(scene, settings).0
 }
 
 /// The light of a solve after other appearances were wished for; all of it presentable.
@@ -346,7 +347,7 @@ fn the_same_bits_on_any_number_of_threads() {
 #[test]
 fn before_the_first_step_only_direct_light_changes() {
     let scene = cornell();
-    let mut solver = Solver::new(scene.clone(), settings(), None, &Cancel::default()).unwrap();
+    let mut solver = prepare(&scene, settings());
     let before = radiance(&solver.snapshot());
     let found = radiance(&relit(
         &mut solver,
@@ -354,7 +355,7 @@ fn before_the_first_step_only_direct_light_changes() {
     ));
     let expected: Vec<Vec3> = before.iter().map(|light| *light * 2.0).collect();
     assert!(difference(&found, &expected) < 1e-5);
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    step_to_end(&mut solver, |_, _| {});
     let mean = mean_irradiance(&solver.snapshot());
     let fresh = mean_irradiance(&solved(&scene, settings()).snapshot());
     assert!(

@@ -2,12 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{f64::consts::TAU, sync::Arc};
 
 use glam::{DVec3, Vec3};
 use vecrad::{
-    scene::{Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, TriangleId},
-    solver::{Cancel, Snapshot, SolveSettings, Solver},
+    scene::{Material, MaterialId, Scene, SceneBuilder, Sides, TriangleId},
+    solver::{Snapshot, SolveSettings},
 };
 
 const COLUMN_RADIUS: f64 = 0.4;
@@ -91,11 +93,7 @@ fn hall(turned: usize, sides: Sides) -> Arc<Scene> {
             DVec3::new(x + COLUMN_RADIUS * sin, 4.0 * v, z + COLUMN_RADIUS * cos)
         });
     }
-    let options = SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).unwrap())
+    common::finish(builder, sides)
 }
 
 fn solve(scene: &Arc<Scene>) -> Snapshot {
@@ -103,9 +101,7 @@ fn solve(scene: &Arc<Scene>) -> Snapshot {
         max_steps: 3,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver.snapshot()
+    common::solve(scene, settings).0.snapshot()
 }
 
 /// Mean irradiance over what is seen in the hall of a material, and over what is within columns.

@@ -2,12 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{fs, path::Path, sync::Arc};
 
+use common::solve;
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
     scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_obj, write_builtin},
-    solver::{Cancel, LeftOut, Snapshot, SolveSettings, Solver},
+    solver::{Cancel, LeftOut, Snapshot, SolveSettings},
 };
 
 /// A triangle whose material names a picture.
@@ -220,10 +223,7 @@ fn read_square(folder: &Path, texcoords: &[[f64; 2]], faces: [[usize; 3]; 2]) ->
 }
 
 fn lit(scene: &Arc<Scene>) -> Snapshot {
-    let settings = SolveSettings::draft();
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver.snapshot()
+    solve(scene, SolveSettings::draft()).0.snapshot()
 }
 
 /// Texture coordinates of a point of a triangle.

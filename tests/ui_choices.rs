@@ -32,7 +32,7 @@ use vecrad::{
         view::{ViewMode, ViewRequest},
     },
 };
-use windows::{perform, plates, wait_for, window};
+use windows::{ONE_TRIANGLE, perform, plates, wait_for, window};
 
 /// What eframe keeps in a file.
 #[derive(Default)]
@@ -251,7 +251,7 @@ fn light_of_a_grey_scene_is_one_figure() {
 fn a_scene_without_emitters_has_nothing_to_scale() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let scene = folder.path().join("dark.obj");
-    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
     let mut harness = window(Options {
         source: Some(SceneSource::File(scene)),
         settings: SolveSettings::draft(),
@@ -401,7 +401,7 @@ fn enter_confirms_a_dialog_and_leaves_the_camera() {
 fn a_typed_path_is_asked_for_again_until_it_can_be_read() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let scene = folder.path().join("lamp.obj");
-    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
     let mut harness = plates();
     harness.state_mut().state.panels.path_text = "/an/older/path.obj".to_owned();
     harness.get_by_label("File").click();

@@ -26,7 +26,7 @@ use vecrad::{
         view::ViewMode,
     },
 };
-use windows::{perform, plates, plates_of_size, wait_for, window};
+use windows::{ONE_TRIANGLE, perform, plates, plates_of_size, wait_for, window};
 
 fn press(harness: &mut Harness<'static, App>, key: Key) {
     harness.key_press(key);
@@ -268,7 +268,7 @@ fn a_colour_is_picked_without_a_missing_glyph() {
 fn pictures_are_saved_beside_the_scene() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let scene = folder.path().join("Hall.obj");
-    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
     let mut harness = window(Options {
         source: Some(SceneSource::File(scene)),
         settings: SolveSettings::draft(),

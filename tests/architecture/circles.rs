@@ -12,10 +12,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::code_of;
 
 /// Names of the folders and of the file below `src`; for a `mod.rs`, of the folders only.
-pub type ModulePath = Vec<String>;
+pub(super) type ModulePath = Vec<String>;
 
 /// Imports between children of a module: the importing child and the imported one.
-pub type SiblingImports = BTreeMap<ModulePath, BTreeSet<(String, String)>>;
+pub(super) type SiblingImports = BTreeMap<ModulePath, BTreeSet<(String, String)>>;
 
 /// A path of a `use` or of code, and whether it is re-exported.
 struct Import {
@@ -31,7 +31,7 @@ struct Tree<'a> {
 }
 
 /// Imports between siblings, by the module whose children they are. `sources` are all files.
-pub fn sibling_imports(sources: &BTreeMap<ModulePath, String>) -> SiblingImports {
+pub(super) fn sibling_imports(sources: &BTreeMap<ModulePath, String>) -> SiblingImports {
     let imports: Vec<(&ModulePath, Vec<Import>)> = sources
         .iter()
         .map(|(module, source)| (module, imports_of(&code_of(source))))
@@ -209,7 +209,7 @@ fn names_of(path: &str) -> Vec<String> {
 }
 
 /// A circle among imports, where there is one: names in the order in which they import each other, the first again last.
-pub fn circle(imports: &BTreeSet<(String, String)>) -> Option<Vec<String>> {
+pub(super) fn circle(imports: &BTreeSet<(String, String)>) -> Option<Vec<String>> {
     /// Go on from the last name of a path; `done` are names from which no circle is reached.
     fn search(
         imports: &BTreeSet<(String, String)>,
@@ -248,7 +248,10 @@ pub fn circle(imports: &BTreeSet<(String, String)>) -> Option<Vec<String>> {
 }
 
 /// Imports against an order, in which each name may import those before it. Names that are not in the order are free.
-pub fn upward(imports: &BTreeSet<(String, String)>, order: &[&str]) -> Vec<(String, String)> {
+pub(super) fn upward(
+    imports: &BTreeSet<(String, String)>,
+    order: &[&str],
+) -> Vec<(String, String)> {
     let place = |name: &str| order.iter().position(|known| *known == name);
     imports
         .iter()

@@ -13,6 +13,9 @@ use vecrad::{
     },
 };
 
+/// An OBJ file of one face.
+pub(crate) const ONE_TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
 /// Longest wait for a small scene on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
