@@ -34,11 +34,11 @@ fn scene(faces: &[[usize; 3]], sides: Sides) -> Arc<Scene> {
     for face in faces {
         builder.push_triangle(face.map(|corner| corners[corner]), material);
     }
-    let options = SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).expect("a sheet"))
+    Arc::new(
+        builder
+            .finish(&SceneOptions::with_sides(sides))
+            .expect("a sheet"),
+    )
 }
 
 fn snapshot(mesh: DisplayMesh) -> Snapshot {

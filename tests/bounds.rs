@@ -33,11 +33,9 @@ fn clumps(seed: u64) -> Scene {
             builder.push_triangle(corners, material);
         }
     }
-    let options = SceneOptions {
-        sides: Sides::Two,
-        ..SceneOptions::default()
-    };
-    builder.finish(&options).expect("the triangles are usable")
+    builder
+        .finish(&SceneOptions::with_sides(Sides::Two))
+        .expect("the triangles are usable")
 }
 
 /// Unoccluded irradiance (luminance) of a face, patch by patch in closed form.

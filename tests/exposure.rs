@@ -55,11 +55,9 @@ fn squares(kinds: &[(Square, usize)]) -> (Arc<Scene>, Snapshot) {
             }
         }
     }
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = builder.finish(&options).expect("squares");
+    let scene = builder
+        .finish(&SceneOptions::with_sides(Sides::One))
+        .expect("squares");
     let mesh = display_scenes::own_triangles(&scene);
     let mut irradiance = Vec::new();
     for &triangle in &mesh.triangle_of {

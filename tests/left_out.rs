@@ -15,11 +15,11 @@ use vecrad::{
 };
 
 fn scene(name: &str, sides: Sides) -> Arc<Scene> {
-    let options = SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    };
-    Arc::new(builtin::builtin(name, &options).unwrap().unwrap())
+    Arc::new(
+        builtin::builtin(name, &SceneOptions::with_sides(sides))
+            .unwrap()
+            .unwrap(),
+    )
 }
 
 fn draft(keep: Keep) -> SolveSettings {

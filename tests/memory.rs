@@ -23,11 +23,11 @@ fn peak_bytes() -> u64 {
 
 #[test]
 fn the_process_holds_no_more_than_the_limit() {
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = Arc::new(builtin::builtin("cornell", &options).unwrap().unwrap());
+    let scene = Arc::new(
+        builtin::builtin("cornell", &SceneOptions::with_sides(Sides::One))
+            .unwrap()
+            .unwrap(),
+    );
     // Elements without end at first, then links without end.
     for (mesh_tolerance, epsilon, limit) in [(1e-9, 10.0, 320 << 20), (1e-3, 0.0, 96 << 20)] {
         let settings = SolveSettings {

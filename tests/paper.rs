@@ -21,11 +21,9 @@ fn one_patch(corner: DVec3, legs: [DVec3; 2]) -> (Hierarchy, Tables) {
     let corners =
         [corner, corner + legs[0], corner + legs[1]].map(|point| builder.push_position(point));
     builder.push_triangle(corners, material);
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = builder.finish(&options).unwrap();
+    let scene = builder
+        .finish(&SceneOptions::with_sides(Sides::One))
+        .unwrap();
     let hierarchy = Hierarchy::new(&scene, 30.0);
     let tables = Tables::new(&hierarchy, |_| Vec4::ONE);
     (hierarchy, tables)

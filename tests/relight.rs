@@ -24,10 +24,7 @@ fn settings() -> SolveSettings {
 }
 
 fn one_sided() -> SceneOptions {
-    SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    }
+    SceneOptions::with_sides(Sides::One)
 }
 
 fn cornell() -> Arc<Scene> {

@@ -43,11 +43,11 @@ fn scene() -> Arc<Scene> {
         }
     }
     // Both copies of a two-sided face would be needed.
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).expect("two walls"))
+    Arc::new(
+        builder
+            .finish(&SceneOptions::with_sides(Sides::One))
+            .expect("two walls"),
+    )
 }
 
 /// The scene's own triangles under even light.

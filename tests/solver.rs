@@ -6,7 +6,7 @@ mod common;
 
 use std::{f32::consts::PI, sync::Arc};
 
-use common::{assert_close, finish, options, prepare, step_to_end};
+use common::{assert_close, finish, prepare, step_to_end};
 use glam::Vec3;
 use vecrad::{
     geometry::{RayTree, area_vector},
@@ -18,7 +18,7 @@ use vecrad::{
 
 fn scene(name: &str) -> Arc<Scene> {
     Arc::new(
-        builtin::builtin(name, &options(Sides::One))
+        builtin::builtin(name, &SceneOptions::with_sides(Sides::One))
             .unwrap()
             .unwrap(),
     )
@@ -140,7 +140,7 @@ fn solve_furnace(
 ) -> (Vec<StepReport>, f64) {
     let options = SceneOptions {
         max_reflectance: 0.9999,
-        ..options(Sides::One)
+        ..SceneOptions::with_sides(Sides::One)
     };
     let scene = Arc::new(builder.finish(&options).unwrap());
     let mut solver = prepare(&scene, settings.clone());

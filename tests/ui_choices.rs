@@ -511,10 +511,7 @@ fn a_wall_that_is_painted_lights_what_was_left_out() {
     }
     let mut harness = window(Options {
         source: Some(SceneSource::File(folder.path().join("scene.obj"))),
-        scene_options: SceneOptions {
-            sides: Sides::One,
-            ..SceneOptions::default()
-        },
+        scene_options: SceneOptions::with_sides(Sides::One),
         settings: SolveSettings::draft(),
         ..Options::default()
     });

@@ -368,10 +368,7 @@ mod tests {
 
     #[test]
     fn the_two_sides_of_a_wall_come_into_the_clusters_of_their_rooms() {
-        let options = SceneOptions {
-            sides: Sides::One,
-            ..SceneOptions::default()
-        };
+        let options = SceneOptions::with_sides(Sides::One);
         let scene = stability::rooms_with_pin_hole(0.5)
             .finish(&options)
             .unwrap();

@@ -270,11 +270,7 @@ mod tests {
             builder.push_triangle([a, b, c], MaterialId(material));
             builder.push_triangle([a, c, d], MaterialId(material));
         }
-        let options = SceneOptions {
-            sides,
-            ..SceneOptions::default()
-        };
-        builder.finish(&options).unwrap()
+        builder.finish(&SceneOptions::with_sides(sides)).unwrap()
     }
 
     fn tree(scene: &Scene) -> PatchTree {

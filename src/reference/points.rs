@@ -455,11 +455,10 @@ mod tests {
         }
 
         fn sample(self) -> (Scene, Vec<ReferencePoint>, SampledSurfaces) {
-            let options = SceneOptions {
-                sides: Sides::One,
-                ..SceneOptions::default()
-            };
-            let scene = self.0.finish(&options).unwrap();
+            let scene = self
+                .0
+                .finish(&SceneOptions::with_sides(Sides::One))
+                .unwrap();
             let (points, surfaces) = sample_points(&scene, COUNT, 1);
             assert_eq!(points.len(), COUNT as usize);
             for point in &points {

@@ -374,11 +374,10 @@ mod tests {
         }
         builder.push_triangle([4, 5, 6], light);
         let orientation = |sides| {
-            let options = SceneOptions {
-                sides,
-                ..SceneOptions::default()
-            };
-            let scene = builder.clone().finish(&options).unwrap();
+            let scene = builder
+                .clone()
+                .finish(&SceneOptions::with_sides(sides))
+                .unwrap();
             let kinds = scene.warnings.iter().map(|warning| warning.kind);
             kinds
                 .filter(|&kind| kind == WarningKind::Orientation)

@@ -36,6 +36,14 @@ impl Default for SceneOptions {
 }
 
 impl SceneOptions {
+    /// The default, with these sides.
+    pub fn with_sides(sides: Sides) -> Self {
+        Self {
+            sides,
+            ..Self::default()
+        }
+    }
+
     /// The largest reflectance, within 0…1.
     pub(super) fn reflectance_limit(&self) -> f32 {
         self.max_reflectance.clamp(0.0, 1.0)

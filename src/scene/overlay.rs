@@ -343,11 +343,10 @@ mod tests {
         }
 
         fn scene(&self, sides: Sides) -> Scene {
-            let options = SceneOptions {
-                sides,
-                ..SceneOptions::default()
-            };
-            self.0.clone().finish(&options).expect("it has faces")
+            self.0
+                .clone()
+                .finish(&SceneOptions::with_sides(sides))
+                .expect("it has faces")
         }
     }
 

@@ -10,17 +10,9 @@ use vecrad::{
     solver::{Cancel, SolveSettings, Solver, StepReport},
 };
 
-/// Default options, with these sides.
-pub(crate) fn options(sides: Sides) -> SceneOptions {
-    SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    }
-}
-
 /// The scene of a builder whose faces are usable.
 pub(crate) fn finish(builder: SceneBuilder, sides: Sides) -> Arc<Scene> {
-    Arc::new(builder.finish(&options(sides)).unwrap())
+    Arc::new(builder.finish(&SceneOptions::with_sides(sides)).unwrap())
 }
 
 /// A solver before its first step.

@@ -24,10 +24,7 @@ impl Exhibit {
     pub fn scene(&self) -> Result<Scene, BuildError> {
         let mut builder = (self.builder)();
         self.name.clone_into(&mut builder.source.name);
-        builder.finish(&SceneOptions {
-            sides: self.sides,
-            ..SceneOptions::default()
-        })
+        builder.finish(&SceneOptions::with_sides(self.sides))
     }
 }
 
