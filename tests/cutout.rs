@@ -214,7 +214,7 @@ fn the_command_line_leaves_the_background_out() {
             .output()
             .expect("it can be run")
     };
-    // Nothing is drawn, so there is nothing to leave out.
+    // Nothing is drawn, so there is nothing to omit.
     assert_eq!(run(&["--transparent"]).status.code(), Some(2));
     let flags = ["--screenshot", "a.png", "--transparent", "--size", "64x64"];
     let output = run(&flags);

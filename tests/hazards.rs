@@ -96,12 +96,12 @@ fn hazards_of_the_obj_file_are_cured_with_a_warning() {
         (
             format!("{POINTS}v 1e39 0 0\n{face}f 1 2 5"),
             LineSkipped,
-            "scene.obj:5: vertex that is not a finite number; faces that use it are left out",
+            "scene.obj:5: vertex that is not a finite number; faces that use it are omitted",
         ),
         (
             format!("{POINTS}v 1.#QNAN 0 0\n{face}f 1 2 5"),
             LineSkipped,
-            "scene.obj:5: vertex without three numbers; faces that use it are left out",
+            "scene.obj:5: vertex without three numbers; faces that use it are omitted",
         ),
         (
             format!("{POINTS}{face}f 1 2 5"),
@@ -136,12 +136,12 @@ fn hazards_of_the_obj_file_are_cured_with_a_warning() {
         (
             format!("{POINTS}{face}l 1 2\np 1"),
             Unsupported,
-            "scene.obj:6: lines and points have no surface and were left out (2 times)",
+            "scene.obj:6: lines and points have no surface and were omitted (2 times)",
         ),
         (
             format!("{POINTS}{face}surf 0 1 0 1 1"),
             Unsupported,
-            "scene.obj:6: free-form curves and surfaces (NURBS) were left out; export them as polygons",
+            "scene.obj:6: free-form curves and surfaces (NURBS) were omitted; export them as polygons",
         ),
         (
             format!("{POINTS}vt x\n{face}"),

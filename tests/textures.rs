@@ -316,18 +316,15 @@ fn coordinates_far_from_the_origin_keep_their_digits_and_their_neighbours() {
         (one[2] - one[0], one[1] - one[0]),
         (Vec2::splat(0.5), Vec2::new(0.5, 0.0))
     );
-    // Whole periods may be left out, parts of one may not.
+    // Whole periods may be omitted, parts of one may not.
     assert_eq!(one[0] - one[0].floor(), Vec2::new(0.75, 0.125));
     assert!(lit(&scene).mesh.repeated.is_empty());
 }
 
-/// Names and counts of what is left out.
-fn left_out(scene: &Scene) -> Vec<(&'static str, u64)> {
-    let left_out = LeftOut::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
-    left_out
-        .iter()
-        .map(|left| (left.name, left.count))
-        .collect()
+/// Names and counts of what is omitted.
+fn omissions(scene: &Scene) -> Vec<(&'static str, u64)> {
+    let omitted = LeftOut::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
+    omitted.iter().map(|left| (left.name, left.count)).collect()
 }
 
 #[test]
@@ -355,12 +352,12 @@ fn a_picture_of_one_colour_costs_nothing() {
             scene.materials[0].reflectance,
             scene.surfaces[0].reflectance
         );
-        assert!(left_out(scene).contains(&("constant-textures", 1)));
+        assert!(omissions(scene).contains(&("constant-textures", 1)));
     }
     assert_eq!(large.surfaces, small.surfaces, "whatever the size");
     assert_eq!((spotted.textures.len(), spotted.texcoords.len()), (1, 1));
     assert!(
-        left_out(&spotted)
+        omissions(&spotted)
             .iter()
             .all(|left| left.0 != "constant-textures")
     );
@@ -392,7 +389,7 @@ fn pictures_that_no_face_shows_are_not_read() {
     };
     assert_eq!(said(&scene), 0, "{:?}", scene.warnings);
     assert_eq!(scene.spared.unused_textures, 3);
-    assert!(left_out(&scene).contains(&("unused-textures", 3)));
+    assert!(omissions(&scene).contains(&("unused-textures", 3)));
     assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.25));
     // Once a face shows them, they are read.
     let scene = read("vt 0 0\nvt 1 0\nvt 0 1\nusemtl flat\nf 1/1 2/2 3/3");

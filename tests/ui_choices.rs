@@ -504,7 +504,7 @@ fn target_is_lit(app: &App) -> bool {
 }
 
 #[test]
-fn a_wall_that_is_painted_lights_what_was_left_out() {
+fn a_wall_that_is_painted_lights_what_was_omitted() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in LAMP_WALL_AND_TARGET {
         fs::write(folder.path().join(name), text).unwrap();

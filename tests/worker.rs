@@ -778,7 +778,7 @@ fn is_relit(event: &Event) -> bool {
     matches!(event, Event::Relit { .. })
 }
 
-/// The light is changed and all that it left out is worked out.
+/// The light is changed and all that it omitted is worked out.
 fn is_relit_finely(event: &Event) -> bool {
     matches!(event, Event::Relit { seconds: None, .. })
 }

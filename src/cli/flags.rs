@@ -163,10 +163,10 @@ pub struct SettingFlags {
         help_heading = "Settings"
     )]
     pub seed: Option<u64>,
-    /// Do not leave this out where the scene does not need it; may be given several times
+    /// Do not omit this where the scene does not need it; may be given several times
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Settings")]
     pub keep: Vec<Omission>,
-    /// Leave nothing out that the scene does not need
+    /// Omit nothing that the scene does not need
     #[arg(long, conflicts_with = "keep", help_heading = "Settings")]
     pub keep_all: bool,
 }

@@ -68,7 +68,7 @@ pub struct SolveArguments {
     #[cfg(feature = "viewer")]
     #[command(flatten)]
     pub picture: super::picture::PictureFlags,
-    /// Say what is left out because this scene does not need it, and why
+    /// Say what is omitted because this scene does not need it, and why
     #[arg(long, help_heading = "Output")]
     pub explain: bool,
     /// No progress line
@@ -343,13 +343,13 @@ fn drain(
     })
 }
 
-/// Say what is left out, one line each.
+/// Say what is omitted, one line each.
 fn explain(snapshot: &Snapshot) {
     if snapshot.left_out.is_empty() {
-        output::say("left out: nothing, this scene needs all of it");
+        output::say("omitted: nothing, this scene needs all of it");
     }
-    for left_out in snapshot.left_out.iter() {
-        output::say(format_args!("left out: {left_out}"));
+    for omission in snapshot.left_out.iter() {
+        output::say(format_args!("omitted: {omission}"));
     }
 }
 

@@ -6,7 +6,7 @@
 //!
 //! Positions are world units from the node's place, so that single precision suffices far from the origin. glTF is Y-up: a
 //! scene with +Z up stands under a turned root node, its numbers stay. Each side of a two-sided face has triangles of its
-//! own, so that the material is one-sided always. Textures are left out: vertices have their mean.
+//! own, so that the material is one-sided always. Textures are omitted: vertices have their mean.
 
 use std::{
     f64::consts::FRAC_1_SQRT_2,

@@ -81,17 +81,17 @@ impl PatchTree {
         grow(scene, sheets, lit_sides(scene), &[], cancelled)
     }
 
-    /// The tree over the patches that are not left out, of which there is at least one; the others follow in their order.
+    /// The tree over the patches that are not omitted, of which there is at least one; the others follow in their order.
     /// `None` when cancelled.
     pub fn without(
         &self,
         scene: &Scene,
         sheets: Option<&SheetSides>,
-        left_out: &[bool],
+        omitted: &[bool],
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
         let of = |is_out: bool| {
-            let flagged = self.patches.iter().zip(left_out);
+            let flagged = self.patches.iter().zip(omitted);
             let chosen = flagged.filter(move |(_, flag)| **flag == is_out);
             chosen.map(|(patch, _)| Item::of(scene, patch.triangle, patch.is_back))
         };

@@ -97,7 +97,7 @@ impl Hierarchy {
     }
 
     /// Parts of a patch, none within another, that emit evenly as far as elements tell: leaves, and elements all of whose
-    /// leaves emit the same. What emits nothing is left out.
+    /// leaves emit the same. What emits nothing is omitted.
     pub fn emitting_parts(&self, patch: usize) -> Vec<usize> {
         let mut parts = Vec::new();
         self.collect_even(patch, &mut parts);

@@ -15,7 +15,7 @@ use crate::{
 
 /// What is nearer to a plane than this lies in it, in frame units. Positions are rounded to 4e-6 there and normals tilted
 /// by 6e-8, over 100 units: below 2e-5 flat walls would rise over themselves. Rays start at twice this distance, so they
-/// cannot tell either. What it leaves out is the light between surfaces that rise over each other by less than a
+/// cannot tell either. What it omits is the light between surfaces that rise over each other by less than a
 /// two-millionth of the scene.
 const IN_PLANE: f32 = 5e-5;
 

@@ -232,7 +232,7 @@ impl Hierarchy {
         (patch != u32::MAX).then_some(patch as usize)
     }
 
-    /// The clusters that hold a patch, the root first; none where it is left out.
+    /// The clusters that hold a patch, the root first; none where it is omitted.
     pub fn clusters_over(&self, patch: usize) -> impl Iterator<Item = usize> + '_ {
         let root = self.held().contains(&patch).then_some(0);
         std::iter::successors(root, move |&index: &usize| {

@@ -2,7 +2,7 @@
 //!
 //! With x the luminance measured, r that of the reference and s its standard error, over n points:
 //! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. What means over the points are means of is told
-//! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are left out, since their own light would
+//! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are omitted, since their own light would
 //! dwarf the rest; where every point emits, all count.
 
 use glam::Vec3;
@@ -23,7 +23,7 @@ pub struct ErrorMeasures {
     /// The same with the reference's noise still in it.
     pub relative_rms_noisy: f64,
     /// `relative_rms` without the worst 1 % of the points, which are mostly leaks under contact edges. Only points that
-    /// differ by more than the reference's noise can explain are left out.
+    /// differ by more than the reference's noise can explain are omitted.
     pub relative_rms_trimmed: f64,
     /// Mean measured over mean reference; 1 is right, absent where the reference is black.
     pub energy_ratio: Option<f64>,
@@ -174,7 +174,7 @@ fn luminance_measures(samples: &[Sample]) -> ErrorMeasures {
     }
 }
 
-/// Standard errors of the reference by which a point must differ to be left out. Smaller, and noise is trimmed away and
+/// Standard errors of the reference by which a point must differ to be omitted. Smaller, and noise is trimmed away and
 /// then subtracted once more; larger, and nothing can be trimmed under a noisy reference.
 const OUTLIER_DEVIATIONS: f64 = 4.0;
 
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn emitters_are_left_out_unless_all_emit() {
+    fn emitters_are_omitted_unless_all_emit() {
         let reference = [point(1.0, 0.0, 0.0), point(1.0, 50.0, 0.0)];
         let error = measure_error(&values(&[1.0, 0.0]), &reference).unwrap();
         assert_eq!(error.points, 1);

@@ -10,7 +10,7 @@ use crate::solver::SolveSettings;
 pub struct Measurement {
     /// Number of the step or pass, from 1.
     pub step: u32,
-    /// Seconds of computing, preparation included, measuring left out; the median where a run was repeated.
+    /// Seconds of computing, preparation included, measuring excluded; the median where a run was repeated.
     pub time_s: f64,
     /// Link threshold of the step, for solver runs.
     pub epsilon: Option<f32>,

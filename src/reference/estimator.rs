@@ -17,7 +17,7 @@ use crate::{
 /// Bounces before Russian roulette begins. Earlier, noise grows; later, dark scenes waste rays.
 const SURE_BOUNCES: u32 = 3;
 
-/// Bounces after which a path is cut. At the reflectance clamp of 0.98 it leaves out a share of 1e-36; it only ends
+/// Bounces after which a path is cut. At the reflectance clamp of 0.98 it omits a share of 1e-36; it only ends
 /// the paths of a closed scene whose clamp was raised to 1.
 const MAX_BOUNCES: u32 = 4096;
 

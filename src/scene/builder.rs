@@ -109,7 +109,7 @@ impl SceneBuilder {
         });
     }
 
-    /// Say that faces, or parts of faces, of these lines were left out; nothing where there are none.
+    /// Say that faces, or parts of faces, of these lines were omitted; nothing where there are none.
     pub(super) fn warn_of_lines(&mut self, what: &str, reason: &'static str, lines: &[u32]) {
         if let Some(&line) = lines.first() {
             let count = lines.len();
@@ -144,7 +144,7 @@ impl SceneBuilder {
     }
 }
 
-/// Faces left out for one reason.
+/// Faces omitted for one reason.
 pub(super) struct Skipped {
     pub(super) reason: &'static str,
     pub(super) count: usize,

@@ -64,7 +64,7 @@ pub(super) struct Notes {
     pub(super) libraries: Vec<Mention>,
     /// The first number of a vertex in a notation that cannot be read.
     pub(super) foreign_number: Option<ForeignNumber>,
-    /// Faces that were left out.
+    /// Faces that were omitted.
     pub(super) skipped_faces: usize,
     /// OBJ statements that were understood.
     pub(super) statements: usize,
@@ -187,15 +187,15 @@ impl<R: BufRead> ObjCleaner<R> {
             b"" | [b'#', ..] => return,
             b"l" | b"p" => (
                 WarningKind::Unsupported,
-                "lines and points have no surface and were left out",
+                "lines and points have no surface and were omitted",
             ),
             b"curv" | b"curv2" | b"surf" => (
                 WarningKind::Unsupported,
-                "free-form curves and surfaces (NURBS) were left out; export them as polygons",
+                "free-form curves and surfaces (NURBS) were omitted; export them as polygons",
             ),
             b"call" | b"csh" => (
                 WarningKind::Unsupported,
-                "calls of other files and commands were left out",
+                "calls of other files and commands were omitted",
             ),
             // Smoothing, display hints and the details of free-form surfaces change nothing here.
             b"s" | b"mg" | b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"parm" | b"trim"
@@ -226,12 +226,12 @@ impl<R: BufRead> ObjCleaner<R> {
                     let first = ForeignNumber { notation, line };
                     self.notes.foreign_number.get_or_insert(first);
                     let Notation { name, cure } = notation;
-                    &format!("vertex with {name}; faces that use it are left out; {cure}")
+                    &format!("vertex with {name}; faces that use it are omitted; {cure}")
                 }
                 None if trouble == Number::NotFinite => {
-                    "vertex that is not a finite number; faces that use it are left out"
+                    "vertex that is not a finite number; faces that use it are omitted"
                 }
-                None => "vertex without three numbers; faces that use it are left out",
+                None => "vertex without three numbers; faces that use it are omitted",
             };
             self.note(WarningKind::LineSkipped, message, line);
         } else if rest.nth(2).is_some() {

@@ -40,7 +40,7 @@ pub(super) fn are_apart(a: &[DVec2], b: &[DVec2], width: f64) -> bool {
     is_beyond(a, b) || is_beyond(b, a)
 }
 
-/// Cut triangles out of a polygon. Pieces less wide than `least` are left out.
+/// Cut triangles out of a polygon. Pieces less wide than `least` are omitted.
 pub(super) fn cut_out(polygon: Vec<DVec2>, triangles: &[[DVec2; 3]], least: f64) -> Parts {
     let mut parts = Parts::default();
     cut_into(&mut parts, polygon, triangles, least, 0);

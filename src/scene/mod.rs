@@ -202,7 +202,7 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// What was skipped, cured or clamped on the way in.
     pub warnings: Vec<Warning>,
-    /// Textures that were left out on the way in.
+    /// Textures that were omitted on the way in.
     pub spared: Spared,
     /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
     pub max_reflectance: f32,

@@ -365,7 +365,7 @@ impl Import<'_> {
             }
             Err(error) => {
                 let message =
-                    format!("material file '{file}' was left out: it cannot be read ({error})");
+                    format!("material file '{file}' was omitted: it cannot be read ({error})");
                 log.note(WarningKind::MaterialMissing, &message, "", 0);
             }
         }

@@ -295,7 +295,7 @@ impl Piece {
     }
 }
 
-/// Pieces of less than about this share of their face are left out: between corners that lie on a line.
+/// Pieces of less than about this share of their face are omitted: between corners that lie on a line.
 const LEAST_SHARE: f64 = 1e-9;
 
 #[cfg(test)]

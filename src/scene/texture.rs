@@ -41,7 +41,7 @@ impl Texture {
     }
 }
 
-/// Textures that were left out while a scene was read. Of a picture that several materials name, each name counts.
+/// Textures that were omitted while a scene was read. Of a picture that several materials name, each name counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Spared {
     /// Of one colour, which the material has instead.

@@ -5,7 +5,7 @@ use std::fmt;
 /// What kind of trouble, for grouping and for tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum WarningKind {
-    /// A face was left out: bad index, non-finite or too few corners, zero area.
+    /// A face was omitted: bad index, non-finite or too few corners, zero area.
     FaceSkipped,
     /// A line of the OBJ or MTL file could not be used.
     LineSkipped,

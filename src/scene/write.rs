@@ -2,7 +2,7 @@
 //!
 //! Coordinates have the fewest digits that lead back to the same position in the frame. Files are written aside and
 //! renamed, the OBJ last, so that no half of a scene is ever found under its name. What OBJ cannot say (that a closed
-//! shell is two-sided) is left out.
+//! shell is two-sided) is omitted.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;

@@ -88,7 +88,7 @@ pub enum Action {
         path: PathBuf,
         /// Width and height.
         size: [u32; 2],
-        /// Whether the background is left out.
+        /// Whether the background is omitted.
         is_transparent: bool,
     },
     /// Ask where the lit mesh is to go.

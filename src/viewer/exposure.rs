@@ -10,7 +10,7 @@ const BRIGHT_END: f64 = 1.6;
 /// The part of the light's pixels that lie below its bright end.
 const BRIGHT_SHARE: f64 = 0.95;
 /// Pixels this many times darker than the bright end count half, and darker ones less: exposed by the bright end, they
-/// are within a few steps of 255 from black. A smaller ratio leaves dim rooms out of account; a larger one lets light
+/// are within a few steps of 255 from black. A smaller ratio ignores dim rooms; a larger one lets light
 /// that nobody can see, such as a leak of a thousandth, decide about the picture.
 const CONTRAST: f64 = 500.0;
 

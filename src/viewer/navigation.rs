@@ -72,12 +72,12 @@ fn fly(ui: &egui::Ui, state: &mut State) {
     if keys == Vec3::ZERO {
         return;
     }
-    let haste = match (modifiers.shift, modifiers.ctrl) {
+    let speed_factor = match (modifiers.shift, modifiers.ctrl) {
         (true, _) => 4.0,
         (_, true) => 0.25,
         _ => 1.0,
     };
-    let step = state.panels.fly_speed * haste * seconds;
+    let step = state.panels.fly_speed * speed_factor * seconds;
     state.rig.target.fly(keys * step);
     ui.ctx().request_repaint();
 }

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use serde::Serialize;
 
-use super::{Effect, Generation, visit::Returned};
+use super::{Effect, Generation, request::Returned};
 use crate::{
     geometry::RayTree,
     scene::{Appearance, Scene},
@@ -29,7 +29,7 @@ pub struct RunOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
-    /// The threshold asked for is reached and light has settled.
+    /// The threshold asked for is reached and light has converged.
     Converged,
     /// The steps asked for are used up before the threshold is reached.
     StepLimit,
@@ -77,11 +77,11 @@ pub enum Event {
     Relit {
         /// What is known of the light.
         report: StepReport,
-        /// Seconds that it took; nothing where what was shown in haste has been worked out.
+        /// Seconds that it took; nothing where a preview was refined.
         seconds: Option<f64>,
-        /// Whether light is missing that only a run that begins anew will show (see
+        /// Whether light is missing that only a restart will show (see
         /// [`Relit::is_outgrown`](crate::solver::Relit::is_outgrown)).
-        is_outgrown: bool,
+        needs_restart: bool,
     },
     /// An answer to [`super::WorkerHandle::inspect`].
     Inspected(Arc<Inspection>),

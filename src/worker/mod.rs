@@ -3,8 +3,8 @@
 //! [`WorkerHandle`] owns a named thread that only waits, so that every command is answered at once. It hands the solve
 //! back and forth between itself and a pool of solver threads, one step at a time; dropping the handle cancels the step
 //! under way and joins. Every run has a [`Generation`]; the handle shows nothing of an older one.
-//! Nothing waits long for a solve that has been cancelled: what has not come home a moment later is left behind, with
-//! its threads, and ends there by itself.
+//! Nothing waits long for a solve that has been cancelled: one that the pool has not returned a moment later is abandoned
+//! with its threads, and ends there.
 //! The window and the headless commands drain the same handle; neither needs to know how a step is made.
 
 mod controller;
@@ -13,12 +13,12 @@ mod generation;
 mod message;
 mod outbox;
 mod priority;
+mod request;
 mod run;
 mod slot;
 mod stepper;
 mod trajectory;
 mod truth;
-mod visit;
 
 use std::{
     io,

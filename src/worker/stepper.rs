@@ -25,7 +25,7 @@ pub trait Stepper: Send {
     /// Light materials that look so, one for each, without refining; `None` when cancelled on the way.
     fn relight(&mut self, appearances: &[Appearance], cancel: &Cancel) -> Option<Relit>;
 
-    /// Work out what a rough relighting left out; `None` when cancelled on the way.
+    /// Refine the preview that a relighting made; `None` when cancelled on the way.
     fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport>;
 }
 

@@ -181,7 +181,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
          Errors are relative RMS of radiance at random points against path tracing, without the worst 1 % of the points \
          and without the noise of the reference.\n\
          \"†\" marks runs that the time limit, or another one, cut short; stochastic Jacobi radiosity has no end but the limit.\n\
-         Times are seconds of computing, preparation included, reading the scene and measuring left out; \"≤\" where \
+         Times are seconds of computing, preparation included, reading the scene and measuring excluded; \"≤\" where \
          the first measurement was already better, \"–\" where a run never came so far.\n\
          Errors far below the noise of the reference cannot be told from none: they read \"below noise\", times to them \"?\".\n\
          Links, rays and memory are those at the best error. The ratio divides the time of the faster bake, whose mesh \

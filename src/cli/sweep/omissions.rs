@@ -131,7 +131,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
          vecrad {}, {}, {} threads.\n\
          Settings: {}.\n\
          Each scene is solved as planned (`nothing` kept), with one omission kept, and with all kept.\n\
-         Keeping `rays` keeps `elements` and `clusters`, too, which rest on them; where one thing is left out, keeping it is keeping all.\n\
+         Keeping `rays` keeps `elements` and `clusters`, too, which rest on them; where one thing is omitted, keeping it is keeping all.\n\
          Times are wall-clock seconds of preparing and stepping, the median of the rounds; ratios are to the run as planned.\n\
          The difference is that of the irradiance at random points of the surfaces from the run that keeps all, relative root mean square; \
          \"of seeds\" is that between two runs that keep all and have different seeds. \

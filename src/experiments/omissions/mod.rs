@@ -32,7 +32,7 @@ const PLANS: u32 = 9;
 /// Name of the run that obeys the plan.
 const AS_PLANNED: &str = "nothing";
 
-/// Name of the run that leaves nothing out.
+/// Name of the run that omits nothing.
 const ALL: &str = "all";
 
 /// Name of the run that differs from the last by its seed: it is there for the noise, and once is enough.
@@ -217,11 +217,11 @@ pub struct Comparison {
     pub scene: String,
     /// Its triangles.
     pub triangles: usize,
-    /// Names of what is left out.
+    /// Names of what is omitted.
     pub left_out: Vec<&'static str>,
-    /// Seconds that it takes to see what can be left out, beside planting the tree; median.
+    /// Seconds that it takes to see what can be omitted, beside planting the tree; median.
     pub plan_s: f64,
-    /// As [`Cost::difference`], of two runs that keep everything and have other seeds. Unknown where nothing is left out.
+    /// As [`Cost::difference`], of two runs that keep everything and have other seeds. Unknown where nothing is omitted.
     pub noise: Option<f64>,
     /// The runs: first the one that obeys the plan, last the one that keeps everything.
     pub runs: Vec<Cost>,

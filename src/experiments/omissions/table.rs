@@ -98,18 +98,18 @@ pub fn omissions_markdown(comparisons: &[Comparison]) -> String {
     text + "\n"
 }
 
-/// A Markdown table of what it takes to see what can be left out.
+/// A Markdown table of what it takes to see what can be omitted.
 pub fn overhead_markdown(comparisons: &[Comparison]) -> String {
     let mut text = String::from(
-        "| scene | triangles | left out | making the plan | share of the run |\n|---|---:|---|---:|---:|",
+        "| scene | triangles | omitted | making the plan | share of the run |\n|---|---:|---|---:|---:|",
     );
     for comparison in comparisons {
-        let left_out = match comparison.left_out.join(", ") {
+        let omitted = match comparison.left_out.join(", ") {
             none if none.is_empty() => "nothing".to_owned(),
             names => names,
         };
         text += &format!(
-            "\n| {} | {} | {left_out} | {} | {} |",
+            "\n| {} | {} | {omitted} | {} | {} |",
             comparison.scene,
             grouped(comparison.triangles as u64),
             duration(comparison.plan_s),

@@ -194,7 +194,7 @@ impl Case {
         }
     }
 
-    /// The same case, left out where time is short.
+    /// The same case, omitted where time is short.
     fn slow(self) -> Self {
         Self {
             is_quick: false,

@@ -15,7 +15,7 @@ use super::{
 pub struct Curve {
     /// What the legend calls it.
     pub label: String,
-    /// Its points, joined in this order; those that are not positive cannot be shown and are left out.
+    /// Its points, joined in this order; those that are not positive cannot be shown and are omitted.
     pub points: Vec<[f64; 2]>,
     /// Dashed curves are what the others are compared with.
     pub is_dashed: bool,

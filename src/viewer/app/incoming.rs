@@ -51,9 +51,9 @@ impl App {
         self.want();
     }
 
-    /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by its haste.
-    fn no_file(&mut self, is_hasty: bool) {
-        let (severity, text) = if is_hasty {
+    /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by how soon it ends.
+    fn no_file(&mut self, is_immediate: bool) {
+        let (severity, text) = if is_immediate {
             self.state.panels.ask_for_path();
             let text = "this desktop has no file dialog; type the path instead";
             (Severity::Warning, text)
@@ -65,7 +65,7 @@ impl App {
 
     fn drain_worker(&mut self) {
         let run = self.worker.generation().number();
-        let mut is_outgrown = false;
+        let mut needs_restart = false;
         for event in self.worker.events() {
             let state = &mut self.state;
             match &event {
@@ -77,16 +77,16 @@ impl App {
                 }
                 // Later light of the same run may need less again.
                 Event::Relit {
-                    is_outgrown: is_now,
+                    needs_restart: is_now,
                     seconds: Some(_),
                     ..
-                } => is_outgrown = *is_now,
+                } => needs_restart = *is_now,
                 _ => {}
             }
             state.truth.note(&event, run, &state.settings);
             state.run.note(event);
         }
-        if is_outgrown {
+        if needs_restart {
             self.begin_again();
         }
         let held = &self.state.run.snapshot;

@@ -184,7 +184,7 @@ pub fn scale_ui(ui: &mut egui::Ui, scale: &Scale, unit: &str, start: f32) {
             .painter()
             .layout_no_wrap(mark_text(value), font.clone(), color);
         let left = x - 0.5 * text.size().x;
-        // Values that would touch the one before are left out; their mark tells where they are.
+        // Values that would touch the one before are omitted; their mark tells where they are.
         if left > free_from {
             free_from = left + text.size().x + 4.0;
             ui.painter().galley(pos2(left, y + 4.0), text, color);

@@ -40,7 +40,7 @@ fn picture_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) -
     });
     ui.checkbox(&mut panels.picture_is_transparent, "Transparent background")
         .on_hover_text(
-            "Leave the background out: straight alpha in a PNG, colours multiplied by alpha in an EXR",
+            "Omit the background: straight alpha in a PNG, colours multiplied by alpha in an EXR",
         );
     let label = "File: .png as seen, .exr with linear radiance";
     file_field(ui, label, &mut panels.picture_text);

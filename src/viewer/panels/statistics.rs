@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::{left_out, row};
+use super::{omissions, row};
 use crate::viewer::{
     figures::{count, figure, seconds},
     state::State,
@@ -108,7 +108,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
             );
         }
     });
-    left_out::left_out_ui(ui, state);
+    omissions::omissions_ui(ui, state);
     frame_ui(ui, state);
     if !state.adapter_name.is_empty() {
         ui.add_space(2.0);

@@ -109,7 +109,7 @@ impl<T: bytemuck::NoUninit> Instances<T> {
             return;
         }
         self.uploaded = instances.clone();
-        // More than the adapter takes at once are left out, the last first.
+        // More than the adapter takes at once are omitted, the last first.
         let fitting = (gpu.max_buffer_size as usize / size_of::<T>()).min(instances.len());
         let shown = &instances[..fitting];
         self.count = shown.len() as u32;

@@ -17,7 +17,7 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::{Generation, Wake, Watch, visit::describe};
+use super::{Generation, Wake, Watch, request::describe};
 use crate::{
     geometry::RayTree,
     metrics::ErrorMeasures,

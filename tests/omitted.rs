@@ -1,4 +1,4 @@
-//! What a scene does not need is left out, and the light is the same with it.
+//! What a scene does not need is omitted, and the light is the same with it.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -247,7 +247,7 @@ fn the_plan_is_explained_reported_and_can_be_switched_off() {
     let report = file.to_str().unwrap();
     let (code, said) = vecrad(&["--explain", "--report", report]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("left out: rays: "), "{said}");
+    assert!(said.contains("omitted: rays: "), "{said}");
     assert!(listed(&file).contains(&"rays".to_owned()));
     let (code, said) = vecrad(&[
         "--explain",

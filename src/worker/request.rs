@@ -1,4 +1,4 @@
-//! A visit of the solve to the pool: to be prepared, to step, or to answer.
+//! Requests to the pool of solver threads: to prepare a solve, to step it, or to inspect it.
 
 use std::{
     any::Any,
@@ -13,80 +13,80 @@ use crate::{
     solver::{Cancel, Inspection, Relit, Snapshot, StepReport, Subject},
 };
 
-/// A solve on its way to the pool.
-pub(super) struct Visit {
+/// A task for the pool, with the solve that it is about.
+pub(super) struct Request {
     /// The run that it belongs to.
     pub generation: Generation,
-    /// What is to be done there.
-    pub errand: Errand,
+    /// What the pool does.
+    pub task: Task,
 }
 
-/// What there is to do in the pool.
-pub(super) enum Errand {
+/// What the pool does with a solve.
+pub(super) enum Task {
     /// Make a solve, unless cancelled.
     Prepare(MakeStepper, Job, Cancel),
     /// Make one step, unless cancelled.
     Step(Box<dyn Stepper>, Cancel),
-    /// Light materials that look otherwise, unless cancelled.
+    /// Light the scene with other appearances of its materials, unless cancelled.
     Relight(Box<dyn Stepper>, Arc<[Appearance]>, Cancel),
-    /// Work out what relighting left out, unless cancelled.
+    /// Compute the light that a relighting omitted, unless cancelled.
     FinishRelighting(Box<dyn Stepper>, Cancel),
-    /// Look into nodes.
+    /// Inspect nodes.
     Inspect(Box<dyn Stepper>, Vec<Subject>),
 }
 
-/// The solve on its way back.
+/// The solve as the pool returns it.
 pub(super) struct Returned {
     /// The run that it belongs to.
     pub generation: Generation,
-    /// What the visit brought, nothing where there is no solve yet, or the text of a panic.
-    pub trip: Result<Option<Trip>, String>,
+    /// The completed task, nothing where there is no solve yet, or the text of a panic.
+    pub result: Result<Option<Completed>, String>,
 }
 
-/// What a visit brought.
-pub(super) struct Trip {
+/// A completed task.
+pub(super) struct Completed {
     /// The solve.
     pub stepper: Box<dyn Stepper>,
-    /// What came of it.
+    /// Its result.
     pub outcome: Outcome,
     /// Time that it took.
     pub spent: Duration,
 }
 
-/// What came of an errand.
+/// The result of a task.
 pub(super) enum Outcome {
     /// The solve is ready.
     Prepared(Snapshot),
     /// A step is done, or was cancelled.
     Stepped(Option<StepReport>, Snapshot),
-    /// Materials look otherwise, or it was cancelled.
+    /// The light of other appearances is there, or the task was cancelled.
     Relit(Option<Relit>, Snapshot),
-    /// What relighting left out is there, or it was cancelled.
+    /// The light that a relighting omitted is there, or the task was cancelled.
     RelitFinely(Option<StepReport>, Snapshot),
-    /// Nodes were looked into.
+    /// Nodes were inspected.
     Inspected(Vec<Inspection>),
 }
 
-impl Visit {
-    /// Do what there is to do.
-    pub(super) fn pay(self) -> Returned {
-        let Self { generation, errand } = self;
-        let trip = catch_unwind(AssertUnwindSafe(move || errand.run()));
+impl Request {
+    /// Run the task; a panic becomes its text.
+    pub(super) fn carry_out(self) -> Returned {
+        let Self { generation, task } = self;
+        let result = catch_unwind(AssertUnwindSafe(move || task.run()));
         Returned {
             generation,
-            trip: trip.map_err(|panic| describe(&*panic)),
+            result: result.map_err(|panic| describe(&*panic)),
         }
     }
 }
 
-impl Errand {
-    fn run(self) -> Option<Trip> {
+impl Task {
+    fn run(self) -> Option<Completed> {
         let begin = Instant::now();
         Some(match self {
             Self::Prepare(make, job, cancel) => {
                 let stepper = make(job, &cancel)?;
                 let spent = begin.elapsed();
-                Trip {
+                Completed {
                     outcome: Outcome::Prepared(stepper.snapshot()),
                     stepper,
                     spent,
@@ -95,7 +95,7 @@ impl Errand {
             Self::Step(mut stepper, cancel) => {
                 let report = stepper.step(&cancel);
                 let spent = begin.elapsed();
-                Trip {
+                Completed {
                     outcome: Outcome::Stepped(report, stepper.snapshot()),
                     stepper,
                     spent,
@@ -104,7 +104,7 @@ impl Errand {
             Self::Relight(mut stepper, appearances, cancel) => {
                 let relit = stepper.relight(&appearances, &cancel);
                 let spent = begin.elapsed();
-                Trip {
+                Completed {
                     outcome: Outcome::Relit(relit, stepper.snapshot()),
                     stepper,
                     spent,
@@ -113,7 +113,7 @@ impl Errand {
             Self::FinishRelighting(mut stepper, cancel) => {
                 let report = stepper.finish_relighting(&cancel);
                 let spent = begin.elapsed();
-                Trip {
+                Completed {
                     outcome: Outcome::RelitFinely(report, stepper.snapshot()),
                     stepper,
                     spent,
@@ -123,7 +123,7 @@ impl Errand {
                 let found = subjects
                     .iter()
                     .filter_map(|subject| stepper.inspect(subject));
-                Trip {
+                Completed {
                     outcome: Outcome::Inspected(found.collect()),
                     stepper,
                     spent: begin.elapsed(),

@@ -1,4 +1,4 @@
-//! What is left out as dark, and materials that are repainted so that light reaches it.
+//! What is omitted as dark, and materials that are repainted so that light reaches it.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -72,7 +72,7 @@ fn irradiance(scene: &Scene, snapshot: &Snapshot, material: usize) -> f32 {
 }
 
 #[test]
-fn light_that_reaches_what_was_left_out_asks_for_a_new_solve() {
+fn light_that_reaches_what_was_omitted_asks_for_a_new_solve() {
     let scene = scene();
     let mut lean = finished(solver(&scene, None));
     let unlit = lean.snapshot().left_out[0].clone();
@@ -96,7 +96,7 @@ fn light_that_reaches_what_was_left_out_asks_for_a_new_solve() {
 }
 
 #[test]
-fn what_begins_to_shine_where_it_was_left_out_asks_for_a_new_solve() {
+fn what_begins_to_shine_where_it_was_omitted_asks_for_a_new_solve() {
     let scene = scene();
     let mut lean = finished(solver(&scene, None));
     let shining = with(&scene, TARGET, |target| target.emission = Vec3::ONE);
@@ -141,15 +141,15 @@ fn the_worker_says_so_and_a_run_that_begins_again_is_right() {
     let scene = scene();
     let mut worker = WorkerHandle::spawn(Arc::new(|| {})).unwrap();
     let drain = |worker: &WorkerHandle| {
-        let mut outgrown = Vec::new();
+        let mut restarts = Vec::new();
         loop {
             match worker.next_event(Duration::from_secs(60)).unwrap() {
                 Event::Relit {
-                    is_outgrown,
+                    needs_restart,
                     seconds: Some(_),
                     ..
-                } => outgrown.push(is_outgrown),
-                Event::Finished(_) | Event::Paused => return outgrown,
+                } => restarts.push(needs_restart),
+                Event::Finished(_) | Event::Paused => return restarts,
                 _ => {}
             }
         }
