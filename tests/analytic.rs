@@ -62,7 +62,7 @@ fn matrix_gives_the_factors_of_plates() {
     let parallel_factor = analytic::parallel_rectangles(1.0, 1.0, 1.0);
     let perpendicular_factor = analytic::perpendicular_rectangles(1.0, 1.0, 1.0);
     // The midpoint rule with cells of 0.15 of the gap is good to some tenths of a percent; touching triangles
-    // get 1024 cells, so that the edge strip, where the integrand bends, is 1/32 of the plate.
+    // get 1024 cells, so that the edge strip, where the integrand varies most, is 1/32 of the plate.
     for n in [1, 4] {
         let found = first_plate_mean(&matrix_of(&parallel(n)));
         assert_close(found, parallel_factor, 0.003, format_args!("parallel {n}"));

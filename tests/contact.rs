@@ -88,7 +88,7 @@ fn no_smudge_shows_on_what_reaches_into_a_wall() {
     assert!(mean < 0.02 && worst < 0.1, "mean {mean}, worst {worst}");
 }
 
-/// A black box before walls that glow, lit over links alone: at its foot, half of the view is black. What glows beyond
+/// A black box before walls that glow, lit over links alone: at its foot, half of the view is black. What glows behind
 /// the box must not leak there.
 #[test]
 fn links_let_no_light_into_the_corner_at_the_foot_of_an_object() {

@@ -265,7 +265,7 @@ fn signals_at_any_moment_leave_outputs_whole_or_absent() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // Dense at the start, where there is much to set up, and up to and beyond the end.
+        // Dense at the start, where there is much to set up, and up to and past the end.
         let part = (round as f64 + 0.5) / kills as f64;
         sleep(Duration::from_secs_f64(3.0 * part * part));
         let signal = ["-TERM", "-INT", "-HUP"][round as usize % 3];

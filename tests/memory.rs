@@ -10,7 +10,7 @@ use vecrad::{
     solver::{Cancel, SolveSettings, Solver},
 };
 
-/// Most bytes that the process held so far.
+/// Most bytes that the process used so far.
 fn peak_bytes() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap();
     let line = status
@@ -48,10 +48,10 @@ fn the_process_holds_no_more_than_the_limit() {
             is_final = report.is_final;
         }
         // What the threads of the pool and the allocator keep for themselves comes on top.
-        let held = peak_bytes() - before;
+        let growth = peak_bytes() - before;
         assert!(
-            held <= limit + (limit >> 2),
-            "{held} bytes at a limit of {limit}"
+            growth <= limit + (limit >> 2),
+            "{growth} bytes at a limit of {limit}"
         );
     }
 }

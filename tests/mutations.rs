@@ -404,10 +404,10 @@ mod sidecar {
             "1979-05-27",
             "0x7f",
         ];
-        let held = &text[start..end];
-        let value = if held.parse::<i64>().is_ok() && chance.below(8) > 0 {
+        let old = &text[start..end];
+        let value = if old.parse::<i64>().is_ok() && chance.below(8) > 0 {
             chance.pick(&integers)
-        } else if held.parse::<f64>().is_ok() && chance.below(8) > 0 {
+        } else if old.parse::<f64>().is_ok() && chance.below(8) > 0 {
             chance.pick(&floats)
         } else {
             chance.pick(&others)

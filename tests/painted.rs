@@ -261,7 +261,7 @@ fn paths_see_lamps_where_they_are_painted() {
     }
     assert!(count > 400, "{count}");
     let chi = squares / f64::from(count);
-    assert!(chi < 1.3, "{chi}: errors beyond their noise");
+    assert!(chi < 1.3, "{chi}: errors above their noise");
     // Four standard errors, and what the blurred rims of the lamps change.
     assert!(
         sum.abs() < 4.0 * variance.sqrt() + 1e-3 * right,

@@ -379,7 +379,7 @@ fn what_is_cancelled_can_be_asked_again() {
 }
 
 #[test]
-fn what_is_shown_in_haste_is_nearly_what_is_shown_after() {
+fn the_preview_is_nearly_the_refined_light() {
     let scene = two_lamps();
     let mut solver = solved(&scene, settings());
     for wished in [

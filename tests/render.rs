@@ -409,13 +409,13 @@ fn measured_errors_are_shown_where_they_are_known() {
         said.expect("a small mesh");
         pictures.push(left(&picture.expect("read back")));
     }
-    let [unknown, none, much, beyond] = pictures[..] else {
+    let [unknown, none, much, excess] = pictures[..] else {
         panic!("four pictures")
     };
     assert!(unknown[0] > 2 * unknown[1], "the red wall: {unknown:?}");
     assert!(none[2] > none[1], "the low end is blue: {none:?}");
     assert!(much[0] > 2 * much[2], "the high end is red: {much:?}");
-    assert_eq!(beyond, [255; 3]);
+    assert_eq!(excess, [255; 3]);
 }
 
 #[test]
@@ -443,7 +443,7 @@ fn emission_scales_light_and_false_colours_alike() {
 }
 
 #[test]
-fn a_mesh_beyond_the_largest_buffer_is_one_sentence() {
+fn a_mesh_above_the_largest_buffer_is_one_sentence() {
     let Some(gpu) = gpu() else { return };
     let scene = scene();
     let snapshot = snapshot(&scene, Vec3::ONE);

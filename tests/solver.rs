@@ -155,7 +155,7 @@ fn solve_furnace(
 }
 
 #[test]
-fn white_furnaces_settle_in_few_sweeps() {
+fn white_furnaces_converge_in_few_sweeps() {
     // Single precision resolves 6e-8, which 1 / (1 − ρ) amplifies, and the tolerance is 1e-4.
     for (reflectance, tolerance) in [
         (0.5, 1e-3),

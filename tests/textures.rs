@@ -141,7 +141,7 @@ fn pictures_that_promise_too_much_are_refused_before_memory_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (name, bytes) in [
-        // A thousand million pixels: beyond the longest side.
+        // A thousand million pixels: above the longest side.
         ("huge.png", png_header(100_000, 10_000)),
         ("most.png", png_header(u32::MAX >> 1, u32::MAX >> 1)),
         ("huge.bmp", bmp_header(30_000, 30_000)),

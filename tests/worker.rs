@@ -416,34 +416,57 @@ impl Stubborn {
 
 #[test]
 fn a_new_run_does_not_wait_for_what_cannot_be_interrupted() {
-    let mut held = stubborn(1);
-    held.worker.start(triangle(), short(), one_thread());
-    held.wait_for_begun(1);
-    held.worker.start(triangle(), short(), one_thread());
+    let mut stubborn_worker = stubborn(1);
+    stubborn_worker
+        .worker
+        .start(triangle(), short(), one_thread());
+    stubborn_worker.wait_for_begun(1);
+    stubborn_worker
+        .worker
+        .start(triangle(), short(), one_thread());
     // The first is still being prepared.
-    let events = wait_for(&held.worker, is_finished);
+    let events = wait_for(&stubborn_worker.worker, is_finished);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Converged)));
-    held.release();
-    wait_for_drops(&held.script, 1);
-    assert!(held.worker.next_event(Duration::from_millis(60)).is_none());
-    assert_eq!(held.worker.latest().map(|snapshot| snapshot.step), Some(1));
+    stubborn_worker.release();
+    wait_for_drops(&stubborn_worker.script, 1);
+    assert!(
+        stubborn_worker
+            .worker
+            .next_event(Duration::from_millis(60))
+            .is_none()
+    );
+    assert_eq!(
+        stubborn_worker
+            .worker
+            .latest()
+            .map(|snapshot| snapshot.step),
+        Some(1)
+    );
 }
 
 #[test]
 fn only_so_many_are_left_behind() {
-    let mut held = stubborn(9);
+    let mut stubborn_worker = stubborn(9);
     for count in 1..=3 {
-        held.worker.start(triangle(), short(), one_thread());
-        held.wait_for_begun(count);
+        stubborn_worker
+            .worker
+            .start(triangle(), short(), one_thread());
+        stubborn_worker.wait_for_begun(count);
     }
-    held.worker.start(triangle(), short(), one_thread());
+    stubborn_worker
+        .worker
+        .start(triangle(), short(), one_thread());
     thread::sleep(Duration::from_millis(300));
-    assert_eq!(held.begun.load(Ordering::SeqCst), 3, "the fourth waits");
-    held.release();
-    let events = wait_for(&held.worker, is_finished);
+    assert_eq!(
+        stubborn_worker.begun.load(Ordering::SeqCst),
+        3,
+        "the fourth waits"
+    );
+    stubborn_worker.release();
+    let events = wait_for(&stubborn_worker.worker, is_finished);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Converged)));
-    wait_for_drops(&held.script, 3);
-    assert_eq!(held.begun.load(Ordering::SeqCst), 4);
+    wait_for_drops(&stubborn_worker.script, 3);
+    assert_eq!(stubborn_worker.begun.load(Ordering::SeqCst), 4);
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub enum Preset {
     /// The default
     #[default]
     Normal,
-    /// For the result that is kept
+    /// For the final result
     Final,
 }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::scene::srgb_byte;
 
-/// How radiance beyond the display's range is brought into it.
+/// How radiance above the range of the display is brought into it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ToneMap {
@@ -54,11 +54,11 @@ impl ColorOptions {
 
 /// Khronos PBR Neutral tone curve; takes any colour of finite, not negative channels into 0…1.
 fn neutral(color: Vec3) -> Vec3 {
-    /// Brightness from which the curve bends.
+    /// Brightness from which the curve is not linear.
     const START: f32 = 0.8 - 0.04;
     /// How fast bright colours turn white.
     const DESATURATION: f32 = 0.15;
-    // Far beyond white the channels are alike anyway, and a square of such numbers would overflow.
+    // Far above white the channels are alike anyway, and a square of such numbers would overflow.
     let color = color.min(Vec3::splat(1e15));
     let smallest = color.min_element();
     let offset = if smallest < 0.08 {

@@ -11,7 +11,7 @@ use glam::{BVec4A, Vec3, Vec4};
 
 use super::Vectors4;
 
-/// Beyond this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
+/// At a distance of more than this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
 /// angles of the edges cancel in single precision, until nothing but rounding is left.
 const FAR: f32 = 64.0;
 

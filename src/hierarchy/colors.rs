@@ -51,7 +51,7 @@ impl ElementColors {
         }
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.slots.as_slice()) + size_of_val(self.varied.as_slice())
     }

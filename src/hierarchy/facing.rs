@@ -21,7 +21,7 @@ const IN_PLANE: f32 = 5e-5;
 
 /// Nodes of the tree that are looked at for one patch. Fewer, and patches that nothing lights are kept; more, and scenes of
 /// many sheets wait.
-const MOST_VISITS: u32 = 128;
+const MAX_NODES: u32 = 128;
 
 /// Rounds of the flood. Light that needs more chained pairs is taken to reach everything: usual scenes need three.
 const MOST_ROUNDS: u32 = 32;
@@ -160,7 +160,7 @@ impl PatchTree {
         pending: &mut Vec<usize>,
     ) -> bool {
         let plane = Plane::of(scene, patch);
-        let (smallest, mut visits) = marked.smallest;
+        let (smallest, mut node_count) = marked.smallest;
         pending.clear();
         pending.push(smallest);
         while let Some(index) = pending.pop() {
@@ -168,8 +168,8 @@ impl PatchTree {
             if !marked.clusters[index] || !plane.sees_box(cluster.min, cluster.max) {
                 continue;
             }
-            visits += 1;
-            if visits > MOST_VISITS {
+            node_count += 1;
+            if node_count > MAX_NODES {
                 return true;
             }
             if !cluster.is_leaf() {

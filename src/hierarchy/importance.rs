@@ -83,7 +83,7 @@ impl Importance {
         self.measures[patch]
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.weights.as_slice()) + size_of_val(self.measures.as_slice())
     }

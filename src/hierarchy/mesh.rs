@@ -460,7 +460,7 @@ impl Mesh {
         triangles
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         /// A hash table keeps about an eighth of its slots free and a byte of control per slot.
         const SLOT: usize = 16;

@@ -245,7 +245,7 @@ impl Hierarchy {
         })
     }
 
-    /// Patches that one task should visit: no more than `most`, and fewer where there are few, since their elements are
+    /// Patches that one task should process: no more than `most`, and fewer where there are few, since their elements are
     /// many. The same on any number of threads.
     pub fn task_patches(&self, most: u32) -> u32 {
         (self.held().len() as u32 / LEAST_TASKS).clamp(1, most)
@@ -412,7 +412,7 @@ impl Hierarchy {
         &self.patches[self.mesh.elements[element].patch as usize]
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.clusters.as_slice())
             + size_of_val(self.patches.as_slice())

@@ -135,7 +135,7 @@ impl Tables {
         }
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.clusters.as_slice())
             + size_of_val(self.brightest.as_slice())

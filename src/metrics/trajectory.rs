@@ -22,7 +22,7 @@ pub struct Measurement {
     pub links: u64,
     /// Elements that receive light, or vertices of a bake.
     pub elements: u64,
-    /// Bytes held.
+    /// Bytes in use.
     pub memory_bytes: u64,
     /// How far off the light is.
     pub error: ErrorMeasures,

@@ -71,8 +71,8 @@ impl VertexReference {
             .collect();
         let mut moved = Self::new(mesh, self.seed);
         for (vertex, sums) in moved.sums.iter_mut().enumerate() {
-            if let Some(held) = known.get(&place(mesh, vertex)) {
-                *sums = *held;
+            if let Some(earlier) = known.get(&place(mesh, vertex)) {
+                *sums = *earlier;
             }
         }
         moved

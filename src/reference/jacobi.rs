@@ -194,7 +194,7 @@ impl StochasticJacobi {
         self.ray_count
     }
 
-    /// Bytes held, with the ray tree.
+    /// Bytes in use, with the ray tree.
     pub fn memory_bytes(&self) -> usize {
         self.rays.memory_bytes()
             + self.mesh.memory_bytes()

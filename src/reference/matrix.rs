@@ -89,7 +89,7 @@ const MAX_SWEEPS: u32 = 5000;
 /// Fill and solve the matrix of a scene. `rays` is its ray tree; `cancel` is asked before every row.
 ///
 /// # Errors
-/// [`MatrixError::TooLarge`] beyond the memory limit, [`MatrixError::Cancelled`] when `cancel` came true.
+/// [`MatrixError::TooLarge`] above the memory limit, [`MatrixError::Cancelled`] when `cancel` came true.
 pub fn solve_matrix(
     scene: &Scene,
     rays: &RayTree,

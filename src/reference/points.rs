@@ -2,7 +2,7 @@
 //!
 //! Points lie on sides that reflect and do not emit all over: elsewhere there is no error to see, and a sky would take
 //! nearly all of them. They are uniform over the area, so plain means over them are area-weighted. Where most of the area
-//! lies far beyond the objects of the scene (a ground to the horizon, a dome), two groups count alike, each weighted by
+//! lies far outside the objects of the scene (a ground to the horizon, a dome), two groups count alike, each weighted by
 //! area: what lies within reach of the objects, and the surroundings. Both have half of the points, so that plain means
 //! over all points are means of both groups.
 
@@ -36,7 +36,7 @@ impl fmt::Display for SampledSurfaces {
             None => Ok(()),
             Some(reach) => write!(
                 f,
-                " within two groups that count alike: up to {} units from the objects, and the surroundings beyond",
+                " within two groups that count alike: up to {} units from the objects, and the surroundings outside",
                 rounded(reach)
             ),
         }
@@ -314,7 +314,7 @@ struct ObjectRegion {
 }
 
 impl ObjectRegion {
-    /// The region, where more than [`SURROUNDINGS_SHARE`] of the area that counts lies beyond.
+    /// The region, where more than [`SURROUNDINGS_SHARE`] of the area that counts lies outside it.
     fn find(scene: &Scene, counted: &[Side]) -> Option<Self> {
         let components = components(scene);
         let total: f64 = counted
@@ -634,8 +634,11 @@ mod tests {
                 reach: 1.0,
             };
             let (inside, outside) = region.split(&scene, &sides);
-            let [within, beyond] = [area(&inside), area(&outside)];
-            assert!((within + beyond - total).abs() < 1e-9 * total, "{a} {b}");
+            let [within, outside_area] = [area(&inside), area(&outside)];
+            assert!(
+                (within + outside_area - total).abs() < 1e-9 * total,
+                "{a} {b}"
+            );
             for piece in inside.iter().chain(&outside) {
                 let middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
                 let [u, v, w] = scene.corners(piece.side.triangle).map(|at| at.as_dvec3());

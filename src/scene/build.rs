@@ -19,7 +19,7 @@ impl SceneBuilder {
     /// Check, clean, scale and finish.
     ///
     /// # Errors
-    /// [`BuildError::NoFaces`] when nothing usable is left, [`BuildError::TooLarge`] beyond 2³¹ of anything.
+    /// [`BuildError::NoFaces`] when nothing usable is left, [`BuildError::TooLarge`] above 2³¹ of anything.
     pub fn finish(mut self, options: &SceneOptions) -> Result<Scene, BuildError> {
         const LIMIT: usize = i32::MAX as usize;
         let count = self.faces.len().max(self.positions.len());

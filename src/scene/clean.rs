@@ -345,7 +345,7 @@ impl<R: BufRead> ObjCleaner<R> {
                 count: 1,
             });
         } else {
-            let message = "skipped an mtllib beyond the first thousand";
+            let message = "skipped an mtllib after the first thousand";
             self.note(WarningKind::LineSkipped, message, line);
         }
     }
@@ -463,7 +463,7 @@ fn parse_corner(word: &[u8]) -> Result<[Option<i64>; 3], Reason> {
     Ok(corner)
 }
 
-/// A decimal integer; beyond 18 digits it saturates, which is out of every range.
+/// A decimal integer; with more than 18 digits it saturates, which is out of every range.
 fn parse_integer(word: &[u8]) -> Option<i64> {
     let (negative, digits) = match word {
         [b'-', digits @ ..] => (true, digits),
@@ -567,7 +567,7 @@ mod tests {
     }
 
     #[test]
-    fn indices_beyond_all_range_are_refused() {
+    fn indices_out_of_all_range_are_refused() {
         for corner in [
             "0",
             "4",

@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 
-/// Triangles beyond so many are sorted to both sides of a line before they are cut out. Fewer cut polygons along lines for
+/// More triangles than this are sorted to both sides of a line before they are cut out. Fewer cut polygons along lines for
 /// nothing, more compare every piece with every triangle.
 const MANY: usize = 32;
 
@@ -31,13 +31,13 @@ pub(super) fn turned_left([a, b, c]: [DVec2; 3]) -> [DVec2; 3] {
 
 /// Whether an edge of one of two convex polygons leaves them apart, or overlapping by no more than `width`.
 pub(super) fn are_apart(a: &[DVec2], b: &[DVec2], width: f64) -> bool {
-    let is_beyond = |a: &[DVec2], b: &[DVec2]| {
+    let is_apart = |a: &[DVec2], b: &[DVec2]| {
         edges(a).any(|edge| {
             let depth = b.iter().map(|&corner| edge.left_of(corner));
             depth.fold(f64::MIN, f64::max) <= width
         })
     };
-    is_beyond(a, b) || is_beyond(b, a)
+    is_apart(a, b) || is_apart(b, a)
 }
 
 /// Cut triangles out of a polygon. Pieces less wide than `least` are omitted.

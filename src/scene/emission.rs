@@ -46,7 +46,7 @@ impl SceneBuilder {
         } else {
             0.0
         };
-        // Textures times their factors may be beyond single precision by far; so is then what comes out.
+        // Textures times their factors may be far outside single precision; so may be the result.
         let unit = exponent.clamp(-126.0, 127.0).exp2();
         for (material, emission) in self.materials.iter_mut().zip(emissions) {
             let largest = emission.max_element() / unit;
@@ -166,13 +166,13 @@ mod tests {
             assert!(share > 0.5 && share < 1.0, "{share}");
             assert!((mean.y / mean.x - 0.5).abs() < 1e-6);
         }
-        let beyond = scene(&[Vec3::splat(1e38)], Some([Vec3::splat(1e38); 2]));
-        assert!(beyond.radiance_unit.is_finite());
-        assert!(beyond.surfaces[0].emission.x <= MAX_EMISSION);
+        let brightest = scene(&[Vec3::splat(1e38)], Some([Vec3::splat(1e38); 2]));
+        assert!(brightest.radiance_unit.is_finite());
+        assert!(brightest.surfaces[0].emission.x <= MAX_EMISSION);
     }
 
     #[test]
-    fn wishes_beyond_the_range_keep_their_colour() {
+    fn appearances_out_of_range_keep_their_colour() {
         let scene = scene(&[Vec3::ONE], None);
         let wish = Appearance {
             reflectance: Vec3::ZERO,

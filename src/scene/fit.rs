@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Face, Frame, SceneBuilder, SizeClasses};
 
 /// Largest extent of a scene, in multiples of the root of its area, that its frame fits. Usual rooms have less than 1, a
-/// corridor 3; beyond, it is far surroundings, or a stray vertex, that make a scene large.
+/// corridor 3; above, it is far surroundings, or a stray vertex, that make a scene large.
 const LARGEST_EXTENT: f64 = 4.0;
 
 impl SceneBuilder {

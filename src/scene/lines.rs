@@ -215,7 +215,7 @@ pub(super) fn label(text: &str) -> &str {
 pub(super) enum Number {
     /// A number that single precision can hold.
     Finite,
-    /// NaN, an infinity, or beyond single precision.
+    /// NaN, an infinity, or outside single precision.
     NotFinite,
     /// A number but for a comma, as in `0,5`. It may be a decimal comma or stand between thousands or numbers.
     Comma,

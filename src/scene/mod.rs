@@ -209,7 +209,7 @@ pub struct Scene {
     /// The textures, ready for means.
     averages: Arc<TextureAverages>,
     /// What emission 1 stands for, W·sr⁻¹·m⁻²: emission here and light computed from it are multiplied by this on their way
-    /// out. A power of two, and 1 unless the file's brightest emission is beyond 1e-12 … 1e12.
+    /// out. A power of two, and 1 unless the file's brightest emission is outside 1e-12 … 1e12.
     pub radiance_unit: f32,
 }
 

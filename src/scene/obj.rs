@@ -619,7 +619,7 @@ impl Import<'_> {
     fn push_face(&mut self, corners: &Corners, which: [usize; 3], base: usize, line: u32) {
         let index = |corner: usize| {
             let index = corners.mesh.indices[corners.start + corner] as usize + base;
-            // Beyond the range it stays out of range, and the builder says so.
+            // Out of range it stays out of range, and the builder says so.
             u32::try_from(index).unwrap_or(u32::MAX)
         };
         self.builder.faces.push(Face {

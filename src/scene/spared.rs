@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn only_what_is_shown_of_a_texture_must_be_constant() {
         let blue = Vec3::new(0.0, 0.0, 0.4);
-        // The red pixel is at u 0…0.25, v 0.75…1; lookups reach half a pixel beyond, and over the edges.
+        // The red pixel is at u 0…0.25, v 0.75…1; lookups reach half a pixel further, and over the edges.
         for (at, is_constant) in [
             (about(0.4, 0.4), true),
             (about(-3.6, 5.4), true),

@@ -25,7 +25,7 @@ pub(super) enum Doubt {
     CrossesItself,
 }
 
-/// How far both of two edges must reach beyond each other to cross, as a share of the polygon's extent. Smaller, and
+/// How far both of two edges must reach past each other to cross, as a share of the polygon's extent. Smaller, and
 /// corners that only touch an edge cross it by the rounding of the file's digits; larger, and crossings of thin parts are
 /// missed.
 const CROSSING_DEPTH: f64 = 1e-5;
@@ -310,7 +310,7 @@ mod tests {
                 false,
             ),
             (
-                "corner beyond another edge",
+                "corner past another edge",
                 vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, -0.1], [0.0, 4.0]],
                 true,
             ),

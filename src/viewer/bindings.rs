@@ -72,12 +72,12 @@ impl Binding {
     /// The key as people write it.
     pub fn keys(&self) -> String {
         let mut text = String::new();
-        for (held, name) in [
+        for (is_down, name) in [
             (self.modifiers.command, "Ctrl+"),
             (self.modifiers.alt, "Alt+"),
             (self.modifiers.shift, "Shift+"),
         ] {
-            if held {
+            if is_down {
                 text.push_str(name);
             }
         }

@@ -20,11 +20,11 @@ pub struct ShownClusters {
 impl ShownClusters {
     /// Choose again if the tree or what is to be shown of it is another.
     pub fn update(&mut self, clusters: &Arc<Vec<ClusterBox>>, overlay: &ClusterOverlay) {
-        let is_current = |(held, counted): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
-            Arc::ptr_eq(held, clusters) && counted.has_same_boxes(overlay)
+        let is_current = |(current, counted): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
+            Arc::ptr_eq(current, clusters) && counted.has_same_boxes(overlay)
         };
         if !self.of.as_ref().is_some_and(is_current) {
-            let is_same_tree = |(held, _): &(Arc<_>, _)| Arc::ptr_eq(held, clusters);
+            let is_same_tree = |(current, _): &(Arc<_>, _)| Arc::ptr_eq(current, clusters);
             if !self.of.as_ref().is_some_and(is_same_tree) {
                 self.deepest = Some(deepest_level(clusters));
             }

@@ -67,11 +67,11 @@ impl Faults {
 
     /// Sentences since the last call.
     pub fn take(&self) -> Vec<String> {
-        let mut held = self
+        let mut sentences = self
             .sentences
             .lock()
             .unwrap_or_else(PoisonError::into_inner);
-        std::mem::take(&mut *held)
+        std::mem::take(&mut *sentences)
     }
 
     fn push(&self, sentence: String) {

@@ -34,8 +34,8 @@ impl Inspections {
             return None;
         }
         self.asked = wanted.to_vec();
-        for held in [&mut self.element, &mut self.cluster] {
-            held.take_if(|held| !wanted.iter().any(|subject| is_same_as(held, subject)));
+        for known in [&mut self.element, &mut self.cluster] {
+            known.take_if(|known| !wanted.iter().any(|subject| is_same_as(known, subject)));
         }
         Some(self.asked.clone())
     }
@@ -124,38 +124,38 @@ mod tests {
 
     #[test]
     fn each_question_is_asked_once() {
-        let mut held = Inspections::default();
+        let mut known = Inspections::default();
         assert!(
-            held.question(&[element(7, 1.0)]).is_none(),
+            known.question(&[element(7, 1.0)]).is_none(),
             "no run is known"
         );
-        held.open();
-        assert!(held.question(&[element(7, 1.0)]).is_some());
-        assert!(held.question(&[element(7, 1.0)]).is_none());
+        known.open();
+        assert!(known.question(&[element(7, 1.0)]).is_some());
+        assert!(known.question(&[element(7, 1.0)]).is_none());
         assert!(
-            held.question(&[element(9, 1.0)]).is_none(),
+            known.question(&[element(9, 1.0)]).is_none(),
             "the same point, divided"
         );
-        assert!(held.is_waiting(LinkEnd::Element));
-        held.note(answer(element(7, 1.0), 1));
-        assert!(!held.is_waiting(LinkEnd::Element));
-        held.note(answer(element(7, 1.0), 2));
-        assert_eq!(held.element().map(|held| held.step), Some(2));
+        assert!(known.is_waiting(LinkEnd::Element));
+        known.note(answer(element(7, 1.0), 1));
+        assert!(!known.is_waiting(LinkEnd::Element));
+        known.note(answer(element(7, 1.0), 2));
+        assert_eq!(known.element().map(|known| known.step), Some(2));
     }
 
     #[test]
     fn answers_to_older_questions_do_not_show() {
-        let mut held = Inspections::default();
-        held.open();
-        held.question(&[element(7, 1.0), Subject::Cluster(NodeId(3))]);
-        held.note(answer(element(7, 1.0), 1));
-        held.note(answer(Subject::Cluster(NodeId(3)), 1));
-        held.question(&[element(8, 2.0), Subject::Cluster(NodeId(3))]);
-        assert!(held.element().is_none());
-        assert!(held.of(LinkEnd::Cluster).is_some(), "still wanted");
-        held.note(answer(element(7, 1.0), 2));
-        assert!(held.element().is_none());
-        held.close();
-        assert!(held.of(LinkEnd::Cluster).is_none());
+        let mut known = Inspections::default();
+        known.open();
+        known.question(&[element(7, 1.0), Subject::Cluster(NodeId(3))]);
+        known.note(answer(element(7, 1.0), 1));
+        known.note(answer(Subject::Cluster(NodeId(3)), 1));
+        known.question(&[element(8, 2.0), Subject::Cluster(NodeId(3))]);
+        assert!(known.element().is_none());
+        assert!(known.of(LinkEnd::Cluster).is_some(), "still wanted");
+        known.note(answer(element(7, 1.0), 2));
+        assert!(known.element().is_none());
+        known.close();
+        assert!(known.of(LinkEnd::Cluster).is_none());
     }
 }

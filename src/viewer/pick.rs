@@ -104,7 +104,7 @@ pub fn probe(snapshot: &Snapshot, pick: &Pick) -> Option<Probe> {
         let corners = mesh.indices[index].map(|corner| mesh.positions[corner as usize]);
         let weights = barycentric_in_plane(pick.point, corners);
         // The element that the point is deepest inside, so that rounding at an edge does no harm.
-        if best.is_none_or(|(_, held)| weights.min_element() > held.min_element()) {
+        if best.is_none_or(|(_, nearest)| weights.min_element() > nearest.min_element()) {
             best = Some((index, weights));
         }
     }

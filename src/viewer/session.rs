@@ -31,7 +31,7 @@ impl Recent {
     pub fn push(&mut self, path: &Path) {
         // Whole paths: the next window may start in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        self.files.retain(|held| *held != path);
+        self.files.retain(|known| *known != path);
         self.files.insert(0, path);
         self.files.truncate(MOST_RECENT);
     }

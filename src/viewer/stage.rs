@@ -26,7 +26,7 @@ use crate::{
     worker::Wake,
 };
 
-/// What the window wants to show. Arcs are held, so that an address is not used twice.
+/// What the window wants to show. Arcs are stored, so that no address is reused.
 #[derive(Clone)]
 pub struct Wanted {
     /// The scene.
@@ -194,8 +194,8 @@ impl StageHand {
         let tree = &wanted.snapshot.clusters;
         self.clusters.update(tree, &wanted.clusters);
         let overlay = wanted.clusters;
-        let is_current = |(held, drawn): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
-            Arc::ptr_eq(held, tree) && *drawn == overlay
+        let is_current = |(current, drawn): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
+            Arc::ptr_eq(current, tree) && *drawn == overlay
         };
         if !self.boxes.of.as_ref().is_some_and(is_current) {
             let boxes = cluster_lines::boxes(tree, &self.clusters.shown, &overlay);

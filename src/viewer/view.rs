@@ -195,7 +195,7 @@ pub struct ViewSettings {
 }
 
 impl ViewSettings {
-    /// Exposures beyond this leave the range of the picture's half floats.
+    /// Exposures outside this leave the range of the picture's half floats.
     pub const EXPOSURE_RANGE: std::ops::RangeInclusive<f32> = -20.0..=20.0;
 
     /// The first value out of its range, as one sentence.
@@ -214,7 +214,7 @@ impl ViewSettings {
                 "a number of at least 0",
             );
         }
-        // Those beyond the range that can be shown are brought into it where they are used.
+        // Those outside the range that can be shown are brought into it where they are used.
         if !self.exposure.is_finite() {
             return sentence("exposure", self.exposure, "a number");
         }

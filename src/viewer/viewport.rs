@@ -41,7 +41,7 @@ pub struct Viewport {
 
 /// Everything that the automatic exposure depends on.
 struct MeterKey {
-    /// Not held: its light may be large.
+    /// Weak: its light may be large.
     light: Weak<VertexLight>,
     mode: ViewMode,
     texture_detail: bool,
@@ -70,7 +70,7 @@ impl MeterKey {
     }
 }
 
-/// Everything that a picture depends on. Arcs are held, so that an address is not used twice.
+/// Everything that a picture depends on. Arcs are stored, so that no address is reused.
 #[derive(Clone)]
 struct PictureKey {
     staged: Arc<Staged>,
@@ -166,8 +166,8 @@ impl Viewport {
             key.view.mode.is_light() && key.staged.is_lit && !state.materials.are_changed();
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
-            let held = self.metered.as_ref();
-            if held.is_none_or(|held| wanted.differs_from(held)) {
+            let last = self.metered.as_ref();
+            if last.is_none_or(|last| wanted.differs_from(last)) {
                 self.metering = self.draw(key, 1.0, |renderer, picture, uploads| {
                     renderer.meter(key.size, picture, uploads)
                 });

@@ -33,7 +33,7 @@ use crate::{
 const GRACE: Duration = Duration::from_millis(60);
 
 /// Most solves that are abandoned and have not ended. More, and memory and cores are spent on results that are not shown:
-/// beyond this number, the next run waits.
+/// at this number, the next run waits.
 const MAX_ABANDONED: usize = 2;
 
 /// Solver threads, kept while their number stays.
@@ -56,12 +56,12 @@ impl Pools {
         threads: usize,
         gives_way: bool,
     ) -> Result<&ThreadPool, ThreadPoolBuildError> {
-        let held = if gives_way {
+        let slot = if gives_way {
             &mut self.giving_way
         } else {
             &mut self.sharing
         };
-        let fitting = held.take().filter(|held| held.threads == threads);
+        let fitting = slot.take().filter(|slot| slot.threads == threads);
         let pool = match fitting {
             Some(pool) => pool,
             None => Pool {
@@ -77,13 +77,13 @@ impl Pools {
                     .build()?,
             },
         };
-        Ok(&held.insert(pool).pool)
+        Ok(&slot.insert(pool).pool)
     }
 
     /// Any of them.
     fn any(&self) -> Option<&ThreadPool> {
-        let held = self.giving_way.as_ref().or(self.sharing.as_ref());
-        held.map(|held| &held.pool)
+        let slot = self.giving_way.as_ref().or(self.sharing.as_ref());
+        slot.map(|slot| &slot.pool)
     }
 }
 

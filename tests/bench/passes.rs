@@ -85,7 +85,7 @@ fn sweeping(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The first material is painted darker and as it was in turn; each time the light settles anew. Every sweep visits
+/// The first material is painted darker and as it was in turn; each time the light converges anew. Every sweep reads
 /// every link once.
 fn sweeps(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, solver: &mut Solver) {
     let cancel = Cancel::default();

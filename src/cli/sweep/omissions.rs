@@ -21,7 +21,7 @@ use crate::{
 /// Rounds of a scene at least, for the median of its times.
 const ROUNDS: u32 = 3;
 
-/// A scene whose runs took longer than this, in seconds, gets no round beyond those asked for: its times are long enough
+/// A scene whose runs took longer than this, in seconds, gets no more rounds than asked for: its times are long enough
 /// to be told from noise, and the whole suite shall take some minutes.
 const PATIENCE: f64 = 8.0;
 

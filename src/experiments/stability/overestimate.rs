@@ -16,8 +16,8 @@ use crate::{
     solver::{Cancel, Direct, Method, Push, SolveSettings},
 };
 
-/// Part of the note that names growth which scaling to the closure holds.
-const HELD: &str = "keep energy";
+/// Part of the note that names growth that scaling to the coverage bounds.
+const SCALED_NOTE: &str = "keep energy";
 
 /// Part of the note that names growth which bounded rows answer.
 const ANSWERED: &str = "the light grows";
@@ -76,12 +76,12 @@ fn closed(method: Method, cancel: &Cancel) -> Result<Finding, Trouble> {
         Method::SixFace => vec![
             irradiance,
             Claim::at_least("gain of unscaled links", 1.05, gain),
-            Claim::at_least("held growth is named", 1.0, noted(&lit, HELD)),
+            Claim::at_least("scaled growth is named", 1.0, noted(&lit, SCALED_NOTE)),
         ],
         _ => vec![
             irradiance,
             Claim::at_most("gain of unscaled links", 1.0, gain),
-            Claim::small("growth is named", noted(&lit, HELD), 0.0),
+            Claim::small("growth is named", noted(&lit, SCALED_NOTE), 0.0),
         ],
     }))
 }

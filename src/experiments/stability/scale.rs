@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::{
     Case, Claim, Finding, Group, Trouble,
     solve::{energy_claim, error_claim, one_sided, sides_by_shape, solve},
-    stiff::settled,
+    stiff::converging,
 };
 use crate::{
     reference::analytic::furnace_radiosity,
@@ -125,7 +125,7 @@ fn channels(cancel: &Cancel) -> Result<Finding, Trouble> {
     let lit = solve(
         stability::colored_furnace(reflectance),
         &one_sided(),
-        &settled(),
+        &converging(),
         cancel,
     )?;
     let found = lit.mean_irradiance("wall");

@@ -76,7 +76,7 @@ fn limited(mebibytes: u64, cancel: &Cancel) -> Result<Finding, Trouble> {
     let most = lit.reports.iter().map(|report| report.memory_bytes).max();
     let is_full = lit.reports.last().is_some_and(|report| report.is_full);
     Ok(lit.finding(vec![
-        Claim::at_most("bytes held", limit as f64, most.unwrap_or(0) as f64),
+        Claim::at_most("bytes in use", limit as f64, most.unwrap_or(0) as f64),
         Claim::at_least("the limit is named", 1.0, f64::from(u8::from(is_full))),
         lit.balance(0.03),
     ]))

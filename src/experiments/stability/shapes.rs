@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::{
     Case, Claim, Finding, Group, Trouble,
     solve::{energy_claim, error_claim, one_sided, sides_by_shape, solve},
-    stiff::settled,
+    stiff::converging,
 };
 use crate::{
     reference::analytic::{furnace_radiosity, parallel_rectangles},
@@ -35,7 +35,7 @@ pub(super) fn cases() -> Vec<Case> {
             by_paths(
                 stability::crossing_boxes(),
                 &SolveSettings::normal(),
-                BURIED,
+                HALF_INSIDE,
                 cancel,
             )
         }),
@@ -82,9 +82,9 @@ pub(super) fn cases() -> Vec<Case> {
     ]
 }
 
-/// Share of the light that boxes may lose which stand in each other: faces that are half buried see less than half of
+/// Share of the light that boxes may lose which stand in each other: faces that are half inside a solid see less than half of
 /// the room with one part and all of it with the other, and are scaled by the mean.
-const BURIED: f64 = 0.05;
+const HALF_INSIDE: f64 = 0.05;
 
 /// Share of the light that may take a wrong way at a bounce over coarse links.
 const LOST: f64 = 0.01;
@@ -95,7 +95,7 @@ fn glowing(builder: SceneBuilder, reflectance: f32, cancel: &Cancel) -> Result<F
         direct: Direct::Linked,
         epsilon: 0.3,
         max_steps: 1,
-        ..settled()
+        ..converging()
     };
     // Light that bounces 1 / (1 − ρ) times on average.
     let allowed = LOST / (1.0 - f64::from(reflectance));

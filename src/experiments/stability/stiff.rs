@@ -12,8 +12,8 @@ use crate::{
     solver::{Cancel, SolveSettings, StepReport},
 };
 
-/// Settings under which light settles to a residual of 1e-4.
-pub(super) fn settled() -> SolveSettings {
+/// Settings under which light converges to a residual of 1e-4.
+pub(super) fn converging() -> SolveSettings {
     SolveSettings {
         tolerance: 1e-4,
         ..SolveSettings::draft()
@@ -59,7 +59,7 @@ fn closed_furnace(reflectance: f32, allowed: f64, cancel: &Cancel) -> Result<Fin
     let lit = solve(
         furnace(reflectance, 1.0, 4),
         &one_sided(),
-        &settled(),
+        &converging(),
         cancel,
     )?;
     // B = E_m / (1 − ρ), and what arrives is B as well.
@@ -101,20 +101,20 @@ fn maze(cancel: &Cancel) -> Result<Finding, Trouble> {
     ]))
 }
 
-/// Light that bounces a thousand times before it is gone must stay bounded; where it has not settled, that is said.
+/// Light that bounces a thousand times before it is gone must stay bounded; where it has not converged, a note says so.
 fn white_maze(cancel: &Cancel) -> Result<Finding, Trouble> {
     let settings = SolveSettings::draft();
     let lit = solve(stability::maze(0.999), &one_sided(), &settings, cancel)?;
     let is_named = |report: &StepReport| {
-        // Coarse steps settle to a tolerance as coarse as their links.
+        // Coarse steps converge to a tolerance as coarse as their links.
         let tolerance = settings.tolerance * report.epsilon / settings.epsilon;
-        let is_settled = report.residual <= tolerance;
-        is_settled || report.notes.iter().any(|note| note.contains("settled"))
+        let has_converged = report.residual <= tolerance;
+        has_converged || report.notes.iter().any(|note| note.contains("settled"))
     };
     let unnamed = lit.reports.iter().filter(|report| !is_named(report));
     Ok(lit.finding(vec![
         Claim::small(
-            "unsettled steps without a note",
+            "unconverged steps without a note",
             unnamed.count() as f64,
             0.0,
         ),

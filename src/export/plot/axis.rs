@@ -11,7 +11,7 @@ const DIGIT_ROOM: f32 = 7.2;
 /// Decades that an axis shows at most: a curve that falls further says nothing there.
 const MOST_DECADES: f64 = 8.0;
 
-/// Numbers that an axis can show: beyond, powers of ten leave the range of `f64`.
+/// Numbers that an axis can show: outside them, powers of ten leave the range of `f64`.
 pub(super) const SHOWABLE: std::ops::RangeInclusive<f64> = 1e-200..=1e200;
 
 /// A range of positive numbers on an interval of the drawing.

@@ -89,9 +89,12 @@ impl App {
         if needs_restart {
             self.begin_again();
         }
-        let held = &self.state.run.snapshot;
-        let is_known =
-            |latest: &Arc<_>| held.as_ref().is_some_and(|held| Arc::ptr_eq(held, latest));
+        let shown = &self.state.run.snapshot;
+        let is_known = |latest: &Arc<_>| {
+            shown
+                .as_ref()
+                .is_some_and(|shown| Arc::ptr_eq(shown, latest))
+        };
         let newer = self.worker.latest().filter(|latest| !is_known(latest));
         let has_light = newer.is_some();
         if has_light {

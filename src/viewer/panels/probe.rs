@@ -249,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bound_beyond_the_light_itself_is_no_figure() {
+    fn a_bound_above_the_light_itself_is_no_figure() {
         assert_eq!(error_bound(5.31, 0.25), "over 100 %");
         assert_eq!(error_bound(0.01, 0.25), "4.00 %");
         assert_eq!(error_bound(1.0, 0.0), "over 100 %");

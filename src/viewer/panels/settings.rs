@@ -38,7 +38,7 @@ fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
         (
             "Final",
             SolveSettings::finest(),
-            "For the bake that is kept: about 2 % error, many times the time",
+            "For the final bake: about 2 % error, many times the time",
         ),
     ];
     ui.horizontal(|ui| {
@@ -82,7 +82,7 @@ fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
         ui,
         "Link threshold ε",
         "Largest error of one link, relative to the mean light. Lower is better and slower: links grow about as 1/ε. \
-         Values beyond the slider may be typed.",
+         Values outside the slider may be typed.",
         &mut settings.epsilon,
         &default.epsilon,
         |ui, value| ui.add(slider(value, 0.001..=0.3)),

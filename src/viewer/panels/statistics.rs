@@ -104,7 +104,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 ui,
                 "Contraction",
                 figure(f64::from(report.contraction)),
-                "Ratio of successive changes; below 1 the iteration settles",
+                "Ratio of successive changes; below 1 the iteration converges",
             );
         }
     });

@@ -147,7 +147,7 @@ fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
         .on_hover_text("Keep the range while the light changes; otherwise it follows the light");
     view.fixed_range = match (is_fixed, view.fixed_range) {
         (true, None) => Some(in_use),
-        (true, held) => held,
+        (true, chosen) => chosen,
         (false, _) => None,
     };
     if let Some([low, high]) = &mut view.fixed_range {

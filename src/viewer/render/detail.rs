@@ -143,8 +143,8 @@ impl DetailSet {
 
     /// Upload the textures of another scene, and take other appearances of materials over.
     pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>, appearances: &[Appearance]) {
-        let is_held = |held: &Arc<Scene>| Arc::ptr_eq(held, scene);
-        if !self.scene.as_ref().is_some_and(is_held) {
+        let is_current = |current: &Arc<Scene>| Arc::ptr_eq(current, scene);
+        if !self.scene.as_ref().is_some_and(is_current) {
             self.scene = Some(scene.clone());
             self.is_tame = is_tame(scene);
             self.views = vec![None; scene.textures.len()];

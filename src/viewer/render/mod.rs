@@ -297,7 +297,7 @@ impl Renderer {
         picture: &Picture<'_>,
         draw: impl FnOnce(&mut Self, &Uploads) -> T,
     ) -> Result<T, RenderError> {
-        // Taken out, so that nothing is held twice while the next is made.
+        // Taken out, so that no buffer exists twice while the next is made.
         let empty = Uploads::new(self.uploads.details().clone());
         let mut uploads = std::mem::replace(&mut self.uploads, empty);
         let result = uploads.renew(&self.gpu, &picture.source());

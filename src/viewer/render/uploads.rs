@@ -61,7 +61,7 @@ impl Uploads {
         self.boxes.prepare(gpu, "boxes", source.boxes);
         self.details
             .prepare(gpu, source.scene, &source.mesh.appearances);
-        let is_current = |held: &MeshBuffers| Arc::ptr_eq(&held.source, source.mesh);
+        let is_current = |current: &MeshBuffers| Arc::ptr_eq(&current.source, source.mesh);
         if !self.mesh.as_ref().is_some_and(is_current) {
             // Nobody holds on to the old mesh here: two large ones may not fit.
             (self.mesh, self.light) = (None, None);
@@ -72,8 +72,8 @@ impl Uploads {
             self.mesh = Some(MeshBuffers::new(gpu, source, &self.details));
         }
         let wanted = LightSource::of(source);
-        let is_held = |(held, _): &(LightSource, wgpu::Buffer)| held.is_same(&wanted);
-        if !self.light.as_ref().is_some_and(is_held) {
+        let is_current = |(current, _): &(LightSource, wgpu::Buffer)| current.is_same(&wanted);
+        if !self.light.as_ref().is_some_and(is_current) {
             let buffer = wanted.upload(gpu, source.mesh.positions.len());
             self.light = Some((wanted, buffer));
         }

@@ -189,10 +189,10 @@ impl Tracing {
         match &snapshot {
             None => self.progress.vertices = None,
             Some(snapshot) => {
-                let held = self.vertices.take();
-                self.vertices = Some(match held {
-                    Some(held) if Arc::ptr_eq(held.mesh(), &snapshot.mesh) => held,
-                    Some(held) => held.on_mesh(&snapshot.mesh),
+                let present = self.vertices.take();
+                self.vertices = Some(match present {
+                    Some(present) if Arc::ptr_eq(present.mesh(), &snapshot.mesh) => present,
+                    Some(present) => present.on_mesh(&snapshot.mesh),
                     // A seed of its own: the same paths as at the points would not be independent of them.
                     None => VertexReference::new(&snapshot.mesh, !self.seed),
                 });
@@ -272,16 +272,16 @@ fn is_same(a: &Option<Arc<Snapshot>>, b: &Option<Arc<Snapshot>>) -> bool {
 
 /// The pool of one thread, or that of one for each core; none where the system refuses threads.
 fn pool(pools: &mut [Option<ThreadPool>; 2], is_narrow: bool) -> Option<&ThreadPool> {
-    let held = &mut pools[usize::from(!is_narrow)];
-    if held.is_none() {
-        *held = ThreadPoolBuilder::new()
+    let pool = &mut pools[usize::from(!is_narrow)];
+    if pool.is_none() {
+        *pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(is_narrow))
             .thread_name(|index| format!("reference {index}"))
             .start_handler(|_| give_way())
             .build()
             .ok();
     }
-    held.as_ref()
+    pool.as_ref()
 }
 
 /// Work in a pool, or in rayon's own where there is none.
