@@ -23,7 +23,7 @@ use vecrad::{
 
 const SIZE: [u32; 2] = [160, 120];
 
-/// What a square reflects at the light of this scene, or emits.
+/// The radiance that a square reflects at the light of this scene, or emits.
 #[derive(Clone, Copy)]
 enum Square {
     Reflects(f32),

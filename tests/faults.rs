@@ -1,4 +1,4 @@
-//! What happens to a running program: full disks, folders that vanish, files that change, readers that leave, signals.
+//! Faults while the program runs: full disks, folders that vanish, files that change, readers that leave, signals.
 //! Whatever comes, outputs are whole or absent, nothing is left beside them, and there is a sentence.
 //!
 //! `VECRAD_KILLS=500 cargo test --release --test faults` sends more signals than the suite does.
@@ -18,7 +18,7 @@ use std::{
 
 fn vecrad(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vecrad"));
-    // What is saved elsewhere is to be found here.
+    // Files saved elsewhere are to be found here.
     let elsewhere = folder.join("elsewhere");
     fs::create_dir_all(&elsewhere).unwrap();
     command

@@ -43,7 +43,7 @@ fn read(folder: &TempDir) -> Scene {
     try_read(folder.path()).unwrap()
 }
 
-/// What is said but that there is no light.
+/// All warnings but the one that there is no light.
 fn said(scene: &Scene) -> Vec<String> {
     let warnings = scene.warnings.iter();
     let others = warnings.filter(|warning| warning.kind != WarningKind::NoEmitter);

@@ -40,7 +40,7 @@ fn read(obj: impl AsRef<[u8]>, others: &[(&str, &[u8])]) -> Scene {
     try_read(obj, others).unwrap()
 }
 
-/// What every scene keeps, whatever the file was.
+/// The invariants of every scene, whatever the file was.
 fn assert_promises(scene: &Scene) {
     assert!(scene.positions.iter().all(|position| position.is_finite()));
     assert_eq!(scene.surfaces.len(), scene.triangles.len());

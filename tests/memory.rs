@@ -47,7 +47,7 @@ fn the_process_holds_no_more_than_the_limit() {
             assert!(report.memory_bytes <= limit, "{report:?}");
             is_final = report.is_final;
         }
-        // What the threads of the pool and the allocator keep for themselves comes on top.
+        // Memory of the thread pool and the allocator comes on top.
         let growth = peak_bytes() - before;
         assert!(
             growth <= limit + (limit >> 2),

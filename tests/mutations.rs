@@ -347,7 +347,7 @@ mod sidecar {
                 0 => spoil(&mut bytes, &mut chance),
                 _ => bytes = with_other_number(&text, &mut chance).into_bytes(),
             }
-            // What is not UTF-8 is refused before.
+            // Text that is not UTF-8 is refused before.
             let Ok(text) = String::from_utf8(bytes) else {
                 continue;
             };

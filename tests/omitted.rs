@@ -1,4 +1,4 @@
-//! What a scene does not need is omitted, and the light is the same with it.
+//! Omissions leave the light as it is with the omitted parts.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 

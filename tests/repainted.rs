@@ -1,4 +1,4 @@
-//! What is omitted as dark, and materials that are repainted so that light reaches it.
+//! Dark surfaces that are omitted, and materials that are repainted so that light reaches them.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 

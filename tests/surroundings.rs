@@ -1,4 +1,4 @@
-//! What is far larger or smaller than the rest of a scene must not spoil the light of the rest: a huge ground, a sky of
+//! Objects far larger or smaller than the rest of a scene must not spoil the light of the rest: a huge ground, a sky of
 //! emitting faces, a tiny lamp, long thin faces.
 
 mod boxes;

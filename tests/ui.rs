@@ -151,7 +151,7 @@ fn light_that_is_finer_than_asked_for_says_so_where_the_run_is_shown() {
         before,
         "nothing moves"
     );
-    // What it says can be done.
+    // The offered actions can be done.
     perform(&mut harness, Action::Reset);
     wait_for(&mut harness, |app| {
         // The light before was a quarter of that.

@@ -34,7 +34,7 @@ use vecrad::{
 };
 use windows::{ONE_TRIANGLE, perform, plates, wait_for, window};
 
-/// What eframe keeps in a file.
+/// The storage that eframe has in a file.
 #[derive(Default)]
 struct Kept(Mutex<HashMap<String, String>>);
 
@@ -69,7 +69,7 @@ fn window_with(kept: Kept, options: Options) -> Harness<'static, App> {
         })
 }
 
-/// What a window leaves behind.
+/// The storage after a window was closed.
 fn kept_by(harness: &mut Harness<'static, App>) -> Kept {
     let mut kept = Kept::default();
     eframe::App::save(harness.state_mut(), &mut kept);

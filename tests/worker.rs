@@ -28,7 +28,7 @@ const FOREVER: Duration = Duration::from_secs(600);
 /// The node that the fake solver knows of.
 const NODE: Subject = Subject::Cluster(NodeId(0));
 
-/// What the fake solver does, and what it was seen doing.
+/// Script of the fake solver, and a record of its calls.
 #[derive(Default)]
 struct Script {
     /// Time that a step takes unless cancelled.

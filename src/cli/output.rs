@@ -89,7 +89,7 @@ pub(super) fn check_distinct(destinations: &[Destination]) -> Result<()> {
 
 /// Refuse an output that would replace one of these files, which the scene is read from.
 pub(super) fn check_inputs_kept(destinations: &[Destination], inputs: &[PathBuf]) -> Result<()> {
-    // What is not there yet cannot be read from.
+    // A file that does not exist yet cannot be read.
     let existing: Vec<&Destination> = destinations
         .iter()
         .filter(|destination| destination.place.exists())

@@ -20,7 +20,7 @@ use crate::{
     },
 };
 
-/// What a picture shows, and from where.
+/// Content and camera of a picture.
 #[derive(Clone, Debug, Args)]
 pub struct ViewFlags {
     /// What the surfaces show [default: radiance]

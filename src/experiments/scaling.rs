@@ -55,7 +55,7 @@ impl SizeCost {
 
 /// A figure of [`SizeCost`] that is fitted and drawn.
 pub struct CostKind {
-    /// What to call it.
+    /// Its label.
     pub label: &'static str,
     /// Its value in seconds, where it is known.
     pub seconds: fn(&SizeCost) -> Option<f64>,

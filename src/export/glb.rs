@@ -28,7 +28,7 @@ use crate::{
 /// Floats of a vertex, three for each of [`ATTRIBUTES`].
 const VERTEX_BYTES: u64 = 4 * 3 * ATTRIBUTES.len() as u64;
 
-/// What a vertex has, in the order of the file.
+/// Attributes of a vertex, in the order of the file.
 const ATTRIBUTES: [&str; 5] = ["POSITION", "NORMAL", "COLOR_0", "_RADIANCE", "_IRRADIANCE"];
 
 /// Three indices of 32 bits.

@@ -10,14 +10,14 @@ use glam::Vec3;
 use super::ColorOptions;
 use crate::{scene::UpAxis, solver::Snapshot};
 
-/// What an exported mesh says beside the numbers of the solve.
+/// Options of an exported mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshOptions {
     /// How displayed colours are made.
     pub color: ColorOptions,
     /// The scene's up axis.
     pub up: UpAxis,
-    /// What all emission, and with it all light, is multiplied by.
+    /// Factor on all emission, and with it on all light.
     pub emission_scale: f32,
     /// Of the scene: see [`crate::scene::Scene::radiance_unit`].
     pub radiance_unit: f32,
@@ -62,7 +62,7 @@ fn presentable(light: Vec3) -> Vec3 {
     light.map(|x| if x > 0.0 { x.min(f32::MAX) } else { 0.0 })
 }
 
-/// Light times two factors. What single precision cannot hold keeps its colour.
+/// Light times two factors. Values above the range of single precision keep their colour.
 fn scaled(light: Vec3, [first, second]: [f64; 2]) -> Vec3 {
     let scaled = presentable(light).as_dvec3() * first * second;
     let excess = scaled.max_element() / f64::from(f32::MAX);

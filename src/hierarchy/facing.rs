@@ -1,6 +1,6 @@
-//! What can face what: tests of planes against the boxes of the light tree, before any light is computed.
+//! Which patches face each other: tests of planes against the boxes of the light tree, before any light is computed.
 //!
-//! Two patches exchange light only where each has a part before the plane of the other. What no chain of such pairs
+//! Two patches exchange light only where each has a part before the plane of the other. Patches that no chain of such pairs
 //! joins to an emitter stays dark, whatever stands between. And where everything that light is computed for lies on one
 //! side of the plane of each triangle, nothing stands between anything: the triangle can at most touch a line of sight.
 

@@ -520,7 +520,7 @@ fn share_vertices(
             };
             let best = match run.len() {
                 0..=2 => down.first(),
-                // What stands between two faces parts them, however smoothly they go on.
+                // A face that stands between two others parts them, however smoothly they join.
                 _ => next_around(scene, patches, one, run),
             };
             let Some(other) = best else { continue };

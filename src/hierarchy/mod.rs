@@ -282,7 +282,7 @@ impl Hierarchy {
         self.clusters.len() + self.mesh.elements.len()
     }
 
-    /// What a node is.
+    /// The kind of a node.
     pub fn kind(&self, node: NodeId) -> Kind {
         let clusters = self.clusters.len();
         if node.index() < clusters {
@@ -382,7 +382,7 @@ impl Hierarchy {
     }
 
     /// The part of the scene's area that an element, or a point on it that stands for so much area, has for errors of what
-    /// it receives, 0…1. What is huge beside all that counts is as large as that.
+    /// it receives, 0…1. Nodes much larger than all that counts have 1.
     pub fn share_of_area(&self, element: usize, area: f32) -> f32 {
         let patch = self.mesh.elements[element].patch as usize;
         let weight = match self.emission_of(element) == Vec3::ZERO {

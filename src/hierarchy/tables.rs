@@ -1,4 +1,4 @@
-//! What every node shows as a source: directional moments of clusters, radiosity of elements.
+//! Every node as a source: directional moments of clusters, radiosity of elements.
 //!
 //! Four channels travel together: red, green, blue, and in `w` what a radiosity of 1 everywhere would give. As a source
 //! `w` holds projected area, as irradiance the sum of form factors, which must be 1 in a closed scene.
@@ -145,7 +145,7 @@ impl Tables {
     }
 }
 
-/// What clusters are pulled from.
+/// The source that clusters are pulled from.
 #[derive(Clone, Copy)]
 struct Level<'a> {
     hierarchy: &'a Hierarchy,

@@ -11,10 +11,10 @@ pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 /// Errors at which runs are compared with the bake.
 const RATIO_TARGETS: [f64; 2] = [0.1, 0.05];
 
-/// What errors are measured against.
+/// The reference of errors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReferenceFacts {
-    /// What the errors are means of.
+    /// The surfaces that the errors are means over.
     pub surfaces: SampledSurfaces,
     /// Surface points.
     pub points: usize,
@@ -33,7 +33,7 @@ pub struct SceneComparison {
     pub scene: String,
     /// Its triangles.
     pub triangles: usize,
-    /// What errors are measured against.
+    /// The reference of errors.
     pub reference: ReferenceFacts,
     /// The runs, in the order of the plan.
     pub runs: Vec<Trajectory>,

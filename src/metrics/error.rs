@@ -1,7 +1,7 @@
 //! Error of measured radiance against path-traced points, with the reference's own noise taken out.
 //!
 //! With x the luminance measured, r that of the reference and s its standard error, over n points:
-//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. What means over the points are means of is told
+//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. The surfaces that means over the points stand for are told
 //! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are omitted, since their own light would
 //! dwarf the rest; where every point emits, all count.
 

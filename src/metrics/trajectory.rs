@@ -28,7 +28,7 @@ pub struct Measurement {
     pub error: ErrorMeasures,
 }
 
-/// What ran.
+/// The runner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Runner {
@@ -43,9 +43,9 @@ pub enum Runner {
 /// A run as it was measured: error over time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trajectory {
-    /// What to call it in plots and tables.
+    /// Its label in plots and tables.
     pub label: String,
-    /// What ran.
+    /// The runner.
     pub runner: Runner,
     /// Its settings, for solver runs.
     pub settings: Option<SolveSettings>,

@@ -20,7 +20,7 @@ use crate::{
 /// keep a new snapshot waiting.
 const PIECE: usize = 4096;
 
-/// What is known of one vertex.
+/// Sums of one vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sums {
     /// Irradiance, summed over passes.

@@ -171,7 +171,7 @@ impl StochasticJacobi {
             .collect()
     }
 
-    /// What turns weighted sums into means.
+    /// The factors from weighted sums to means.
     fn scale(&self) -> f64 {
         if self.weight > 0.0 {
             1.0 / self.weight
@@ -257,7 +257,7 @@ impl StochasticJacobi {
     }
 }
 
-/// What a ray is chosen by: the power of all channels.
+/// The weight by which a ray is chosen: the power of all channels.
 fn importance(power: DVec3) -> f64 {
     power.element_sum()
 }

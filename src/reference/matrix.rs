@@ -44,9 +44,9 @@ pub enum MatrixError {
     TooLarge {
         /// Sides of triangles that receive light.
         patches: usize,
-        /// What it would take.
+        /// The memory it would take.
         mebibytes: u64,
-        /// What it may take.
+        /// The memory it may take.
         limit_mebibytes: u64,
     },
     /// The caller asked to stop.

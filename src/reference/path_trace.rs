@@ -50,7 +50,7 @@ impl Default for PathSettings {
 pub struct PathTraced {
     /// Random points.
     pub points: Vec<ReferencePoint>,
-    /// What means over them are means of.
+    /// The surfaces that they stand for.
     pub surfaces: SampledSurfaces,
     /// Samples taken at each point so far.
     pub samples: u32,

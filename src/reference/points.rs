@@ -17,7 +17,7 @@ use crate::{
     scene::{DisjointSets, Scene, TriangleId},
 };
 
-/// What means over the points of a reference are means of.
+/// The surfaces that the points of a reference stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SampledSurfaces {
     /// Whether nothing reflects without emitting, so that all surfaces count.

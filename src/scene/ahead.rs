@@ -10,9 +10,9 @@ use super::clean::{Notes, ObjCleaner};
 /// Chunks that may wait for the parser. Fewer, and both wait for each other's slow ones; more only hold memory.
 const CHUNKS_AHEAD: usize = 16;
 
-/// What the parser made of the clean text and what was noted meanwhile; `None` for what panicked.
+/// The results of the parser and of the cleaner; `None` where one panicked.
 pub(super) struct Parsed<T> {
-    /// What the parser returned.
+    /// The result of the parser.
     pub(super) value: Option<T>,
     /// Notes of the cleaner.
     pub(super) notes: Option<Notes>,

@@ -60,7 +60,7 @@ pub struct SceneBuilder {
     pub textures: Vec<Texture>,
     /// Object names with the index of their first face, ascending.
     pub objects: Vec<(String, usize)>,
-    /// What was met while reading.
+    /// Warnings of the reader.
     pub warnings: Vec<Warning>,
     /// Textures that were not even read.
     pub spared: Spared,

@@ -51,7 +51,7 @@ pub(super) struct ForeignNumber {
     pub(super) line: usize,
 }
 
-/// What was noted beside the text.
+/// Notes of the cleaner.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     /// Segments by the number that the parser sees as their name.
@@ -60,7 +60,7 @@ pub(super) struct Notes {
     pub(super) faces: Vec<FaceNote>,
     /// Names of `usemtl`, in order of first use.
     pub(super) materials: Vec<Mention>,
-    /// What follows `mtllib`, each once.
+    /// Arguments of `mtllib`, each once.
     pub(super) libraries: Vec<Mention>,
     /// The first number of a vertex in a notation that cannot be read.
     pub(super) foreign_number: Option<ForeignNumber>,
@@ -72,7 +72,7 @@ pub(super) struct Notes {
     pub(super) any_text: bool,
     /// The error that ended reading.
     pub(super) failure: Option<String>,
-    /// What was cured or skipped.
+    /// Corrections and omissions.
     pub(super) log: WarningLog,
 }
 
@@ -87,7 +87,7 @@ pub(super) struct ObjCleaner<R> {
     clean: Vec<u8>,
     /// Whether the clean text ends within a face, which the next one continues.
     in_face: bool,
-    /// What was found.
+    /// Notes so far.
     pub(super) notes: Notes,
     position_count: i64,
     texcoord_count: i64,

@@ -14,9 +14,9 @@ const DEEPEST: u32 = 16;
 /// Polygons that a set of triangles leaves of one, and those that it covers; together they are the whole but for slivers.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
-    /// What no triangle covers.
+    /// Parts that no triangle covers.
     pub(super) open: Vec<Vec<DVec2>>,
-    /// What one covers.
+    /// Parts that one covers.
     pub(super) covered: Vec<Vec<DVec2>>,
 }
 

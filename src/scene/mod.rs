@@ -1,4 +1,4 @@
-//! What is lit: triangles with reflectance, emission and sidedness, in a frame of known size.
+//! Scenes: triangles with reflectance, emission and sidedness, in a frame of known size.
 //!
 //! A [`Scene`] is made by [`SceneBuilder`], whatever it comes from (an OBJ file, a built-in scene, a test), so that
 //! every scene obeys the same promises: finite positions in the unit frame, no zero-area triangle, reflectance below
@@ -140,7 +140,7 @@ impl Material {
 pub struct Triangle {
     /// Indices into [`Scene::positions`].
     pub corners: [u32; 3],
-    /// What it is made of.
+    /// Its material.
     pub material: MaterialId,
     /// Whether the back reflects and emits as the front does. The back of a one-sided triangle is black but blocks.
     pub two_sided: bool,
@@ -174,7 +174,7 @@ pub struct Object {
 /// A scene ready to be lit.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What to call it in titles and reports: the file's stem or the built-in name.
+    /// Its name in titles and reports: the file's stem or the built-in name.
     pub name: String,
     /// The files that it comes from: the OBJ file, then MTL files and pictures that were found, those that no face shows
     /// included. Empty for generated scenes.
@@ -200,7 +200,7 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
-    /// What was skipped, cured or clamped on the way in.
+    /// Warnings: what was skipped, corrected or clamped.
     pub warnings: Vec<Warning>,
     /// Textures that were omitted on the way in.
     pub spared: Spared,
@@ -208,7 +208,7 @@ pub struct Scene {
     pub max_reflectance: f32,
     /// The textures, ready for means.
     averages: Arc<TextureAverages>,
-    /// What emission 1 stands for, W·sr⁻¹·m⁻²: emission here and light computed from it are multiplied by this on their way
+    /// The radiance of emission 1, W·sr⁻¹·m⁻²: emission here and light computed from it are multiplied by this on their way
     /// out. A power of two, and 1 unless the file's brightest emission is outside 1e-12 … 1e12.
     pub radiance_unit: f32,
 }

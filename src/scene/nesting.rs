@@ -329,7 +329,7 @@ fn crossed(
             (to.1, from.1, -1.0)
         };
         let side = (to - from).truncate().perp_dot((at - from).truncate());
-        // What lies on the edge is given to one of its sides.
+        // A point on the edge counts for one of its sides.
         let is_left = (side >= 0.0) == (sign > 0.0);
         (side * sign, is_left)
     };

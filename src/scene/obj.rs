@@ -1,7 +1,7 @@
 //! Reading an OBJ file with its MTL files and textures into a [`Scene`].
 //!
-//! The file passes [`ObjCleaner`], beside it the parser, then [`Triangulator`], and ends in [`SceneBuilder`]. What can be
-//! skipped is skipped, counted and named with its line; only what leaves no scene is an error.
+//! The file passes [`ObjCleaner`], beside it the parser, then [`Triangulator`], and ends in [`SceneBuilder`]. Parts that can
+//! be skipped are skipped, counted and named with their lines; only a file without a usable face is an error.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -161,7 +161,7 @@ impl Transparent {
     }
 }
 
-/// What the faces of a material can show.
+/// Texture coordinates of the faces of a material.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shown {
     has_faces: bool,
@@ -240,7 +240,7 @@ impl Import<'_> {
         self.warn_of_transparent(&transparent);
     }
 
-    /// What the faces of each material that is mentioned can show.
+    /// By material that is mentioned: whether its faces have texture coordinates.
     fn shown(&self, models: &[tobj::Model]) -> Vec<Shown> {
         let mut shown = vec![Shown::default(); self.notes.materials.len()];
         for model in models {
@@ -248,7 +248,7 @@ impl Import<'_> {
             let segment = segment.and_then(|segment| self.notes.segments.get(segment));
             if let Some(material) = segment.and_then(|segment| segment.material) {
                 shown[material].has_faces |= !model.mesh.indices.is_empty();
-                // What is not finite stands for none.
+                // Non-finite coordinates stand for none.
                 let mut texcoords = model.mesh.texcoords.iter();
                 shown[material].has_texcoords |= texcoords.any(|at| at.is_finite());
             }
@@ -464,7 +464,7 @@ impl Import<'_> {
         let mut readings = statement.readings();
         let names: Vec<&str> = readings.iter().map(|reading| &*reading.name).collect();
         let located = self.folder.locate(&defined.folder, &names);
-        // What is nowhere is named without all that may surround a name.
+        // A missing file is named without quotes and other marks around its name.
         let meant = located
             .as_ref()
             .map_or(readings.len() - 1, |(number, _)| *number);

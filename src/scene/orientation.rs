@@ -34,7 +34,7 @@ enum Emission {
     Whole,
 }
 
-/// What becomes of a closed shell.
+/// How a closed shell is lit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Facing {
     /// It is lit where the file's winding says.
@@ -45,7 +45,7 @@ pub(super) enum Facing {
     Both,
 }
 
-/// What is known of the faces beside their corners.
+/// Properties of the faces, apart from their corners.
 pub(super) struct Evidence<'a> {
     /// Whether each triangle emits.
     pub(super) emits: &'a (dyn Fn(usize) -> bool + Sync),
@@ -72,7 +72,7 @@ pub(super) struct Regions {
     bounds: Vec<u32>,
 }
 
-/// What speaks of a region.
+/// Evidence that a region is seen.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     /// Things in it, or facing it and nothing else.
@@ -199,7 +199,7 @@ impl Regions {
         }
     }
 
-    /// What a shell says of the region inside and of the one outside.
+    /// The evidence of a shell for the region inside and for the one outside.
     fn says(&self, shell: usize, facing: Facing) -> [Tally; 2] {
         let is_sure = facing != Facing::Both;
         let shines = self.emission[shell] != Emission::None;
@@ -222,7 +222,7 @@ impl Regions {
         tallies
     }
 
-    /// What is meant of a closed shell by what others say of its two regions; `facing` is what it says itself so far.
+    /// How a closed shell is lit, by the evidence of others for its two regions; `facing` is its present state.
     fn judge(&self, shell: usize, facing: Facing, tallies: &[Tally]) -> Facing {
         let [own_inside, own_outside] = self.says(shell, facing);
         let inside = tallies[shell + 1].without(own_inside);

@@ -8,39 +8,39 @@ pub enum ReadError {
     /// No file of that name.
     #[error("there is no such file; check the name: {}", path.display())]
     NotFound {
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// A folder instead of a file.
     #[error("this is a folder; name the OBJ file in it: {}", path.display())]
     Folder {
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// A pipe or a device: it may have no end.
     #[error("this is a pipe or a device; save the scene to a file first: {}", path.display())]
     NotFile {
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// The system refuses to read it.
     #[error("the file cannot be read ({reason}); check its permissions and the disk: {}", path.display())]
     Unreadable {
-        /// What the system says.
+        /// The message of the system.
         reason: String,
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// Nothing but white space.
     #[error("the file is empty; export the scene again: {}", path.display())]
     Empty {
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// Another format.
     #[error("this is not an OBJ text file; export the scene as Wavefront OBJ: {}", path.display())]
     NotObj {
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// No face is left to light.
@@ -48,7 +48,7 @@ pub enum ReadError {
     NoFaces {
         /// Why they went, starting with a separator, or empty.
         detail: String,
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// Numbers in a notation that cannot be read, and nothing else to light.
@@ -58,9 +58,9 @@ pub enum ReadError {
         line: usize,
         /// How they are written.
         notation: &'static str,
-        /// What to do about it.
+        /// The remedy.
         cure: &'static str,
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// More than the program can index.
@@ -70,15 +70,15 @@ pub enum ReadError {
         count: usize,
         /// How many there may be.
         limit: usize,
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
     /// The parser gave up on text that was cleaned for it.
     #[error("the OBJ parser gave up ({reason}); export the scene again with another program: {}", path.display())]
     Parser {
-        /// What the parser says.
+        /// The message of the parser.
         reason: String,
-        /// What was asked for.
+        /// The path.
         path: PathBuf,
     },
 }

@@ -68,8 +68,8 @@ impl Scene {
         self.materials.iter().map(Appearance::of).collect()
     }
 
-    /// What becomes of wished appearances: one for each material, in the ranges that materials have. Materials that
-    /// nothing is wished for stay as they are.
+    /// Appearances brought into their ranges, one for each material. Materials without a new appearance stay as they
+    /// are.
     pub fn allowed(&self, wished: &[Appearance]) -> Vec<Appearance> {
         let mut allowed = self.appearances();
         for (appearance, wish) in allowed.iter_mut().zip(wished) {

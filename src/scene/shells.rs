@@ -73,7 +73,7 @@ fn volumes(
     of_triangle: &[u32],
     closed: &[bool],
 ) -> Vec<f64> {
-    /// What is summed over a shell.
+    /// Sums over a shell.
     #[derive(Clone, Copy, Default)]
     struct Sums {
         /// A corner; what is far from the origin keeps its digits when it is measured from there.

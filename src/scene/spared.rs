@@ -13,7 +13,7 @@ use super::{Face, SceneBuilder, Texture, TextureId};
 /// Pixels that differ by no more than this share of the first are of one colour: means of equal pixels are rounded.
 const ALIKE: f32 = 1e-6;
 
-/// What the faces of a material show of its textures.
+/// Texture coordinates of the faces of a material.
 #[derive(Clone, Copy, Debug, Default)]
 struct View {
     /// Box of the texture coordinates, where a face has any.
@@ -37,7 +37,7 @@ impl View {
     }
 }
 
-/// What becomes of a texture of a material.
+/// The treatment of a texture of a material.
 enum Fate {
     Kept,
     Unused,

@@ -98,7 +98,7 @@ impl Texture {
                 return covered(&picture.into_rgba16(), name, role, word, share);
             }
             DynamicImage::ImageRgba32F(pixels) => {
-                // What is no number hides nothing.
+                // NaN counts as opaque.
                 let share = |alpha: f32| if alpha < 1.0 { alpha.max(0.0) } else { 1.0 };
                 return covered(&pixels, name, role, finite_non_negative, share);
             }
@@ -161,7 +161,7 @@ fn color_of<T: Copy, const N: usize>(channels: [T; N], linear: impl Fn(T) -> f32
     Vec3::new(red, green, blue)
 }
 
-/// What a picture is for, which decides what its transparent pixels stand for.
+/// The role of a picture, which decides the meaning of its transparent pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Role {
     /// It reflects: hidden pixels have the mean colour of the others, so that none is too bright or dark by what nobody

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What kind of trouble, for grouping and for tests.
+/// Kind of a warning, for grouping and for tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum WarningKind {
     /// A face was omitted: bad index, non-finite or too few corners, zero area.
@@ -32,7 +32,7 @@ pub enum WarningKind {
 pub struct Warning {
     /// Its kind.
     pub kind: WarningKind,
-    /// What happened and what was done, one sentence in lower case without a final period.
+    /// The problem and the remedy, one sentence in lower case without a final period.
     pub message: String,
     /// How often, at least 1.
     pub count: usize,

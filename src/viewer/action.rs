@@ -1,4 +1,4 @@
-//! What the user asks for: keys, menus, buttons and panels all end here.
+//! Actions of the user: keys, menus, buttons and panels all end here.
 
 use std::path::PathBuf;
 

@@ -34,7 +34,7 @@ const MAX_PITCH: f32 = FRAC_PI_2 - 1e-3;
 /// A turntable camera. Positions in frame units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What it looks at and turns around.
+    /// The point that it looks at and turns around.
     pub pivot: Vec3,
     /// Radians around the up axis; 0 looks from the front.
     pub yaw: f32,
@@ -46,7 +46,7 @@ pub struct Camera {
     pub fov_y_radians: f32,
     /// Parallel instead of central projection.
     pub orthographic: bool,
-    /// What is up: a unit vector, which the camera turns around.
+    /// The up direction, a unit vector; the camera turns around it.
     pub up: Vec3,
 }
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::view::{ClusterCut, ClusterOverlay};
 use crate::solver::ClusterBox;
 
-/// What is shown of a tree, kept because large trees take a while to go through.
+/// The shown clusters of a tree, stored because large trees take a while to go through.
 #[derive(Clone, Default)]
 pub struct ShownClusters {
     of: Option<(Arc<Vec<ClusterBox>>, ClusterOverlay)>,
@@ -129,7 +129,7 @@ pub fn containing(clusters: &[ClusterBox], shown: &[usize], point: Vec3) -> Opti
     shown
         .iter()
         .copied()
-        // What is shown may still be of the tree before.
+        // The shown clusters may still be of the tree before.
         .filter(|&index| index < clusters.len())
         .filter(|&index| {
             let cluster = &clusters[index];

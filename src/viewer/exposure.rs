@@ -78,7 +78,7 @@ impl Histogram {
 /// How the exposure of the window follows what was metered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Follower {
-    /// What was metered last; `None` before the first light of a scene.
+    /// The last metering; `None` before the first light of a scene.
     pub target: Option<f32>,
 }
 

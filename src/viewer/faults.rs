@@ -9,7 +9,7 @@ use eframe::egui;
 
 use crate::worker::Wake;
 
-/// What comes from outside the window, from whatever thread: complaints of the graphics device, signals of the system.
+/// Events from outside the window, on any thread: errors of the graphics device, signals of the system.
 #[derive(Default)]
 pub struct Faults {
     sentences: Mutex<Vec<String>>,

@@ -22,7 +22,7 @@ pub fn figure(value: f64) -> String {
     }
 }
 
-/// What was typed as a number, with or without spaces between thousands.
+/// A number as it was typed, with or without spaces between thousands.
 pub fn number(text: &str) -> Option<f64> {
     let packed: String = text.split_whitespace().collect();
     packed.parse().ok()

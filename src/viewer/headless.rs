@@ -55,7 +55,7 @@ impl HeadlessPicture {
     }
 }
 
-/// What is drawn: a scene under a snapshot's light.
+/// The subject of a picture: a scene under a snapshot's light.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
     /// The scene.

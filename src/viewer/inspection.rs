@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::view::{LinkEnd, LinkOverlay};
 use crate::solver::{Inspection, Subject};
 
-/// What was asked, and what is known.
+/// Subjects of the present run, and their inspections.
 #[derive(Default)]
 pub struct Inspections {
     /// Whether the nodes that are shown are those of the present run.
@@ -26,7 +26,7 @@ impl Inspections {
         self.is_open = true;
     }
 
-    /// What to ask now: once, until something else is wanted.
+    /// The subjects to ask about now: once, until others are wanted.
     pub fn question(&mut self, wanted: &[Subject]) -> Option<Vec<Subject>> {
         let is_same = self.asked.len() == wanted.len()
             && self.asked.iter().zip(wanted).all(|(a, b)| is_same(a, b));
@@ -51,12 +51,12 @@ impl Inspections {
         }
     }
 
-    /// What is known of the picked element.
+    /// The inspection of the picked element.
     pub fn element(&self) -> Option<&Arc<Inspection>> {
         self.element.as_ref()
     }
 
-    /// What is known of an end of links.
+    /// The inspection of an end of links.
     pub fn of(&self, end: LinkEnd) -> Option<&Arc<Inspection>> {
         match end {
             LinkEnd::Element => self.element.as_ref(),

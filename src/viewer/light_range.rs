@@ -48,7 +48,7 @@ pub fn false_color_range(
     }
 }
 
-/// What false colours show at a vertex.
+/// The value of false colours at a vertex.
 fn value(snapshot: &Snapshot, mode: ViewMode, vertex: usize) -> f32 {
     let light = &snapshot.light;
     match mode {

@@ -32,7 +32,7 @@ pub enum SceneSource {
 }
 
 impl SceneSource {
-    /// What to call it in lists and titles.
+    /// Its name in lists and titles.
     pub fn label(&self) -> String {
         match self {
             Self::File(path) => path
@@ -80,12 +80,12 @@ pub struct LoadedScene {
     pub viewpoint: Camera,
 }
 
-/// What is done to a scene on its way, in order.
+/// Stages of loading a scene, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// The file, its materials and textures.
     Reading,
-    /// What picking and the reference need.
+    /// The tree that picking and the reference need.
     BuildingRayTree,
     /// Where to look from.
     ChoosingView,
@@ -126,14 +126,14 @@ impl Tracker {
 pub struct LoadProgress {
     /// The part that is done, 0…1.
     pub share: f32,
-    /// What is being done.
+    /// The present stage.
     doing: &'static str,
     /// Since reading began.
     elapsed: Duration,
 }
 
 impl LoadProgress {
-    /// What is being done and how far it is, short.
+    /// The present stage and its progress, short.
     pub fn text(&self) -> String {
         let percent = (100.0 * self.share).floor();
         match self.elapsed.as_secs() {
@@ -185,7 +185,7 @@ impl Loader {
         self.tracker.progress(self.since.elapsed())
     }
 
-    /// What is being read.
+    /// The source that is being read.
     pub fn source(&self) -> &SceneSource {
         &self.source
     }

@@ -96,7 +96,7 @@ impl Materials {
         }
     }
 
-    /// What the file says of a material.
+    /// A material as in the file.
     pub fn of_file(&self, index: usize) -> &MaterialControl {
         &self.of_file[index]
     }
@@ -116,7 +116,7 @@ impl Materials {
         (0..self.now.len()).filter(|&index| self.now[index].light.is_some())
     }
 
-    /// How they look, one for each. What was not changed is exactly as the scene has it.
+    /// Their appearances, one for each. An unchanged one is exactly that of the scene.
     pub fn appearances(&self, scene: &Scene) -> Vec<Appearance> {
         let controls = self.now.iter().zip(&self.of_file);
         let of = |((now, of_file), material)| {

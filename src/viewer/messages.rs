@@ -1,4 +1,4 @@
-//! What the window tells the user: sentences, which of them were seen, and which go with the scene they are about.
+//! Messages to the user: sentences, which of them were seen, and which are dropped with the scene they are about.
 
 /// How much a message matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -9,7 +9,7 @@ use super::{
     state::State,
 };
 
-/// What a click asks for.
+/// The result of a click.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Picked {
     /// This point was clicked.
@@ -125,7 +125,7 @@ fn point_under(rect: egui::Rect, state: &State, pointer: egui::Pos2) -> Vec3 {
     )
 }
 
-/// What a click or double click means.
+/// The action of a click or double click.
 fn clicked(response: &egui::Response, state: &mut State) -> Option<Picked> {
     if !response.clicked() && !response.double_clicked() {
         return None;

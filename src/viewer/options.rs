@@ -1,4 +1,4 @@
-//! What the window is opened with.
+//! Options with which the window is opened.
 
 use glam::{DVec3, Vec3};
 
@@ -9,14 +9,14 @@ use crate::{
     worker::RunOptions,
 };
 
-/// What the window opens with.
+/// Options of the window.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The scene; none shows how to open one.
     pub source: Option<SceneSource>,
     /// How it is read.
     pub scene_options: SceneOptions,
-    /// What is computed.
+    /// Settings of the solve.
     pub settings: SolveSettings,
     /// Whether these settings go before those saved beside the scene.
     pub settings_are_asked_for: bool,
@@ -33,11 +33,11 @@ pub struct Options {
 pub struct CameraRequest {
     /// The eye.
     pub position: Option<DVec3>,
-    /// What it looks at.
+    /// The point it looks at.
     pub focal_point: Option<DVec3>,
     /// Vertical angle of view in degrees.
     pub view_angle_degrees: Option<f32>,
-    /// What is up; by default as it was.
+    /// The up direction; by default unchanged.
     pub up: Option<Vec3>,
 }
 

@@ -1,4 +1,4 @@
-//! What lies under the cursor: the point, its element, its light, and the object around it.
+//! Picking under the cursor: the point, its element, its light, and the object around it.
 
 use glam::{Vec2, Vec3};
 

@@ -120,7 +120,7 @@ impl Run {
 /// A change of settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// What it does.
+    /// Its effect.
     pub effect: Effect,
     /// Where the run stood when it came.
     pub status: RunStatus,

@@ -52,7 +52,7 @@ pub struct Drawn {
     pub canvas: Canvas,
     /// By what.
     pub gpu: Gpu,
-    /// What its radiance was multiplied by.
+    /// The factor on its radiance.
     pub exposure_factor: f32,
     /// How it becomes display colours.
     pub tone_map: ToneMap,
@@ -98,7 +98,7 @@ impl Shot {
     }
 }
 
-/// What becomes a file.
+/// The content of a file.
 pub enum Content {
     /// A picture; `.exr` takes the radiance.
     Picture(Shot),
@@ -114,7 +114,7 @@ pub struct LitMesh {
     pub snapshot: Arc<Snapshot>,
     /// Of the scene.
     pub frame: Frame,
-    /// What the file says beside.
+    /// Options of the file.
     pub options: MeshOptions,
 }
 
@@ -132,7 +132,7 @@ impl LitMesh {
 pub struct Saving {
     /// Where to; the ending names the format.
     pub path: PathBuf,
-    /// What.
+    /// The content.
     pub content: Content,
 }
 

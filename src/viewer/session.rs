@@ -1,4 +1,4 @@
-//! What outlives a window: recent scenes, and a sidecar beside a scene with its camera, view and settings.
+//! State that outlives a window: recent scenes, and a sidecar beside a scene with its camera, view and settings.
 
 use std::{
     fs,
@@ -63,7 +63,7 @@ struct Sidecar {
     settings: SolveSettings,
 }
 
-/// What a sidecar holds, in the scene's frame.
+/// The content of a sidecar, in the scene's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {
     /// The camera, where it is valid.

@@ -1,4 +1,4 @@
-//! What takes too long for a frame of a large scene, done on a thread of its own: handing mesh, light and boxes to the
+//! A thread for work that takes too long for a frame of a large scene: handing mesh, light and boxes to the
 //! adapter, choosing and colouring the boxes, looking up the light at the picked point, letting go of what was replaced.
 //!
 //! The window says what it wants to show and goes on with what is there. Only the newest wish is fulfilled.
@@ -26,7 +26,7 @@ use crate::{
     worker::Wake,
 };
 
-/// What the window wants to show. Arcs are stored, so that no address is reused.
+/// The picture that the window wants. Arcs are stored, so that no address is reused.
 #[derive(Clone)]
 pub struct Wanted {
     /// The scene.
@@ -35,7 +35,7 @@ pub struct Wanted {
     pub snapshot: Arc<Snapshot>,
     /// Measured errors at its vertices, where they are shown.
     pub errors: Option<Arc<Vec<f32>>>,
-    /// What the surfaces show.
+    /// The view mode.
     pub mode: ViewMode,
     /// Ends of the false colours of that mode.
     pub range: [f32; 2],
@@ -60,11 +60,11 @@ impl PartialEq for Wanted {
     }
 }
 
-/// What is ready to be shown.
+/// A picture that is ready to be shown.
 pub struct Staged {
-    /// What was wanted.
+    /// The request.
     pub wanted: Wanted,
-    /// What the adapter holds of it; nothing without an adapter.
+    /// Its uploads; `None` without an adapter.
     pub uploads: Option<Uploads>,
     /// Why there is no mesh among it.
     pub error: Option<RenderError>,
@@ -72,7 +72,7 @@ pub struct Staged {
     pub is_lit: bool,
     /// The clusters that boxes are drawn of.
     pub clusters: ShownClusters,
-    /// What the ends of their colours stand for, as [`cluster_lines::ColoredBoxes`] has them.
+    /// Values of the ends of their colours, as [`cluster_lines::ColoredBoxes`] has them.
     pub box_ends: [f32; 2],
     /// Light at the picked point.
     pub probe: Option<Probe>,
@@ -80,7 +80,7 @@ pub struct Staged {
     pub object_light: ObjectLight,
 }
 
-/// What the thread is told.
+/// A command to the thread.
 enum Order {
     Show(Box<Wanted>),
     Drop(Box<dyn Any + Send>),
@@ -138,7 +138,7 @@ impl Stage {
         self.drop_later(asked);
     }
 
-    /// What has become ready, if it is still wanted or on the way to it.
+    /// The newest picture that is ready, if it is of the present run.
     pub fn poll(&mut self) -> Option<Staged> {
         let newest = self.staged.try_iter().last()?;
         let is_of_run = |asked: &Wanted| Arc::ptr_eq(&asked.scene, &newest.wanted.scene);

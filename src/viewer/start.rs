@@ -109,7 +109,7 @@ fn describe(error: &eframe::Error) -> ViewerError {
     }
 }
 
-/// What an error says, without the places in other people's source that it names.
+/// The text of an error, without the source locations that it names.
 fn essence(text: &str) -> String {
     let text = text.replace('\n', " ");
     let said = match text.rsplit_once(".rs:") {

@@ -1,4 +1,4 @@
-//! What the window knows: the scene, the run, the view, the selection, the messages.
+//! State of the window: the scene, the run, the view, the selection, the messages.
 
 use std::sync::Arc;
 
@@ -59,9 +59,9 @@ pub struct State {
     pub materials: Materials,
     /// How the light is shown.
     pub view: ViewSettings,
-    /// What the surfaces showed before the key for normals was pressed.
+    /// The view mode before the key for normals was pressed.
     pub mode_before_normals: ViewMode,
-    /// What the automatic exposure makes for.
+    /// The automatic exposure.
     pub exposure: Follower,
     /// From where.
     pub rig: CameraRig,
@@ -69,21 +69,21 @@ pub struct State {
     pub selection: Option<Selection>,
     /// The selected cluster.
     pub cluster: Option<usize>,
-    /// What is shown of the cluster tree.
+    /// The shown clusters.
     pub shown_clusters: ShownClusters,
-    /// What is ready to be drawn.
+    /// The picture that is ready to be drawn.
     pub staged: Option<Arc<Staged>>,
-    /// What the solver knows of what is selected.
+    /// Inspections of the selection.
     pub inspections: Inspections,
-    /// What frames cost.
+    /// Times of frames.
     pub frame_times: FrameTimes,
     /// Ends of the false colours in use.
     pub false_color_range: [f32; 2],
-    /// What was said.
+    /// Messages to the user.
     pub messages: Messages,
     /// Scenes opened before.
     pub recent: Recent,
-    /// What the panels hold.
+    /// State of the panels.
     pub panels: PanelState,
     /// The graphics adapter, for the statistics.
     pub adapter_name: String,
@@ -122,7 +122,7 @@ impl State {
         }
     }
 
-    /// What the solver is asked about: the picked element, and the selected cluster.
+    /// The subjects of inspection: the picked element, and the selected cluster.
     pub fn subjects(&self) -> Vec<Subject> {
         let element = self.selection.as_ref().and_then(|selection| {
             Some(Subject::Element {
@@ -146,7 +146,7 @@ impl State {
         })
     }
 
-    /// What light is multiplied by where it is shown as a number: see [`Scene::radiance_unit`].
+    /// Factor on light where it is shown as a number: see [`Scene::radiance_unit`].
     pub fn radiance_unit(&self) -> f32 {
         let loaded = self.loaded.as_ref();
         loaded.map_or(1.0, |loaded| loaded.scene.radiance_unit)

@@ -36,13 +36,13 @@ const GRACE: Duration = Duration::from_millis(60);
 /// at this number, the next run waits.
 const MAX_ABANDONED: usize = 2;
 
-/// Solver threads, kept while their number stays.
+/// Solver threads; they are reused as long as their number stays the same.
 struct Pool {
     threads: usize,
     pool: ThreadPool,
 }
 
-/// The solver threads: those that share the cores, and those that give way. Idle ones cost nothing.
+/// The solver threads: those of normal priority and those of low priority. Idle ones cost nothing.
 #[derive(Default)]
 struct Pools {
     sharing: Option<Pool>,
@@ -50,7 +50,7 @@ struct Pools {
 }
 
 impl Pools {
-    /// The pool of that many threads, made anew only when the number changes.
+    /// The pool of that many threads; it is rebuilt only when the number changes.
     fn pool_of(
         &mut self,
         threads: usize,
@@ -94,7 +94,7 @@ struct InPool {
     cancel: Cancel,
     /// Whether it is being prepared.
     prepares: bool,
-    /// Whether what it does gives way to light that is changed.
+    /// Whether a change of appearances cancels its task.
     gives_way: bool,
     /// When its run was replaced by another.
     outdated_since: Option<Instant>,
@@ -403,7 +403,7 @@ impl Controller {
         self.outbox.send(generation, Event::Started);
     }
 
-    /// Let go of something large where it keeps no command waiting.
+    /// Drop something large on a thread where no command waits for it.
     fn drop_in_pool(&self, large: impl Send + 'static) {
         match self.pools.any() {
             Some(pool) => pool.spawn(move || drop(large)),
@@ -422,8 +422,8 @@ impl Controller {
         }
     }
 
-    /// A step under way is interrupted: it lights materials that look otherwise. Light on its way is not, or nothing would
-    /// show while a slider is dragged; of what is wished meanwhile only the last is done.
+    /// Light the run with other appearances. A step under way is interrupted, since it lights the old ones. A relighting
+    /// under way is not, or nothing would show while a slider is dragged; of later appearances only the last are lit.
     fn relight(&mut self, generation: Generation, appearances: Arc<[Appearance]>) {
         let run = self.run.as_mut();
         if let Some(run) = run.filter(|run| run.generation == generation) {

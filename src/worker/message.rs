@@ -1,4 +1,4 @@
-//! What goes in and out of the worker: commands, events, options of a run.
+//! Messages of the worker: commands, events, options of a run.
 
 use std::{sync::Arc, time::Duration};
 
@@ -18,7 +18,7 @@ pub struct RunOptions {
     pub threads: usize,
     /// Time from the start or the last continue after which the run stops.
     pub time_limit: Option<Duration>,
-    /// Bytes that the solver may hold.
+    /// Bytes that the solver may use.
     pub memory_limit: Option<u64>,
     /// Whether steps wait for other threads of the program where cores are few. The preparation does not: until it is
     /// done there is nothing to look at.
@@ -37,7 +37,7 @@ pub enum StopReason {
     TimeLimit,
     /// The memory limit is reached.
     MemoryLimit,
-    /// Someone asked for it.
+    /// The owner stopped it.
     Requested,
 }
 
@@ -53,7 +53,7 @@ impl StopReason {
     }
 }
 
-/// What the worker announces.
+/// An event that the worker announces.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A run begins; its solver is being prepared.
@@ -72,10 +72,10 @@ pub enum Event {
         /// Time spent on preparing and stepping, in seconds, as in [`StepReport::solve_s`].
         solve_s: f64,
     },
-    /// Materials look otherwise; their light is in the slot. The figures are those of the last step, but for what has
-    /// changed.
+    /// The light of other appearances is in the slot. The figures are those of the last step, except those that the
+    /// change affects.
     Relit {
-        /// What is known of the light.
+        /// Figures of the light.
         report: StepReport,
         /// Seconds that it took; nothing where a preview was refined.
         seconds: Option<f64>,
@@ -99,19 +99,19 @@ pub enum Event {
 pub(super) struct Start {
     /// The new run.
     pub generation: Generation,
-    /// What to light.
+    /// The scene.
     pub scene: Arc<Scene>,
     /// Its ray tree, where there is one already.
     pub rays: Option<Arc<RayTree>>,
-    /// What to compute.
+    /// The settings.
     pub settings: SolveSettings,
     /// How to run.
     pub options: RunOptions,
-    /// How materials look, where not as the scene says.
+    /// Appearances of the materials, where they differ from the scene.
     pub appearances: Option<Arc<[Appearance]>>,
 }
 
-/// What the owner asks of the worker.
+/// A command of the owner.
 pub(super) enum Command {
     /// Light a scene from the beginning.
     Start(Start),
@@ -119,7 +119,7 @@ pub(super) enum Command {
     Restart {
         /// The new run.
         generation: Generation,
-        /// What to compute.
+        /// The settings.
         settings: SolveSettings,
     },
     /// Interrupt and rest.
@@ -130,35 +130,35 @@ pub(super) enum Command {
     Stop,
     /// Other settings that the run can take over.
     Settings {
-        /// What to compute from the next step on.
+        /// The settings from the next step on.
         settings: SolveSettings,
-        /// What the change does.
+        /// The effect of the change.
         effect: Effect,
     },
     /// Other limits.
     Options(RunOptions),
-    /// Materials of a run look so from now on.
+    /// Use other appearances of the materials of a run from now on.
     Relight {
         /// The run.
         generation: Generation,
         /// One for each material.
         appearances: Arc<[Appearance]>,
     },
-    /// Look into nodes of a run.
+    /// Inspect nodes of a run.
     Inspect {
         /// The run that the nodes are of.
         generation: Generation,
-        /// Which ones, now and after each step, instead of those asked for before.
+        /// The nodes, now and after each step, instead of those of the last such command.
         subjects: Vec<Subject>,
     },
     /// End the thread.
     Shutdown,
 }
 
-/// What the worker thread waits for.
+/// A message that the worker thread waits for.
 pub(super) enum Message {
-    /// The owner asks.
+    /// A command.
     Command(Command),
-    /// The pool gives the solve back.
+    /// The pool returns the solve.
     Returned(Returned),
 }

@@ -17,11 +17,11 @@ use crate::{
 pub(super) struct Request {
     /// The run that it belongs to.
     pub generation: Generation,
-    /// What the pool does.
+    /// The task.
     pub task: Task,
 }
 
-/// What the pool does with a solve.
+/// A task with a solve.
 pub(super) enum Task {
     /// Make a solve, unless cancelled.
     Prepare(MakeStepper, Job, Cancel),

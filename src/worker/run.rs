@@ -16,7 +16,7 @@ use crate::{
     solver::{Cancel, SolveSettings, StepReport, Subject},
 };
 
-/// What a run is meant to be doing.
+/// The state that a run is to reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Aim {
     /// Step after step.
@@ -25,7 +25,7 @@ pub(super) enum Aim {
     Rest,
     /// Nothing more.
     End(StopReason),
-    /// Nothing: the solve is lost.
+    /// None: the solve is lost.
     Failed,
 }
 
@@ -33,17 +33,17 @@ pub(super) enum Aim {
 pub(super) struct Run {
     /// Which run.
     pub generation: Generation,
-    /// What is lit.
+    /// The scene.
     pub scene: Arc<Scene>,
     /// Its ray tree, where there is one already.
     pub rays: Option<Arc<RayTree>>,
-    /// What is computed.
+    /// The settings.
     pub settings: SolveSettings,
     /// Whether the solve does not have the settings yet.
     pub settings_changed: bool,
     /// How it is computed.
     pub options: RunOptions,
-    /// How materials look, where not as the scene says. Changed by [`Run::relight`].
+    /// Appearances of the materials, where they differ from the scene. Changed by [`Run::relight`].
     pub appearances: Option<Arc<[Appearance]>>,
     /// Whether the solve does not have the appearances yet.
     pub appearances_changed: bool,
@@ -55,9 +55,9 @@ pub(super) struct Run {
     subjects: Vec<Subject>,
     /// Whether an answer is due.
     is_asked: bool,
-    /// What it is meant to be doing. Changed by [`Run::turn_to`].
+    /// The state that it is to reach. Changed by [`Run::turn_to`].
     pub aim: Aim,
-    /// Whether the aim was said to be reached.
+    /// Whether it was announced that the aim is reached.
     pub announced: bool,
     /// Start, or last continue.
     since: Instant,
@@ -101,7 +101,7 @@ impl Run {
                 && self.stepper.is_some())
     }
 
-    /// Materials look so from now on; earlier appearances that are still waiting are dropped.
+    /// Use these appearances from now on; earlier appearances that are still waiting are dropped.
     pub(super) fn relight(&mut self, appearances: Arc<[Appearance]>) {
         self.appearances = Some(appearances);
         self.appearances_changed = true;
@@ -168,7 +168,7 @@ impl Run {
         }
     }
 
-    /// Aim at something, which is to be announced once it is reached. The clock runs on from where it stood.
+    /// Set the aim, which is to be announced once it is reached. The clock continues.
     pub(super) fn turn_to(&mut self, aim: Aim) {
         self.before = self.running_time();
         self.since = Instant::now();

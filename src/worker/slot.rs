@@ -1,4 +1,4 @@
-//! A place for one large value, where the newest replaces what nobody fetched.
+//! A slot for one large value; a newer value replaces one that was not fetched.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

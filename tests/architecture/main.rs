@@ -45,7 +45,7 @@ const CONFINED: [(&str, &[&str]); 7] = [
     ("clap", &["cli"]),
 ];
 
-/// What the solver must not say: it is a value, without threads, channels, clocks or globals.
+/// Words that the solver must not use: it is a value, without threads, channels, clocks or globals.
 const FORBIDDEN_IN_SOLVER: [&str; 9] = [
     "thread",
     "mpsc",
@@ -229,7 +229,7 @@ fn tangles(imports: &SiblingImports, ordered: &[(&str, &[&str])], tangled: &[&st
     found
 }
 
-/// What [`tangles`] finds among made-up files, none of whose modules is excused.
+/// The findings of [`tangles`] among made-up files, without exceptions.
 fn tangles_of(files: &[(&str, &str)], ordered: &[(&str, &[&str])]) -> Vec<String> {
     let files = files
         .iter()

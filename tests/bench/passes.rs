@@ -1,4 +1,4 @@
-//! What a solve does once over all of a scene: reading, building trees, sweeping over links.
+//! The time of passes over a whole scene: reading, building trees, sweeping over links.
 
 #![expect(
     clippy::unwrap_used,

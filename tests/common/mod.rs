@@ -1,4 +1,4 @@
-//! What tests of light share: finished scenes, whole solves, and one measure of closeness.
+//! Helpers of tests of light: finished scenes, whole solves, and one measure of closeness.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![allow(dead_code, reason = "each test uses some of it")]

@@ -129,7 +129,7 @@ fn spoil_once(text: &mut Vec<u8>, chance: &mut Chance) {
     }
 }
 
-/// What every scene keeps, whatever its file of so many bytes was.
+/// The invariants of every scene, whatever its file of so many bytes was.
 pub(crate) fn assert_promises(scene: &Scene, bytes: usize) {
     assert!(scene.positions.iter().all(|position| position.is_finite()));
     assert_eq!(scene.surfaces.len(), scene.triangles.len());

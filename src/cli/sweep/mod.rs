@@ -1,7 +1,7 @@
 //! `vecrad report`: run methods and baselines on scenes, measure their error against run time, write what came out.
 //!
 //! A suite says which scenes and what to run; a [`session::Session`] loads, traces references and runs, and
-//! knows when to stop. What is measured is described in the room `metrics`, plots are drawn in `export`.
+//! knows when to stop. Measures are described in the room `metrics`, plots are drawn in `export`.
 
 mod baselines;
 mod error_time;

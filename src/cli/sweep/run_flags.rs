@@ -1,4 +1,4 @@
-//! What is run on a scene: which methods, oracles, thresholds and sample counts, and which baselines.
+//! The runs on a scene: which methods, oracles, thresholds and sample counts, and which baselines.
 //!
 //! The first of each list is the base; the others are tried one at a time, so that the number of runs is the sum of the
 //! lengths of the lists. `--full` asks for their product.
@@ -72,9 +72,9 @@ pub enum Baseline {
 /// A solver run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Configuration {
-    /// What to call it.
+    /// Its label.
     pub(super) label: String,
-    /// What it computes.
+    /// Its settings.
     pub(super) settings: SolveSettings,
 }
 
@@ -229,7 +229,7 @@ impl Lists {
     }
 }
 
-/// What was given, or else the base and all others.
+/// The given values, or else the base and all others.
 fn given_or<T: PartialEq>(
     given: impl Iterator<Item = T>,
     base: T,
@@ -286,7 +286,7 @@ fn at(flags: &SettingFlags, method: Method, oracle: Oracle, epsilon: f32) -> Sol
     }
 }
 
-/// What tells a run from the others.
+/// The label of a run, unique among the runs.
 fn label(settings: &SolveSettings, usual_epsilon: f32) -> String {
     let mut label = name_of(&settings.method);
     if settings.oracle == Oracle::Samples {

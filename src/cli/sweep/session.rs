@@ -1,4 +1,4 @@
-//! What all runs of a report share: scenes, references, threads, limits, progress, and whether to stop.
+//! State shared by all runs of a report: scenes, references, threads, limits, progress, and whether to stop.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -43,7 +43,7 @@ pub(super) enum Source {
 
 /// A report in the making.
 pub(super) struct Session<'a> {
-    /// What was asked for.
+    /// Arguments of the command.
     pub(super) arguments: &'a ReportArguments,
     /// Set by Ctrl+C.
     pub(super) interrupted: Arc<AtomicBool>,
@@ -54,11 +54,11 @@ pub(super) struct Session<'a> {
     is_cut_short: bool,
 }
 
-/// What the light of a scene is compared with.
+/// The reference of a scene.
 pub(super) struct Truth {
     /// Random points with their light.
     pub(super) points: Vec<ReferencePoint>,
-    /// What to say of it.
+    /// Its description.
     pub(super) facts: ReferenceFacts,
 }
 

@@ -44,7 +44,7 @@ pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
             case.name
         ));
         let outcome = try_case(session, case);
-        // What an interruption left unfinished is no failure.
+        // A case that an interruption ended has not failed.
         if session.is_interrupted() && !outcome.holds() {
             break;
         }

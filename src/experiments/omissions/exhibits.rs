@@ -1,4 +1,4 @@
-//! The scenes of the table: those that need less, and some that need everything.
+//! The scenes of the table: some where omissions apply, and some that need everything.
 
 use crate::scene::{
     BuildError, Scene, SceneBuilder, SceneOptions, Sides,
@@ -8,7 +8,7 @@ use crate::scene::{
 /// A scene of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct Exhibit {
-    /// Its name, unlike all others.
+    /// Its name; unique.
     pub name: &'static str,
     /// Whether all its runs take no more than a second or two in a build without optimisation.
     pub is_quick: bool,

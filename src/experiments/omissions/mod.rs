@@ -1,4 +1,4 @@
-//! What each omission of the plan saves: the same scene with the plan as it is, with one omission kept, and with all.
+//! What each omission of the plan saves: the same scene solved with all omissions, without one of them, and with none.
 //!
 //! Times are wall-clock seconds of preparing and stepping, without reading and without pictures. Light is compared where
 //! it arrives, at random points of the surfaces, with that of the run that keeps everything; how far two such runs
@@ -29,13 +29,13 @@ const POINTS: u32 = 4000;
 /// How often the plan alone is made, for the median of its time.
 const PLANS: u32 = 9;
 
-/// Name of the run that obeys the plan.
+/// Name of the run with all omissions.
 const AS_PLANNED: &str = "nothing";
 
 /// Name of the run that omits nothing.
 const ALL: &str = "all";
 
-/// Name of the run that differs from the last by its seed: it is there for the noise, and once is enough.
+/// Name of the run that differs from the last by its seed only; it measures the noise and is run once.
 const RESEEDED: &str = "all, other seed";
 
 /// A solve to be run.
@@ -45,11 +45,11 @@ struct Run {
     settings: SolveSettings,
     /// The times of its rounds.
     seconds: Vec<f64>,
-    /// What came of it; the same in all rounds.
+    /// Its result; the same in all rounds.
     lit: Option<Lit>,
 }
 
-/// What came of a solve.
+/// The result of a solve.
 #[derive(Clone, Debug)]
 struct Lit {
     last: StepReport,
@@ -67,7 +67,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// Make the plan of a scene, and see from it which runs there are; `None` when cancelled.
+    /// Make the plan of a scene and derive the runs from it; `None` when cancelled.
     pub fn new(scene: Arc<Scene>, settings: &SolveSettings, cancel: &Cancel) -> Option<Self> {
         let keeping = |keep: Keep| SolveSettings {
             keep,
@@ -90,7 +90,7 @@ impl Trial {
             .into_iter()
             .filter(|omission| names.contains(&omission.name()))
             .collect();
-        // The tree is planted whatever is kept.
+        // The tree is built in any case.
         let plan_s = (seconds_of(&planned)? - seconds_of(&keeping(Keep::ALL))?).max(0.0);
         let run = |kept, settings| Run {
             kept,
@@ -121,7 +121,7 @@ impl Trial {
         })
     }
 
-    /// What is kept in each run, in their order.
+    /// The omission that each run does without, in the order of the runs.
     pub fn kept(&self) -> impl ExactSizeIterator<Item = &'static str> + use<> {
         let kept: Vec<&'static str> = self.runs.iter().map(|run| run.kept).collect();
         kept.into_iter()
@@ -157,7 +157,7 @@ impl Trial {
         self.runs.iter().flat_map(|run| &run.seconds).sum()
     }
 
-    /// What the runs cost and how far their light differs; `None` before each was run.
+    /// Cost of the runs and differences of their light; `None` before each was run.
     pub fn comparison(&self) -> Option<Comparison> {
         let lit_of = |kept: &str| self.runs.iter().find(|run| run.kept == kept)?.lit.as_ref();
         let whole = lit_of(ALL)?;
@@ -187,10 +187,10 @@ impl Trial {
     }
 }
 
-/// What a run cost, and how far its light is from that of the run that keeps everything.
+/// Cost of a run, and how far its light differs from that of the run without omissions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cost {
-    /// What was kept: `nothing`, the name of an omission, or `all`.
+    /// The parts that were not omitted: `nothing`, the name of an omission, or `all`.
     pub kept: &'static str,
     /// Wall-clock seconds of preparing and stepping, median of the rounds.
     pub wall_s: f64,
@@ -202,7 +202,7 @@ pub struct Cost {
     pub links: u64,
     /// Elements at the end.
     pub elements: u64,
-    /// Bytes that the solver holds at the end.
+    /// Bytes that the solver uses at the end.
     pub memory_bytes: u64,
     /// Root mean square of the difference in irradiance, relative to that of the irradiance.
     pub difference: f64,
@@ -219,7 +219,7 @@ pub struct Comparison {
     pub triangles: usize,
     /// Names of what is omitted.
     pub left_out: Vec<&'static str>,
-    /// Seconds that it takes to see what can be omitted, beside planting the tree; median.
+    /// Seconds that making the plan takes, in addition to building the tree; median.
     pub plan_s: f64,
     /// As [`Cost::difference`], of two runs that keep everything and have other seeds. Unknown where nothing is omitted.
     pub noise: Option<f64>,
@@ -239,7 +239,7 @@ impl Comparison {
     }
 }
 
-/// Random points as a reference has them, made white and dark, so that their radiance is what arrives.
+/// Random points as in a reference, with reflectance 1 and no emission, so that their radiance is the irradiance over π.
 fn points(scene: &Arc<Scene>) -> Vec<ReferencePoint> {
     let settings = PathSettings {
         point_count: POINTS,

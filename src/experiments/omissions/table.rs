@@ -1,4 +1,4 @@
-//! What omissions save, as tables.
+//! Tables of what omissions save.
 
 use serde::Serialize;
 
@@ -98,7 +98,7 @@ pub fn omissions_markdown(comparisons: &[Comparison]) -> String {
     text + "\n"
 }
 
-/// A Markdown table of what it takes to see what can be omitted.
+/// A Markdown table of the cost of making the plan.
 pub fn overhead_markdown(comparisons: &[Comparison]) -> String {
     let mut text = String::from(
         "| scene | triangles | omitted | making the plan | share of the run |\n|---|---:|---|---:|---:|",

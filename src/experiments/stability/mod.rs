@@ -20,13 +20,13 @@ use serde::Serialize;
 
 use crate::{scene::BuildError, solver::Cancel};
 
-/// What a case is about.
+/// The subject of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Group {
-    /// Light that hardly dies, or hardly gets through.
+    /// Light that is absorbed slowly, or passes narrow openings.
     Stiff,
-    /// Links that make light.
+    /// Links that overestimate light.
     Overestimate,
     /// Very large, small, bright, dark and far.
     Scale,
@@ -52,11 +52,11 @@ impl Group {
 /// A figure that must be met.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
-    /// What it is, in a few words.
+    /// Its description, in a few words.
     pub quantity: String,
-    /// What it must be.
+    /// The required value.
     pub expected: f64,
-    /// What came out.
+    /// The value found.
     pub found: f64,
     /// How far that is from what is expected; see the constructors.
     pub deviation: f64,
@@ -118,7 +118,7 @@ impl Claim {
         }
     }
 
-    /// Whether it is met. What is not a number meets nothing.
+    /// Whether it is met. NaN meets nothing.
     pub fn holds(&self) -> bool {
         self.deviation <= self.allowed
     }
@@ -133,7 +133,7 @@ impl Claim {
     }
 }
 
-/// What a case found.
+/// The findings of a case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Finding {
     /// All figures; at least one.
@@ -142,7 +142,7 @@ pub struct Finding {
     pub steps: u32,
     /// Sweeps of all its solves.
     pub sweeps: u32,
-    /// What the solver said that it had to do, each sentence once.
+    /// Notes of the solver, each once.
     pub notes: Vec<String>,
 }
 
@@ -155,25 +155,25 @@ pub enum Trouble {
     /// Its scene cannot be lit.
     #[error(transparent)]
     Build(#[from] BuildError),
-    /// A step broke a promise.
+    /// A step broke an invariant.
     #[error("step {step} of {scene}: {what}")]
     Broken {
         /// Name of the scene.
         scene: String,
         /// Number of the step.
         step: u32,
-        /// What is wrong.
+        /// The fault.
         what: String,
     },
 }
 
 type Run = dyn Fn(&Cancel) -> Result<Finding, Trouble> + Send + Sync;
 
-/// Something to try.
+/// A case to run.
 pub struct Case {
-    /// What it is about.
+    /// Its subject.
     pub group: Group,
-    /// Its name, unlike all others.
+    /// Its name; unique.
     pub name: String,
     /// Whether it takes no more than a second or two in a build without optimisation.
     pub is_quick: bool,
@@ -202,7 +202,7 @@ impl Case {
         }
     }
 
-    /// Try it on the threads of the caller's pool.
+    /// Run it on the threads of the caller's pool.
     pub fn run(&self, cancel: &Cancel) -> Outcome {
         let begin = Instant::now();
         let (finding, failure) = match (self.run)(cancel) {
@@ -219,23 +219,23 @@ impl Case {
     }
 }
 
-/// How a case went.
+/// The outcome of a case.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
-    /// What it is about.
+    /// Its subject.
     pub group: Group,
     /// Its name.
     pub case: String,
-    /// What it found; without claims where it did not come to its end.
+    /// Its findings; without claims where it did not finish.
     pub finding: Finding,
-    /// Why it did not come to its end.
+    /// Why it did not finish.
     pub failure: Option<String>,
     /// Time that it took.
     pub seconds: f64,
 }
 
 impl Outcome {
-    /// A case that ended in a way of which it could not tell itself.
+    /// A case that ended by a panic.
     pub fn failed(case: &Case, failure: String, seconds: f64) -> Self {
         Self {
             group: case.group,
@@ -246,7 +246,7 @@ impl Outcome {
         }
     }
 
-    /// Whether it came to its end and all its claims hold.
+    /// Whether it finished and all its claims hold.
     pub fn holds(&self) -> bool {
         self.failure.is_none()
             && !self.finding.claims.is_empty()

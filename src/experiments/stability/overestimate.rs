@@ -1,4 +1,4 @@
-//! Links that make light: the six-face value is up to 1.5 times the truth, so that coarse links in a bright closed scene
+//! Links that overestimate light: the six-face value is up to 1.5 times the truth, so that coarse links in a bright closed scene
 //! return more than is sent.
 
 use std::f64::consts::PI;
@@ -90,7 +90,7 @@ fn leaking(method: Method, cancel: &Cancel) -> Result<Finding, Trouble> {
     const REFLECTANCE: f32 = 0.9999;
     let lit = coarse(stability::leaking_sphere(REFLECTANCE, 30), method, cancel)?;
     let found = lit.mean_irradiance("wall").x;
-    // What a sphere without leaks would hold.
+    // The power in a sphere without leaks.
     let ceiling = furnace_radiosity(PI, f64::from(REFLECTANCE));
     let irradiance = Claim::at_most("irradiance", ceiling, found);
     Ok(lit.finding(match method {

@@ -43,7 +43,7 @@ pub(super) fn sides_by_shape() -> SceneOptions {
     }
 }
 
-/// A solve that came to its end.
+/// A finished solve.
 pub(super) struct Lit {
     pub(super) scene: Arc<Scene>,
     pub(super) reports: Vec<StepReport>,
@@ -95,7 +95,7 @@ pub(super) fn solve_within(
     })
 }
 
-/// What is wrong with the figures of a step.
+/// The faults of the figures of a step.
 fn broken_by(report: &StepReport) -> Option<String> {
     let figures = [
         ("epsilon", f64::from(report.epsilon)),
@@ -113,7 +113,7 @@ fn broken_by(report: &StepReport) -> Option<String> {
         .map(|(name, value)| format!("the {name} is {value}"))
 }
 
-/// What light must not exceed.
+/// Upper bounds of light.
 struct Limits {
     /// Irradiance by channel: what a point would get if the brightest radiosity that there can be were all round it.
     irradiance: DVec3,
@@ -136,7 +136,7 @@ impl Limits {
         }
     }
 
-    /// What is wrong with the light of a snapshot.
+    /// The faults of the light of a snapshot.
     fn broken_by(&self, snapshot: &Snapshot, is_final: bool) -> Option<String> {
         let light = &snapshot.light;
         if light.irradiance.len() != snapshot.mesh.positions.len() {
@@ -199,7 +199,7 @@ fn arriving_power(snapshot: &Snapshot, weight: impl Fn(TriangleId) -> DVec3) -> 
 }
 
 impl Lit {
-    /// What was found, with these claims.
+    /// The findings, with these claims.
     pub(super) fn finding(&self, claims: Vec<Claim>) -> Finding {
         let mut finding = Finding {
             claims,

@@ -1,4 +1,4 @@
-//! Light that hardly dies, or hardly gets through.
+//! Light that is absorbed slowly, or passes narrow openings.
 
 use std::f64::consts::PI;
 
@@ -143,7 +143,7 @@ fn pin_hole(cancel: &Cancel) -> Result<Finding, Trouble> {
     let (loss, passed) = (walls * (1.0 - reflectance), reflectance * hole);
     let share = passed / (loss + passed);
     let first = walls * PI / (loss + passed * (1.0 - share));
-    // What arrives: B = E_m + ρ H.
+    // The irradiance H of B = E_m + ρ H.
     let arrives = |radiosity: f64, emitted: f64| (radiosity - emitted) / reflectance;
     Ok(lit.finding(vec![
         Claim::near(

@@ -13,7 +13,7 @@ use super::{
 /// A curve and its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What the legend calls it.
+    /// Its name in the legend.
     pub label: String,
     /// Its points, joined in this order; those that are not positive cannot be shown and are omitted.
     pub points: Vec<[f64; 2]>,

@@ -186,7 +186,7 @@ impl App {
 
     fn pause_or_continue(&mut self) {
         if self.state.run.status.is_busy() {
-            // What is under way may take a moment to end.
+            // A task under way may take a moment to end.
             self.state.run.status = RunStatus::Pausing;
             self.worker.pause();
         } else if self.state.run.status.can_continue() {

@@ -41,7 +41,7 @@ fn scene_among(paths: &[PathBuf]) -> Option<Result<PathBuf, String>> {
     Some(if chosen.is_dir() {
         scene_in(chosen)
     } else {
-        // What is no scene is refused by its reader, which knows why.
+        // A file that is no scene is refused by its reader, which knows why.
         Ok(chosen.clone())
     })
 }

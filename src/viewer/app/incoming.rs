@@ -1,4 +1,4 @@
-//! What arrives between frames: chosen files, notices, a scene that was read, events and light of the worker.
+//! Results that arrive between frames: chosen files, notices, a scene that was read, events and light of the worker.
 
 use std::{sync::Arc, time::Duration};
 

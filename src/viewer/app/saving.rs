@@ -1,4 +1,4 @@
-//! What the window saves: pictures, the lit mesh, and the sidecar of a scene.
+//! Saving: pictures, the lit mesh, and the sidecar of a scene.
 
 use std::path::PathBuf;
 

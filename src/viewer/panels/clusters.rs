@@ -103,7 +103,7 @@ fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
     }
 }
 
-/// What the colours of the boxes stand for.
+/// Legend of the colours of the boxes.
 fn legend_ui(ui: &mut egui::Ui, state: &State) {
     let (Some(staged), Some(loaded)) = (&state.staged, &state.loaded) else {
         return;

@@ -8,10 +8,10 @@ use crate::viewer::{figures::count, state::State, theme, view::ViewMode};
 /// Marks on a scale at most. More touch each other.
 const MOST_MARKS: usize = 7;
 
-/// What colours stand for.
+/// The quantity of colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// What the first and the last colour stand for.
+    /// Values of the first and the last colour.
     pub ends: [f64; 2],
     /// Whether values are spaced by their logarithm.
     pub is_logarithmic: bool,

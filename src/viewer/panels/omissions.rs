@@ -1,4 +1,4 @@
-//! What the scene does not need and was omitted, folded.
+//! The list of omissions, folded.
 
 use eframe::egui;
 

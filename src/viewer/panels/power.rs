@@ -36,7 +36,7 @@ impl PowerScale {
         }
     }
 
-    /// What the figures are called.
+    /// Name of the figures.
     pub fn name(&self) -> &'static str {
         if self.is_in_watts {
             "Power"
@@ -45,7 +45,7 @@ impl PowerScale {
         }
     }
 
-    /// What the figures are, for a hint.
+    /// Explanation of the figures, for a hint.
     pub fn explanation(&self) -> &'static str {
         if self.is_in_watts {
             "Luminance of the power that leaves"

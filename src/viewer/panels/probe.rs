@@ -145,7 +145,7 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     });
 }
 
-/// What the solver says of the element.
+/// The inspection of the element.
 fn inspection_rows(ui: &mut egui::Ui, state: &State) {
     let Some(inspection) = state.inspections.element() else {
         if state.inspections.is_waiting(LinkEnd::Element) {

@@ -60,7 +60,7 @@ fn run_text(status: &RunStatus, step: u32, steps: u32) -> String {
     }
 }
 
-/// What the last change of settings did. Its room is always there, so that no slider moves away from the hand.
+/// The effect of the last change of settings. Its room is always there, so that no slider moves away from the hand.
 fn change_ui(ui: &mut egui::Ui, state: &State) {
     if state.loaded.is_none() {
         return;

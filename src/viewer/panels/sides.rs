@@ -70,7 +70,7 @@ fn light_sections(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
     }
 }
 
-/// What is looked into.
+/// Inspection of the method.
 fn look_sections(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     row::section(ui, "Probe", true, |ui| {
         probe::probe_ui(ui, state, actions);

@@ -119,7 +119,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
     }
 }
 
-/// What a frame of the window costs.
+/// Time of a frame of the window.
 fn frame_ui(ui: &mut egui::Ui, state: &State) {
     let Some([middle, most]) = state.frame_times.middle_and_most() else {
         return;

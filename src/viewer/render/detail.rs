@@ -54,7 +54,7 @@ pub(super) struct DetailSet {
     is_tame: bool,
     /// Its textures, those that were needed.
     views: Vec<Option<Uploaded>>,
-    /// What each material multiplies its textures by; empty where that is as the scene says.
+    /// Factors of each material on its textures; empty where they are those of the scene.
     appearances: Vec<Appearance>,
     /// Number of the group of each material.
     group_of: Vec<usize>,
@@ -66,7 +66,7 @@ pub(super) struct DetailSet {
 #[derive(Clone)]
 struct Uploaded {
     view: wgpu::TextureView,
-    /// What it must be multiplied by: its brightest channel, where that is above 1.
+    /// Its factor: its brightest channel, where that is above 1.
     scale: f32,
 }
 

@@ -160,7 +160,7 @@ fn pipeline(
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(!is_ribbon),
-                // What is selected shows through everything.
+                // The selection shows through everything.
                 depth_compare: Some(if is_ribbon {
                     wgpu::CompareFunction::Always
                 } else {

@@ -130,7 +130,7 @@ fn draw_sides<'p>(
     }
 }
 
-/// What a pipeline draws.
+/// The primitives of a pipeline.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Fronts, as the mode shows them.

@@ -1,4 +1,4 @@
-//! What every pass knows of the picture, in one uniform buffer. Twin of `View` in view.wgsl.
+//! Parameters of the picture for every pass, in one uniform buffer. Twin of `View` in view.wgsl.
 
 use std::num::NonZeroU64;
 

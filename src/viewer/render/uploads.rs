@@ -1,4 +1,4 @@
-//! What the adapter holds of a scene: mesh, light, textures, cluster boxes. Made again only where the `Arc` that a part
+//! Uploads of a scene to the adapter: mesh, light, textures, cluster boxes. Made again only where the `Arc` that a part
 //! comes from is another, on whatever thread; copies share the buffers, so that one can be drawn from while the next is
 //! being made.
 
@@ -15,7 +15,7 @@ use crate::{
     viewer::view::ViewMode,
 };
 
-/// What is to be uploaded.
+/// The source of uploads.
 pub struct Source<'a> {
     /// Materials and textures.
     pub scene: &'a Arc<Scene>,
@@ -33,7 +33,7 @@ pub struct Source<'a> {
     pub boxes: &'a Arc<Vec<BoxInstance>>,
 }
 
-/// What the adapter holds. Cheap to clone.
+/// Uploads to the adapter. Cheap to clone.
 #[derive(Clone)]
 pub struct Uploads {
     details: DetailSet,
@@ -124,7 +124,7 @@ impl Channel {
     }
 }
 
-/// What the buffer of light was filled from.
+/// The source of the buffer of light.
 #[derive(Clone)]
 enum LightSource {
     Light(Arc<VertexLight>, Channel),

@@ -1,8 +1,8 @@
 //! The reference thread: traces random surface points pass by pass, and measures every snapshot that is handed in.
 //!
-//! [`TruthHandle`] owns the thread; dropping it cancels the pass under way and joins. What was looked up of a snapshot
-//! is kept and compared anew after each pass, so that the first error shows after a second and all of them, those of
-//! earlier runs too, get better as samples grow. Snapshots themselves are not kept.
+//! [`TruthHandle`] owns the thread; dropping it cancels the pass under way and joins. The radiance of a snapshot at the
+//! points is stored and compared again after each pass, so that the first error shows after a second and all errors,
+//! those of earlier runs too, become more accurate as samples grow. Snapshots themselves are not stored.
 
 mod tracing;
 
@@ -45,12 +45,12 @@ pub struct VertexErrors {
     pub percent: Arc<Vec<f32>>,
 }
 
-/// What is known so far.
+/// Progress so far.
 #[derive(Clone, Debug, Default)]
 pub struct TruthProgress {
     /// Surface points.
     pub points: usize,
-    /// What means over them are means of.
+    /// The surfaces that the points stand for.
     pub surfaces: SampledSurfaces,
     /// Samples at each of them.
     pub samples: u32,
@@ -62,11 +62,11 @@ pub struct TruthProgress {
     pub vertices: Option<VertexErrors>,
     /// Samples at each vertex, and the share of the next pass that is done.
     pub vertex_samples: (u32, f32),
-    /// Why there will be no more.
+    /// Why tracing failed, where it did.
     pub failed: Option<String>,
 }
 
-/// What the owner wants.
+/// Requests of the owner.
 #[derive(Default)]
 struct Wishes {
     waiting: VecDeque<(u64, Arc<Snapshot>)>,
@@ -77,7 +77,7 @@ struct Wishes {
     compared: Option<Arc<Snapshot>>,
 }
 
-/// The place where owner and thread meet.
+/// State shared by owner and thread.
 struct Desk {
     wishes: Mutex<Wishes>,
     changed: Condvar,
@@ -200,7 +200,7 @@ impl TruthHandle {
         self.desk.yields.store(yields, Ordering::Relaxed);
     }
 
-    /// What is known so far. The same `Arc` as before where there is nothing newer.
+    /// The progress so far. The same `Arc` as before where there is nothing newer.
     pub fn progress(&self) -> Arc<TruthProgress> {
         self.desk
             .newest

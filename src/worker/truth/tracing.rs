@@ -24,7 +24,7 @@ const SAMPLES_PER_PASS: u32 = 16;
 /// Samples at each point before any at vertices: figures come first.
 const FIRST_SAMPLES: u32 = 64;
 
-/// What to do next.
+/// The next task.
 enum Task {
     Measure(u64, Arc<Snapshot>),
     Forget(Vec<u64>),
@@ -111,7 +111,7 @@ impl Tracing {
         }
     }
 
-    /// What is most urgent; waits while there is nothing.
+    /// The most urgent task; waits while there is none.
     fn next_task(&mut self) -> Task {
         let desk = self.desk.clone();
         let mut wishes = desk.wishes();
