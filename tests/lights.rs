@@ -208,12 +208,12 @@ fn colours_of_many_lamps_stay_right_when_one_is_switched_off() {
         }
     };
     check(&solver, 1.0);
-    let mut wished: Vec<Appearance> = scene.appearances();
-    for appearance in &mut wished {
+    let mut requested: Vec<Appearance> = scene.appearances();
+    for appearance in &mut requested {
         if appearance.emission.x > 0.0 {
             appearance.emission = Vec3::ZERO;
         }
     }
-    solver.relight(&wished, &Cancel::default()).unwrap();
+    solver.relight(&requested, &Cancel::default()).unwrap();
     check(&solver, 0.0);
 }

@@ -201,16 +201,16 @@ fn painted_lamps_are_dimmed_and_coloured_with_their_material() {
     for direct in [Direct::Sampled, Direct::Linked] {
         let scene = painted_room(true);
         let mut solver = solver(&scene, direct);
-        let mut wished = scene.appearances();
+        let mut requested = scene.appearances();
         let painted = Vec3::new(1.0, 4.0, 9.0);
-        for (material, appearance) in scene.materials.iter().zip(&mut wished) {
+        for (material, appearance) in scene.materials.iter().zip(&mut requested) {
             match material.name.as_str() {
                 "ceiling" => appearance.emission = painted,
                 "lamp" => appearance.emission = Vec3::ZERO,
                 _ => {}
             }
         }
-        solver.relight(&wished, &Cancel::default()).unwrap();
+        solver.relight(&requested, &Cancel::default()).unwrap();
         solver.finish_relighting(&Cancel::default()).unwrap();
         let right = |point: DVec3| is_told(point).then(|| on_floor(point, painted, Vec3::ZERO));
         let found = errors(&scene, &solver.snapshot(), Vec3::Z, right);
@@ -219,7 +219,7 @@ fn painted_lamps_are_dimmed_and_coloured_with_their_material() {
             found[0] < 0.013 && found[1] < 0.043,
             "{direct:?}: mean and high errors {found:?}"
         );
-        let off: Vec<Appearance> = wished
+        let off: Vec<Appearance> = requested
             .iter()
             .map(|appearance| Appearance {
                 emission: Vec3::ZERO,

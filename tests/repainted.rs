@@ -46,10 +46,10 @@ fn finished(mut solver: Solver) -> Solver {
     solver
 }
 
-fn solver(scene: &Arc<Scene>, wished: Option<&[Appearance]>) -> Solver {
+fn solver(scene: &Arc<Scene>, requested: Option<&[Appearance]>) -> Solver {
     let settings = SolveSettings::draft();
     let cancel = Cancel::default();
-    Solver::with_rays(scene.clone(), None, settings, None, wished, &cancel).unwrap()
+    Solver::with_rays(scene.clone(), None, settings, None, requested, &cancel).unwrap()
 }
 
 /// The appearances of the scene but for one material.
@@ -112,7 +112,7 @@ fn what_begins_to_shine_where_it_was_omitted_asks_for_a_new_solve() {
 fn changes_that_light_nothing_else_need_no_new_solve() {
     let scene = scene();
     let mut lean = finished(solver(&scene, None));
-    for wished in [
+    for requested in [
         // Nothing shines at the lamp, and it looks at the wall only.
         with(&scene, LAMP, |lamp| lamp.reflectance = Vec3::splat(0.5)),
         with(&scene, LAMP, |lamp| lamp.emission = Vec3::ZERO),
@@ -122,14 +122,14 @@ fn changes_that_light_nothing_else_need_no_new_solve() {
         }),
         scene.appearances(),
     ] {
-        let relit = lean.relight(&wished, &Cancel::default()).unwrap();
+        let relit = lean.relight(&requested, &Cancel::default()).unwrap();
         assert!(!relit.is_outgrown);
     }
     // Made for a white wall, a solve holds for both.
     let white = with(&scene, WALL, |wall| wall.reflectance = Vec3::splat(0.8));
     let mut wide = finished(solver(&scene, Some(&white)));
-    for (wished, is_dark) in [(&scene.appearances(), true), (&white, false)] {
-        let relit = wide.relight(wished, &Cancel::default()).unwrap();
+    for (requested, is_dark) in [(&scene.appearances(), true), (&white, false)] {
+        let relit = wide.relight(requested, &Cancel::default()).unwrap();
         assert!(!relit.is_outgrown);
         let light = irradiance(&scene, &wide.snapshot(), TARGET);
         assert_eq!(light == 0.0, is_dark, "{light}");

@@ -174,11 +174,11 @@ mod tests {
     #[test]
     fn appearances_out_of_range_keep_their_colour() {
         let scene = scene(&[Vec3::ONE], None);
-        let wish = Appearance {
+        let request = Appearance {
             reflectance: Vec3::ZERO,
             emission: Vec3::new(f32::MAX, 1e38, 0.0),
         };
-        let allowed = scene.allowed(&[wish])[0].emission;
+        let allowed = scene.allowed(&[request])[0].emission;
         assert!(allowed.x <= MAX_EMISSION && allowed.x > 0.99 * MAX_EMISSION);
         assert!((allowed.y / allowed.x - 1e38 / f32::MAX).abs() < 1e-6);
         assert_eq!(scene.appearances().len(), 1);

@@ -70,10 +70,10 @@ impl Scene {
 
     /// Appearances brought into their ranges, one for each material. Materials without a new appearance stay as they
     /// are.
-    pub fn allowed(&self, wished: &[Appearance]) -> Vec<Appearance> {
+    pub fn allowed(&self, requested: &[Appearance]) -> Vec<Appearance> {
         let mut allowed = self.appearances();
-        for (appearance, wish) in allowed.iter_mut().zip(wished) {
-            *appearance = wish.within(self.max_reflectance);
+        for (appearance, request) in allowed.iter_mut().zip(requested) {
+            *appearance = request.within(self.max_reflectance);
         }
         allowed
     }
@@ -172,18 +172,18 @@ mod tests {
         let mean = textured.reflectance / 0.8;
         assert!(mean.cmpgt(Vec3::splat(0.4)).all() && mean.cmplt(Vec3::splat(0.6)).all());
         assert!((textured.emission / 6.0 - mean).abs().max_element() < 1e-6);
-        assert_eq!(plain, scene().surfaces[1], "nothing was wished for it");
+        assert_eq!(plain, scene().surfaces[1], "it has no new appearance");
         assert_eq!(relit.appearances()[0], grey(0.8, 6.0));
     }
 
     #[test]
-    fn wishes_end_at_what_materials_can_be() {
+    fn appearances_are_brought_into_the_ranges_of_materials() {
         let scene = scene();
-        let wished = [grey(7.0, -1.0), grey(f32::NAN, f32::INFINITY)];
-        let allowed = scene.allowed(&wished);
+        let requested = [grey(7.0, -1.0), grey(f32::NAN, f32::INFINITY)];
+        let allowed = scene.allowed(&requested);
         assert_eq!(allowed[0], grey(scene.max_reflectance, 0.0));
         assert_eq!(allowed[1], grey(0.0, 0.0));
-        for surface in scene.surfaces_under(&wished) {
+        for surface in scene.surfaces_under(&requested) {
             assert!(surface.reflectance.max_element() <= scene.max_reflectance);
             assert_eq!(surface.emission, Vec3::ZERO);
         }

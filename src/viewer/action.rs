@@ -9,7 +9,7 @@ use crate::{
     worker::RunOptions,
 };
 
-/// One wish, carried out by the window after the panels are drawn.
+/// One action, carried out by the window after the panels are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Ask for a file.

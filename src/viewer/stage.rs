@@ -1,7 +1,7 @@
 //! A thread for work that takes too long for a frame of a large scene: handing mesh, light and boxes to the
 //! adapter, choosing and colouring the boxes, looking up the light at the picked point, letting go of what was replaced.
 //!
-//! The window says what it wants to show and goes on with what is there. Only the newest wish is fulfilled.
+//! The window says what it wants to show and goes on with what is there. Only the newest request is fulfilled.
 
 use std::{
     any::Any,
@@ -156,7 +156,7 @@ impl Stage {
     }
 }
 
-/// The newest wish; those before it and what is to be dropped go. `None` when the window is gone.
+/// The newest request; older ones are discarded, and large values are dropped. `None` when the window is gone.
 fn newest(inbox: &Receiver<Order>) -> Option<Box<Wanted>> {
     let mut newest = None;
     loop {

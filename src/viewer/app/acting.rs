@@ -1,4 +1,4 @@
-//! Wishes carried out.
+//! Actions carried out.
 
 use eframe::egui;
 

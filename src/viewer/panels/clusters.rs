@@ -20,7 +20,7 @@ use crate::{
     },
 };
 
-/// Show the controls; wishes go into `actions`.
+/// Show the controls; requested actions go into `actions`.
 pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let snapshot = state.run.snapshot.clone();
     let clusters: &[ClusterBox] = snapshot.as_ref().map_or(&[], |snapshot| &snapshot.clusters);

@@ -9,7 +9,7 @@ use crate::viewer::{
     state::State,
 };
 
-/// Show the scale of all emission; a wish goes into `actions`.
+/// Show the scale of all emission; a requested action goes into `actions`.
 pub fn emission_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let mut scale = state.view.emission_scale;
     let has_changed = row::setting(

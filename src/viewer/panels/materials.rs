@@ -19,7 +19,7 @@ use crate::viewer::{
 /// Height of the list of lights, and of that of materials, above which it scrolls, in points.
 const MOST_HEIGHT: f32 = 240.0;
 
-/// Show the lights and the materials; a wish goes into `actions`.
+/// Show the lights and the materials; a requested action goes into `actions`.
 pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let Some(loaded) = &state.loaded else {
         return;

@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-/// Show the bar; wishes go into `actions`.
+/// Show the bar; requested actions go into `actions`.
 pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
     egui::MenuBar::new().ui(ui, |ui| {
         ui.menu_button("File", |ui| file_menu(ui, state, table, actions));

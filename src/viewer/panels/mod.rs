@@ -1,4 +1,4 @@
-//! The panels around the viewport, one a file. They show the state, and return wishes as actions.
+//! The panels around the viewport, one a file. They show the state, and return actions.
 
 pub mod clusters;
 pub mod color;

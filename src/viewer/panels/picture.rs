@@ -7,7 +7,7 @@ use eframe::egui::{self, DragValue};
 use super::dialog::{confirm, dialog, file_field};
 use crate::viewer::{action::Action, state::State};
 
-/// Show the dialog where it is open; wishes go into `actions`.
+/// Show the dialog where it is open; requested actions go into `actions`.
 pub fn picture_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let mut open = state.panels.picture;
     dialog(ctx, "Save picture", &mut open, |ui| {

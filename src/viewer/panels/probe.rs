@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Show the picked point; wishes go into `actions`.
+/// Show the picked point; requested actions go into `actions`.
 pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let (Some(selection), Some(loaded)) = (&state.selection, &state.loaded) else {
         ui.weak("Click a surface to see its light.");

@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-/// Show the run; wishes go into `actions`.
+/// Show the run; requested actions go into `actions`.
 pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let status = &state.run.status;
     let steps = state.settings.max_steps;

@@ -14,7 +14,7 @@ use crate::{
     viewer::{action::Action, figures::number, state::State},
 };
 
-/// Show the settings; wishes go into `actions`.
+/// Show the settings; requested actions go into `actions`.
 pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let mut settings = state.settings.clone();
     presets_ui(ui, &mut settings);

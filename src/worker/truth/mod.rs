@@ -68,7 +68,7 @@ pub struct TruthProgress {
 
 /// Requests of the owner.
 #[derive(Default)]
-struct Wishes {
+struct Requests {
     waiting: VecDeque<(u64, Arc<Snapshot>)>,
     forgotten: Vec<u64>,
     goal: u32,
@@ -79,7 +79,7 @@ struct Wishes {
 
 /// State shared by owner and thread.
 struct Desk {
-    wishes: Mutex<Wishes>,
+    requests: Mutex<Requests>,
     changed: Condvar,
     cancelled: AtomicBool,
     /// Whether the solver is at work: tracing then takes one thread only.
@@ -88,22 +88,22 @@ struct Desk {
 }
 
 impl Desk {
-    fn wishes(&self) -> MutexGuard<'_, Wishes> {
-        // Each wish is put down whole, so a poisoned lock guards nothing broken.
-        self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
+    fn requests(&self) -> MutexGuard<'_, Requests> {
+        // Each request is stored whole, so a poisoned lock guards nothing broken.
+        self.requests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self, change: impl FnOnce(&mut Wishes)) {
-        change(&mut self.wishes());
+    fn change(&self, change: impl FnOnce(&mut Requests)) {
+        change(&mut self.requests());
         self.changed.notify_all();
     }
 
     fn measure(&self, run: u64, snapshot: Arc<Snapshot>) {
-        self.change(|wishes| {
-            if wishes.waiting.len() >= MOST_WAITING {
-                wishes.waiting.pop_front();
+        self.change(|requests| {
+            if requests.waiting.len() >= MOST_WAITING {
+                requests.waiting.pop_front();
             }
-            wishes.waiting.push_back((run, snapshot));
+            requests.waiting.push_back((run, snapshot));
         });
     }
 
@@ -125,9 +125,9 @@ impl TruthHandle {
     /// When the system refuses a thread.
     pub fn spawn(scene: Arc<Scene>, rays: Arc<RayTree>, seed: u64, wake: Wake) -> io::Result<Self> {
         let desk = Arc::new(Desk {
-            wishes: Mutex::new(Wishes {
+            requests: Mutex::new(Requests {
                 goal: SAMPLE_GOAL,
-                ..Wishes::default()
+                ..Requests::default()
             }),
             changed: Condvar::new(),
             cancelled: AtomicBool::new(false),
@@ -169,30 +169,30 @@ impl TruthHandle {
 
     /// Compare the vertices of a snapshot, too, until told otherwise.
     pub fn compare_vertices(&self, snapshot: Option<Arc<Snapshot>>) {
-        self.desk.change(|wishes| wishes.compared = snapshot);
+        self.desk.change(|requests| requests.compared = snapshot);
     }
 
     /// Forget the errors of a run.
     pub fn forget(&self, run: u64) {
-        self.desk.change(|wishes| {
-            wishes.waiting.retain(|(waiting, _)| *waiting != run);
-            wishes.forgotten.push(run);
+        self.desk.change(|requests| {
+            requests.waiting.retain(|(waiting, _)| *waiting != run);
+            requests.forgotten.push(run);
         });
     }
 
     /// Rest, or go on from where it stands. A resting reference still measures.
     pub fn rest(&self, rests: bool) {
-        self.desk.change(|wishes| wishes.rests = rests);
+        self.desk.change(|requests| requests.rests = rests);
     }
 
     /// Whether it was told to rest.
     pub fn rests(&self) -> bool {
-        self.desk.wishes().rests
+        self.desk.requests().rests
     }
 
     /// Trace as many samples again.
     pub fn trace_more(&self) {
-        self.desk.change(|wishes| wishes.goal *= 2);
+        self.desk.change(|requests| requests.goal *= 2);
     }
 
     /// Leave all processors but one to the solver, or take them.

@@ -114,29 +114,29 @@ impl Tracing {
     /// The most urgent task; waits while there is none.
     fn next_task(&mut self) -> Task {
         let desk = self.desk.clone();
-        let mut wishes = desk.wishes();
+        let mut requests = desk.requests();
         loop {
             if desk.is_cancelled() {
                 return Task::End;
             }
-            self.progress.goal = wishes.goal;
-            if !wishes.forgotten.is_empty() {
-                return Task::Forget(std::mem::take(&mut wishes.forgotten));
+            self.progress.goal = requests.goal;
+            if !requests.forgotten.is_empty() {
+                return Task::Forget(std::mem::take(&mut requests.forgotten));
             }
-            if let Some((run, snapshot)) = wishes.waiting.pop_front() {
+            if let Some((run, snapshot)) = requests.waiting.pop_front() {
                 return Task::Measure(run, snapshot);
             }
-            if !is_same(&wishes.compared, &self.compared) {
-                return Task::CompareVertices(wishes.compared.clone());
+            if !is_same(&requests.compared, &self.compared) {
+                return Task::CompareVertices(requests.compared.clone());
             }
-            if !wishes.rests
-                && let Some(task) = self.tracing_task(wishes.goal)
+            if !requests.rests
+                && let Some(task) = self.tracing_task(requests.goal)
             {
                 return task;
             }
-            wishes = desk
+            requests = desk
                 .changed
-                .wait(wishes)
+                .wait(requests)
                 .unwrap_or_else(PoisonError::into_inner);
         }
     }
