@@ -1,7 +1,5 @@
 //! Many lamps, against closed forms.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 mod common;
 
 use std::sync::Arc;

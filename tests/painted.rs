@@ -1,8 +1,6 @@
 //! Light of painted surfaces, where it leaves from: lamps in `map_Ke`, dark and bright parts of `map_Kd`. Against closed
 //! forms, sampled and linked, in the clear and with something in the way.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 mod common;
 
 use std::{f64::consts::PI, sync::Arc};

@@ -79,7 +79,7 @@ fn light_that_reaches_what_was_omitted_asks_for_a_new_solve() {
     assert_eq!((unlit.name, unlit.count), ("unlit", 2), "the target");
     let white = with(&scene, WALL, |wall| wall.reflectance = Vec3::splat(0.8));
     let relit = lean.relight(&white, &Cancel::default()).unwrap();
-    assert!(relit.is_outgrown);
+    assert!(relit.needs_restart);
     assert_eq!(
         irradiance(&scene, &lean.snapshot(), TARGET),
         0.0,
@@ -101,7 +101,7 @@ fn what_begins_to_shine_where_it_was_omitted_asks_for_a_new_solve() {
     let mut lean = finished(solver(&scene, None));
     let shining = with(&scene, TARGET, |target| target.emission = Vec3::ONE);
     let relit = lean.relight(&shining, &Cancel::default()).unwrap();
-    assert!(relit.is_outgrown);
+    assert!(relit.needs_restart);
     let before = irradiance(&scene, &lean.snapshot(), WALL);
     let anew = finished(solver(&scene, Some(&shining)));
     let after = irradiance(&scene, &anew.snapshot(), WALL);
@@ -123,14 +123,14 @@ fn changes_that_light_nothing_else_need_no_new_solve() {
         scene.appearances(),
     ] {
         let relit = lean.relight(&requested, &Cancel::default()).unwrap();
-        assert!(!relit.is_outgrown);
+        assert!(!relit.needs_restart);
     }
     // Made for a white wall, a solve holds for both.
     let white = with(&scene, WALL, |wall| wall.reflectance = Vec3::splat(0.8));
     let mut wide = finished(solver(&scene, Some(&white)));
     for (requested, is_dark) in [(&scene.appearances(), true), (&white, false)] {
         let relit = wide.relight(requested, &Cancel::default()).unwrap();
-        assert!(!relit.is_outgrown);
+        assert!(!relit.needs_restart);
         let light = irradiance(&scene, &wide.snapshot(), TARGET);
         assert_eq!(light == 0.0, is_dark, "{light}");
     }

@@ -94,7 +94,7 @@ fn pictures_beside_the_scene_are_read_whatever_their_ending() {
     ] {
         let scene = read(folder, picture);
         assert_eq!(
-            scene.spared.constant_textures, 1,
+            scene.omitted_textures.constant_textures, 1,
             "{picture}: {:?}",
             scene.warnings
         );
@@ -187,7 +187,10 @@ fn nothing_outside_the_folder_and_no_device_is_read() {
     for picture in ["pipe.png", "zero.png", "loop.png"] {
         assert_refused(&folder, picture, "was not found");
     }
-    assert_eq!(read(&folder, "good.png").spared.constant_textures, 1);
+    assert_eq!(
+        read(&folder, "good.png").omitted_textures.constant_textures,
+        1
+    );
     // The same holds for material files.
     let mtl = "newmtl m\nKd 0.1\n";
     fs::write(outer.path().join("secret.mtl"), mtl).unwrap();
@@ -388,11 +391,11 @@ fn pictures_that_no_face_shows_are_not_read() {
         warnings.filter(missing).count()
     };
     assert_eq!(said(&scene), 0, "{:?}", scene.warnings);
-    assert_eq!(scene.spared.unused_textures, 3);
+    assert_eq!(scene.omitted_textures.unused_textures, 3);
     assert!(omissions(&scene).contains(&("unused-textures", 3)));
     assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.25));
     // Once a face shows them, they are read.
     let scene = read("vt 0 0\nvt 1 0\nvt 0 1\nusemtl flat\nf 1/1 2/2 3/3");
     assert_eq!(said(&scene), 2, "{:?}", scene.warnings);
-    assert_eq!(scene.spared.unused_textures, 0);
+    assert_eq!(scene.omitted_textures.unused_textures, 0);
 }

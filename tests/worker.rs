@@ -125,7 +125,7 @@ impl Stepper for FakeSolver {
                 ..StepReport::default()
             },
             is_rough: true,
-            is_outgrown: false,
+            needs_restart: false,
         })
     }
 

@@ -108,7 +108,7 @@ impl PatchTree {
     }
 
     /// The patches that clusters hold; light is computed for these.
-    pub fn held(&self) -> std::ops::Range<usize> {
+    pub fn active_patches(&self) -> std::ops::Range<usize> {
         self.clusters[0].patches()
     }
 }

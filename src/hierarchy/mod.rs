@@ -190,9 +190,9 @@ impl Hierarchy {
         crease_degrees: f32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
-        let held = tree.held().end;
+        let active = tree.active_patches().end;
         let PatchTree { clusters, patches } = tree;
-        let mesh = Mesh::new(scene, &patches, held, crease_degrees, cancelled)?;
+        let mesh = Mesh::new(scene, &patches, active, crease_degrees, cancelled)?;
         let mut sides = vec![[u32::MAX; 2]; scene.triangles.len()];
         for (index, patch) in patches.iter().enumerate() {
             sides[patch.triangle.index()][usize::from(patch.is_back)] = index as u32;
@@ -214,14 +214,14 @@ impl Hierarchy {
     pub const ROOT: NodeId = NodeId(0);
 
     /// The patches that clusters hold. For the others no light is computed.
-    pub fn held(&self) -> std::ops::Range<usize> {
+    pub fn active_patches(&self) -> std::ops::Range<usize> {
         self.clusters[0].patches()
     }
 
     /// The patch that a ray of the given direction meets on a triangle, if a cluster holds it: if light is computed for it.
     pub fn patch_met(&self, triangle: TriangleId, direction: Vec3) -> Option<usize> {
         let patch = self.side_met(triangle, direction)?;
-        self.held().contains(&patch).then_some(patch)
+        self.active_patches().contains(&patch).then_some(patch)
     }
 
     /// The patch that a ray of the given direction meets on a triangle, unless it is the back of a one-sided surface.
@@ -234,7 +234,7 @@ impl Hierarchy {
 
     /// The clusters that hold a patch, the root first; none where it is omitted.
     pub fn clusters_over(&self, patch: usize) -> impl Iterator<Item = usize> + '_ {
-        let root = self.held().contains(&patch).then_some(0);
+        let root = self.active_patches().contains(&patch).then_some(0);
         std::iter::successors(root, move |&index: &usize| {
             let cluster = &self.clusters[index];
             let first = cluster.first_child as usize;
@@ -248,7 +248,7 @@ impl Hierarchy {
     /// Patches that one task should process: no more than `most`, and fewer where there are few, since their elements are
     /// many. The same on any number of threads.
     pub fn task_patches(&self, most: u32) -> u32 {
-        (self.held().len() as u32 / LEAST_TASKS).clamp(1, most)
+        (self.active_patches().len() as u32 / LEAST_TASKS).clamp(1, most)
     }
 
     /// The largest clusters with few enough patches, in the order of the patches.

@@ -12,7 +12,7 @@ use super::{
 pub struct Appearance {
     /// Diffuse reflectance (`Kd`); multiplies the texture.
     pub reflectance: Vec3,
-    /// Emitted radiance (`Ke`) in units of [`Scene::radiance_unit`]; multiplies the texture.
+    /// Emitted radiance (`Ke`) in units of [`super::Scene::radiance_unit`]; multiplies the texture.
     pub emission: Vec3,
 }
 

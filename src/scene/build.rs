@@ -45,7 +45,7 @@ impl SceneBuilder {
         }
         let overlaps = self.drop_repeated_faces(&corner_of, &positions);
         let face_count = self.faces.len();
-        self.spare_textures();
+        self.omit_textures();
         let mut triangles = self.triangles(&corner_of, &positions, options);
         self.resolve_overlaps(
             &overlaps,
@@ -70,7 +70,7 @@ impl SceneBuilder {
             textures: self.textures,
             objects: object_ranges(&self.objects, self.faces.len()),
             warnings: self.warnings,
-            spared: self.spared,
+            omitted_textures: self.omitted_textures,
             max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
             radiance_unit,

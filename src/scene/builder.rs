@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{Material, MaterialId, Texture, Warning, WarningKind, texture::Spared};
+use super::{Material, MaterialId, Texture, Warning, WarningKind, texture::OmittedTextures};
 
 /// A triangle on its way in.
 #[derive(Clone, Copy, Debug)]
@@ -41,11 +41,11 @@ pub struct Source {
     pub name: String,
     /// File name without folder, empty for generated scenes.
     pub file: String,
-    /// See [`Scene::files`].
+    /// See [`super::Scene::files`].
     pub files: Vec<PathBuf>,
 }
 
-/// Collects faces in world coordinates and turns them into a [`Scene`].
+/// Collects faces in world coordinates and turns them into a [`super::Scene`].
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
     /// Where it comes from.
@@ -63,7 +63,7 @@ pub struct SceneBuilder {
     /// Warnings of the reader.
     pub warnings: Vec<Warning>,
     /// Textures that were not even read.
-    pub spared: Spared,
+    pub omitted_textures: OmittedTextures,
 }
 
 /// Why there is no scene.

@@ -28,6 +28,7 @@ mod means;
 mod mtl;
 mod nesting;
 mod obj;
+mod omitted_textures;
 mod options;
 mod orientation;
 mod overlay;
@@ -39,7 +40,6 @@ mod shells;
 mod sidedness;
 mod size_classes;
 mod source;
-mod spared;
 mod texture;
 mod texture_statement;
 mod triangulate;
@@ -60,9 +60,9 @@ pub use options::{SceneOptions, Sides};
 pub use overlay::DOUBLED;
 pub use progress::ReadProgress;
 pub use read_error::ReadError;
-pub use relight::Awakened;
+pub use relight::ActiveMaterials;
 pub use size_classes::SizeClasses;
-pub use texture::{Spared, Texture};
+pub use texture::{OmittedTextures, Texture};
 pub use up_axis::UpAxis;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
@@ -203,7 +203,7 @@ pub struct Scene {
     /// Warnings: what was skipped, corrected or clamped.
     pub warnings: Vec<Warning>,
     /// Textures that were omitted on the way in.
-    pub spared: Spared,
+    pub omitted_textures: OmittedTextures,
     /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
     pub max_reflectance: f32,
     /// The textures, ready for means.

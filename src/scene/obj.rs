@@ -391,7 +391,7 @@ impl Import<'_> {
                 return self.texture(map.as_ref()?, defined, role);
             }
             if let Some(map) = map {
-                self.builder.spared.unused_textures += 1;
+                self.builder.omitted_textures.unused_textures += 1;
                 self.note_unread(map, defined);
             }
             None

@@ -1,31 +1,31 @@
-//! The same triangles under other light: what a material reflects and emits may be changed after a scene was read.
+//! The same triangles with other reflectance and emission of materials.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{Appearance, MaterialId, Scene, Surface, TriangleId};
 
-/// Materials that may emit or reflect, though the scene as it was read says that they do not.
+/// Materials that emit or reflect under other appearances, but not in the scene as it was read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Awakened {
+pub struct ActiveMaterials {
     /// By material; none where it is shorter.
     emit: Vec<bool>,
     /// Likewise.
     reflect: Vec<bool>,
 }
 
-impl Awakened {
-    /// Whether a material emits that the scene says does not.
+impl ActiveMaterials {
+    /// Whether a material emits that does not in the scene.
     pub fn emits(&self, material: MaterialId) -> bool {
         self.emit.get(material.index()) == Some(&true)
     }
 
-    /// Whether a material reflects that the scene says does not.
+    /// Whether a material reflects that does not in the scene.
     pub fn reflects(&self, material: MaterialId) -> bool {
         self.reflect.get(material.index()) == Some(&true)
     }
 
-    /// Whether no other material is awake than here.
+    /// Whether all materials that are active in the other are active here.
     pub fn covers(&self, other: &Self) -> bool {
         let covers = |own: &[bool], other: &[bool]| {
             let is_own = |at: usize| own.get(at) == Some(&true);
@@ -34,7 +34,7 @@ impl Awakened {
         covers(&self.emit, &other.emit) && covers(&self.reflect, &other.reflect)
     }
 
-    /// What is awake in either.
+    /// The materials that are active in either.
     pub fn joined(&self, other: &Self) -> Self {
         let join = |own: &[bool], other: &[bool]| {
             let is = |of: &[bool], at: usize| of.get(at) == Some(&true);
@@ -49,16 +49,16 @@ impl Awakened {
 }
 
 impl Scene {
-    /// Which materials are awake when they look so, one for each.
-    pub fn awakened(&self, appearances: &[Appearance]) -> Awakened {
+    /// The materials that are active under these appearances, one for each material.
+    pub fn active_materials(&self, appearances: &[Appearance]) -> ActiveMaterials {
         let pairs = || self.materials.iter().zip(appearances);
-        let wakes = |before: Vec3, now: Vec3| before == Vec3::ZERO && now != Vec3::ZERO;
-        Awakened {
+        let activates = |before: Vec3, now: Vec3| before == Vec3::ZERO && now != Vec3::ZERO;
+        ActiveMaterials {
             emit: pairs()
-                .map(|(material, now)| wakes(material.emission, now.emission))
+                .map(|(material, now)| activates(material.emission, now.emission))
                 .collect(),
             reflect: pairs()
-                .map(|(material, now)| wakes(material.reflectance, now.reflectance))
+                .map(|(material, now)| activates(material.reflectance, now.reflectance))
                 .collect(),
         }
     }
@@ -78,7 +78,7 @@ impl Scene {
         allowed
     }
 
-    /// The surfaces that the triangles have when materials look so.
+    /// The surfaces of the triangles under these appearances.
     pub fn surfaces_under(&self, appearances: &[Appearance]) -> Vec<Surface> {
         let allowed = self.allowed(appearances);
         let changed: Vec<bool> = allowed
@@ -107,7 +107,7 @@ impl Scene {
             .collect()
     }
 
-    /// The scene with materials that look so.
+    /// The scene with these appearances.
     pub fn relit(&self, appearances: &[Appearance]) -> Self {
         let mut relit = Self {
             surfaces: self.surfaces_under(appearances),
@@ -190,19 +190,19 @@ mod tests {
     }
 
     #[test]
-    fn only_what_was_black_or_dark_is_awakened() {
+    fn only_black_or_dark_materials_become_active() {
         let scene = scene();
-        assert_eq!(scene.awakened(&scene.appearances()), {
-            Awakened {
+        assert_eq!(scene.active_materials(&scene.appearances()), {
+            ActiveMaterials {
                 emit: vec![false; 2],
                 reflect: vec![false; 2],
             }
         });
-        let painted = scene.awakened(&[grey(0.5, 0.0), grey(0.0, 0.0)]);
-        let lit = scene.awakened(&[grey(0.0, 1.0), grey(0.9, 7.0)]);
+        let painted = scene.active_materials(&[grey(0.5, 0.0), grey(0.0, 0.0)]);
+        let lit = scene.active_materials(&[grey(0.0, 1.0), grey(0.9, 7.0)]);
         assert!(painted.reflects(MaterialId(0)) && !painted.emits(MaterialId(0)));
         assert!(lit.emits(MaterialId(0)) && !lit.emits(MaterialId(1)));
-        let (both, none) = (painted.joined(&lit), Awakened::default());
+        let (both, none) = (painted.joined(&lit), ActiveMaterials::default());
         assert!(both.covers(&painted) && both.covers(&lit) && both.covers(&none));
         assert!(!painted.covers(&lit) && !none.covers(&lit));
         assert_eq!(none.joined(&lit), lit);

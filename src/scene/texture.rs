@@ -43,7 +43,7 @@ impl Texture {
 
 /// Textures that were omitted while a scene was read. Of a picture that several materials name, each name counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spared {
+pub struct OmittedTextures {
     /// Of one colour, which the material has instead.
     pub constant_textures: usize,
     /// Shown by no face.

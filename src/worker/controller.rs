@@ -299,7 +299,7 @@ impl Controller {
                 run.ask_again();
                 let report = run.dated(relit.report);
                 let seconds = Some(completed.spent.as_secs_f64());
-                let needs_restart = relit.is_outgrown;
+                let needs_restart = relit.needs_restart;
                 let event = Event::Relit {
                     report,
                     seconds,

@@ -80,7 +80,7 @@ pub enum Event {
         /// Seconds that it took; nothing where a preview was refined.
         seconds: Option<f64>,
         /// Whether light is missing that only a restart will show (see
-        /// [`Relit::is_outgrown`](crate::solver::Relit::is_outgrown)).
+        /// [`Relit::needs_restart`](crate::solver::Relit::needs_restart)).
         needs_restart: bool,
     },
     /// An answer to [`super::WorkerHandle::inspect`].

@@ -109,7 +109,11 @@ fn white_maze(cancel: &Cancel) -> Result<Finding, Trouble> {
         // Coarse steps converge to a tolerance as coarse as their links.
         let tolerance = settings.tolerance * report.epsilon / settings.epsilon;
         let has_converged = report.residual <= tolerance;
-        has_converged || report.notes.iter().any(|note| note.contains("settled"))
+        has_converged
+            || report
+                .notes
+                .iter()
+                .any(|note| note.contains("not converged"))
     };
     let unnamed = lit.reports.iter().filter(|report| !is_named(report));
     Ok(lit.finding(vec![

@@ -45,9 +45,9 @@ enum Fate {
 }
 
 impl SceneBuilder {
-    /// Let go of textures that no face shows, and make plain colours of those that are constant where faces show them.
+    /// Drop textures that no face shows, and replace those that are constant where faces show them by plain colours.
     /// For textures and materials within their ranges.
-    pub(super) fn spare_textures(&mut self) {
+    pub(super) fn omit_textures(&mut self) {
         if self.textures.is_empty() {
             return;
         }
@@ -55,7 +55,7 @@ impl SceneBuilder {
         for face in &self.faces {
             views[face.material.index()].add(face);
         }
-        let before = self.spared;
+        let before = self.omitted_textures;
         for (material, view) in self.materials.iter_mut().zip(&views) {
             let colors = [&mut material.reflectance, &mut material.emission];
             let slots = [
@@ -66,21 +66,21 @@ impl SceneBuilder {
                 let Some(id) = *slot else { continue };
                 match fate(&self.textures[id.index()], view) {
                     Fate::Kept => continue,
-                    Fate::Unused => self.spared.unused_textures += 1,
+                    Fate::Unused => self.omitted_textures.unused_textures += 1,
                     Fate::Constant(of_texture) => {
                         *color = (*color * of_texture).map(finite_non_negative);
-                        self.spared.constant_textures += 1;
+                        self.omitted_textures.constant_textures += 1;
                     }
                 }
                 *slot = None;
             }
         }
-        if self.spared != before {
+        if self.omitted_textures != before {
             self.forget_unshown_textures();
         }
     }
 
-    /// Let go of textures without a material, and of texture coordinates without a texture.
+    /// Drop textures without a material, and of texture coordinates without a texture.
     fn forget_unshown_textures(&mut self) {
         let mut renamed: Vec<Option<TextureId>> = vec![None; self.textures.len()];
         let mut kept: Vec<Texture> = Vec::new();
@@ -158,7 +158,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Material, MaterialId, Scene, SceneOptions, Spared};
+    use crate::scene::{Material, MaterialId, OmittedTextures, Scene, SceneOptions};
 
     /// Four by four pixels, blue but for a red one at the top left.
     fn spotted() -> Texture {
@@ -211,7 +211,7 @@ mod tests {
         assert_eq!(scene.materials[0].reflectance_texture, None);
         assert_eq!(scene.materials[1].reflectance_texture, Some(TextureId(0)));
         assert_eq!(scene.textures, [spotted()]);
-        assert_eq!(scene.spared.constant_textures, 1);
+        assert_eq!(scene.omitted_textures.constant_textures, 1);
     }
 
     #[test]
@@ -252,11 +252,14 @@ mod tests {
         builder.push_triangle([0, 1, 2], material);
         builder.push_triangle([0, 1, 3], MaterialId(0));
         let bare = builder.clone().finish(&SceneOptions::default()).unwrap();
-        assert_eq!(bare.spared.unused_textures, 1);
+        assert_eq!(bare.omitted_textures.unused_textures, 1);
         assert!(bare.textures.is_empty());
         builder.faces[0].texcoords = about(0.0, 0.0);
         let mixed = builder.finish(&SceneOptions::default()).unwrap();
-        assert_eq!((mixed.textures.len(), mixed.spared), (1, Spared::default()));
+        assert_eq!(
+            (mixed.textures.len(), mixed.omitted_textures),
+            (1, OmittedTextures::default())
+        );
         for scene in [bare, mixed] {
             assert_eq!(scene.surfaces[1].reflectance, Vec3::splat(0.8));
         }
