@@ -32,7 +32,7 @@ use vecrad::{
         view::{ViewMode, ViewRequest},
     },
 };
-use windows::{ONE_TRIANGLE, perform, plates, wait_for, window};
+use windows::{ONE_TRIANGLE, one_triangle, perform, plates, wait_for, window};
 
 /// The storage that eframe has in a file.
 #[derive(Default)]
@@ -249,15 +249,7 @@ fn light_of_a_grey_scene_is_one_figure() {
 
 #[test]
 fn a_scene_without_emitters_has_nothing_to_scale() {
-    let folder = tempfile::tempdir().expect("a folder can be made");
-    let scene = folder.path().join("dark.obj");
-    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
-    let mut harness = window(Options {
-        source: Some(SceneSource::File(scene)),
-        settings: SolveSettings::draft(),
-        ..Options::default()
-    });
-    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    let (_folder, harness) = one_triangle("dark.obj");
     for label in ["Emission scale", "Rays per vertex"] {
         assert!(
             // A figure of the progress has the same name.

@@ -26,7 +26,7 @@ use vecrad::{
         view::ViewMode,
     },
 };
-use windows::{ONE_TRIANGLE, perform, plates, plates_of_size, wait_for, window};
+use windows::{one_triangle, perform, plates, plates_of_size, wait_for, window};
 
 fn press(harness: &mut Harness<'static, App>, key: Key) {
     harness.key_press(key);
@@ -266,15 +266,7 @@ fn a_colour_is_picked_without_a_missing_glyph() {
 
 #[test]
 fn pictures_are_saved_beside_the_scene() {
-    let folder = tempfile::tempdir().expect("a folder can be made");
-    let scene = folder.path().join("Hall.obj");
-    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
-    let mut harness = window(Options {
-        source: Some(SceneSource::File(scene)),
-        settings: SolveSettings::draft(),
-        ..Options::default()
-    });
-    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    let (folder, mut harness) = one_triangle("Hall.obj");
     perform(&mut harness, Action::PictureDialog);
     let path = &harness.state().state.panels.picture_text;
     assert_eq!(Path::new(path), folder.path().join("Hall_1.png"));

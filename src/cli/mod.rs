@@ -66,7 +66,7 @@ pub(crate) enum Outcome {
     StoppedEarly,
 }
 
-/// Read the command line, do what it says, and return the exit code.
+/// Parse the command line, run the command, and return the exit code.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command {

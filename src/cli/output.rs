@@ -18,7 +18,7 @@ pub(super) fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Put a sentence on standard error. One that nobody reads is no reason to stop.
+/// Print a sentence to standard error. A closed standard error is ignored.
 pub(super) fn say(sentence: impl Display) {
     let _ = writeln!(io::stderr(), "{sentence}");
 }

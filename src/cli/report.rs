@@ -184,7 +184,7 @@ pub(super) fn core_count() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)
 }
 
-/// The processor's name where the system tells it in a file.
+/// The processor's name, where the system has it in a file.
 fn processor() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;

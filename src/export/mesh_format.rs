@@ -17,7 +17,7 @@ pub enum MeshFormat {
     Glb,
 }
 
-/// The name of a file tells no format.
+/// The name of a file has no known extension.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the exported file must end in .ply or .glb: {0}")]
 pub struct UnknownMeshFormat(String);

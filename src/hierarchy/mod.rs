@@ -88,9 +88,9 @@ pub struct Patch {
     pub normal: Vec3,
     /// Area, above 0 unless it underflows.
     pub area: f32,
-    /// Mean reflectance; that of an element is told by [`Hierarchy::reflectance_of`].
+    /// Mean reflectance; for an element see [`Hierarchy::reflectance_of`].
     pub reflectance: Vec3,
-    /// Mean emitted radiance; that of an element is told by [`Hierarchy::emission_of`].
+    /// Mean emitted radiance; for an element see [`Hierarchy::emission_of`].
     pub emission: Vec3,
 }
 
@@ -171,7 +171,7 @@ impl Hierarchy {
         Self::build(scene, crease_degrees, &|| false).expect("nothing stops it")
     }
 
-    /// As [`Self::new`], or `None` once `cancelled` says so.
+    /// As [`Self::new`], or `None` once `cancelled` returns true.
     pub fn build(
         scene: &Scene,
         crease_degrees: f32,

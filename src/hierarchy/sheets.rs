@@ -1,4 +1,4 @@
-//! The two sides of sheets, told apart over whole surfaces.
+//! The two sides of sheets, distinguished over whole surfaces.
 //!
 //! A sheet separates two spaces, and what one of its sides sees the other does not. A cluster that holds both sides of a
 //! tube has faces that look the same way and yet do not see the same: one visibility for all of them lights the inside of
@@ -28,7 +28,7 @@ pub struct SheetSides {
 }
 
 impl SheetSides {
-    /// Tell the sides of a scene apart; `None` where no surface has two. Makes the ray tree of the scene where it is needed
+    /// Find the sides of a scene; `None` where no surface has two. Makes the ray tree of the scene where it is needed
     /// and not there yet.
     pub fn of(scene: &Scene, rays: &mut Option<Arc<RayTree>>) -> Option<Self> {
         let corners: Vec<[u32; 3]> = scene.triangles.iter().map(|face| face.corners).collect();
@@ -102,7 +102,7 @@ impl Sides {
 
     /// Join sides of surfaces that see each other, those first that see most.
     fn join_by_sight(&mut self, scene: &Scene, rays: &RayTree) {
-        // How many more rays tell that the least sides of two surfaces belong together than that they do not.
+        // The number of rays that join the smallest sides of two surfaces, less the number that join the others.
         let mut votes: BTreeMap<[u32; 2], i32> = BTreeMap::new();
         for [from, met] in sights(scene, rays) {
             let ((a, a_turned), (b, b_turned)) = (self.surface(from), self.surface(met));

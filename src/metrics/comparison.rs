@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Measurement, Runner, Trajectory, error_text, smallest_error};
 use crate::reference::SampledSurfaces;
 
-/// Errors for which the table tells the time.
+/// Errors for which the table has the time.
 pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 
 /// Errors at which runs are compared with the bake.
@@ -81,7 +81,7 @@ impl SceneComparison {
             .min_by(f64::total_cmp)
     }
 
-    /// The smallest error that can be told from none.
+    /// The smallest error that is distinguishable from 0.
     pub fn smallest_error(&self) -> f64 {
         smallest_error(self.reference.noise_floor)
     }

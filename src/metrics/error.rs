@@ -1,7 +1,7 @@
 //! Error of measured radiance against path-traced points, with the reference's own noise taken out.
 //!
 //! With x the luminance measured, r that of the reference and s its standard error, over n points:
-//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. The surfaces that means over the points stand for are told
+//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. The surfaces that means over the points stand for are given
 //! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are omitted, since their own light would
 //! dwarf the rest; where every point emits, all count.
 
@@ -35,7 +35,7 @@ pub struct ErrorMeasures {
     pub p95_pointwise: f64,
     /// Median of the difference over the reference at the same point.
     pub median_pointwise: f64,
-    /// Root mean square of the reference's standard error, relative: errors far below it cannot be told.
+    /// Root mean square of the reference's standard error, relative: errors far below it cannot be measured.
     pub noise_floor: f64,
     /// Root mean square of the reference, W·sr⁻¹·m⁻².
     pub reference_rms: f64,
@@ -45,12 +45,12 @@ pub struct ErrorMeasures {
     pub nonfinite: usize,
 }
 
-/// Noise-corrected errors below this share of the reference's noise cannot be told from none. Trimming drops points whose
+/// Noise-corrected errors below this share of the reference's noise cannot be distinguished from 0. Trimming drops points whose
 /// noise is large, so what is subtracted from the others is a little too much: by 0.3 of the noise where that is Gaussian
 /// and even. A smaller share calls noise an error of 0; a larger one hides what longer references would confirm.
 const RELIABLE_SHARE: f64 = 0.3;
 
-/// The smallest error that can be told from none under a reference with this noise; all relative.
+/// The smallest error that is distinguishable from 0 under a reference with this noise; all relative.
 pub fn smallest_error(noise_floor: f64) -> f64 {
     RELIABLE_SHARE * noise_floor
 }

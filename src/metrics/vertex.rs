@@ -16,7 +16,7 @@ use crate::{
     solver::{DisplayMesh, VertexLight},
 };
 
-/// Vertices traced between two looks at what else is to be done. Fewer leave threads idle at the end of a piece, more
+/// Vertices traced between two checks for other tasks. Fewer leave threads idle at the end of a piece, more
 /// keep a new snapshot waiting.
 const PIECE: usize = 4096;
 
@@ -48,7 +48,7 @@ pub struct VertexReference {
 }
 
 impl VertexReference {
-    /// Samples a vertex and pass: one evenly spread group, the least that a scatter can be told from.
+    /// Samples a vertex and pass: one evenly spread group, the least that yields a variance.
     pub const SAMPLES_PER_PASS: u32 = 8;
 
     /// Nothing known yet about the vertices of a mesh.
@@ -132,7 +132,7 @@ impl VertexReference {
     }
 
     /// Luminance by which the radiance of each vertex errs under this light, without the reference's noise, in units
-    /// of `unit` W·sr⁻¹·m⁻². `None` before two passes, from which the noise cannot be told, and for light of another
+    /// of `unit` W·sr⁻¹·m⁻². `None` before two passes, which yield no noise, and for light of another
     /// mesh.
     pub fn errors(&self, light: &VertexLight, unit: f64) -> Option<Vec<f32>> {
         if self.passes < 2 || light.irradiance.len() != self.points.len() {

@@ -1,6 +1,6 @@
 //! Irradiance at random surface points by path tracing, pass by pass, with its standard error.
 //!
-//! Where the points lie, and what means over them are means of, is told in [`super::points`]. Each takes its samples in
+//! For the points, and the surfaces that they stand for, see [`super::points`]. Each takes its samples in
 //! groups; a group covers the hemisphere with a randomly shifted low-discrepancy sequence, and since groups are
 //! independent their scatter gives an unbiased variance. All random numbers belong to a point and a group, so the
 //! result does not depend on threads.
@@ -21,7 +21,7 @@ use crate::{
     scene::{Scene, luminance},
 };
 
-/// Samples of a group. Fewer lose stratification, more leave too few groups to tell the variance from.
+/// Samples of a group. Fewer lose stratification, more leave too few groups to estimate the variance.
 const GROUP: u32 = 8;
 
 /// How a path-traced reference is made.

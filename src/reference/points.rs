@@ -1,4 +1,4 @@
-//! Where the reference looks: random points of the surfaces whose light may be wrong.
+//! The points of the reference: random points of the surfaces whose light is to be measured.
 //!
 //! Points lie on sides that reflect and do not emit all over: elsewhere there is no error to see, and a sky would take
 //! nearly all of them. They are uniform over the area, so plain means over them are area-weighted. Where most of the area

@@ -38,7 +38,7 @@ pub(super) fn parse_ahead<T>(
         };
         // The clean text is valid for the parser; should it panic nevertheless, the window must survive.
         let value = std::panic::catch_unwind(AssertUnwindSafe(|| parse(&mut text))).ok();
-        // The cleaner stops where nobody reads on.
+        // The cleaner stops when the parser stops reading.
         drop(text);
         Ok(Parsed {
             value,
@@ -47,7 +47,7 @@ pub(super) fn parse_ahead<T>(
     })
 }
 
-/// Send chunks until there are no more or nobody wants them.
+/// Send chunks until there are no more or the receiver is gone.
 fn clean(mut cleaner: ObjCleaner<impl BufRead>, sender: &SyncSender<Vec<u8>>) -> Notes {
     while let Some(chunk) = cleaner.next_chunk() {
         if sender.send(chunk).is_err() {

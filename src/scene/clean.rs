@@ -4,7 +4,7 @@
 //! The parser reads nothing but ASCII `v`, `vt`, `vn`, `f` and `o` statements. Its `o` names are numbers of
 //! [`Segment`]s. The first `vt` and the first `vn` it sees are not numbers: they stand for "none".
 //! Faces that follow each other are handed over as one long face, which it reads several times faster than many short
-//! ones; [`FaceNote`] says where each ends.
+//! ones; [`FaceNote`] has the end of each.
 
 use std::collections::HashMap;
 use std::io::BufRead;

@@ -39,7 +39,7 @@ const MOST_LINES_IN_ALL: usize = 1 << 11;
 /// Points nearer than this are one place, frame units: half of the distance that rays keep from their ends.
 const SAME_PLACE: f64 = 5e-5;
 
-/// And relative to the distance from the origin: what single precision tells apart.
+/// The same relative to the distance from the origin: the resolution of single precision.
 const SAME_PLACE_RELATIVE: f64 = 5e-7;
 
 /// Cut the faces of a scene. Parts keep what their face has; their textures are averaged anew.

@@ -70,7 +70,7 @@ impl SceneBuilder {
             let Some((id, variant)) = *wanted else {
                 continue;
             };
-            // The first takes the place of the original, which nobody else needs.
+            // The first takes the place of the original, which is not needed otherwise.
             if variants[id.index()][0] == variant {
                 continue;
             }

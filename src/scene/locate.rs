@@ -27,7 +27,7 @@ pub(super) enum Missing {
 #[derive(Debug)]
 pub(super) struct SceneFolder {
     root: PathBuf,
-    /// The root without symbolic links, where it can be told.
+    /// The root without symbolic links, where it is known.
     followed_root: Option<PathBuf>,
     /// Folders that were searched, relative to the root.
     listings: HashMap<PathBuf, Listing>,

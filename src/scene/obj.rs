@@ -37,7 +37,7 @@ pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError>
     read_obj_with_progress(path, options, &ReadProgress::default())
 }
 
-/// Read an OBJ file and tell another thread how much of it has been read.
+/// Read an OBJ file and report to another thread how much of it has been read.
 ///
 /// # Errors
 /// As [`read_obj`].

@@ -14,7 +14,7 @@ pub enum Sides {
     Two,
 }
 
-/// How a scene is read, apart from what the file says.
+/// Options of reading a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneOptions {
     /// Sidedness of faces.

@@ -1,27 +1,27 @@
 //! Which side of a closed shell is meant to be lit, where its winding cannot be what was meant.
 //!
 //! Closed shells divide space into regions: the inside of each, without what lies within shells in it, and the outside of
-//! all. A shell bounds two, and its winding says which of them it faces. Of that other things bear witness: sheets and
-//! lamps lie in a region that is seen, and so do the shells that face it.
+//! all. A shell bounds two, and its winding says which of them it faces. Other objects are evidence of which regions are seen:
+//! sheets and lamps lie in a region that is seen, and shells face one.
 //!
-//! * A shell that faces a region of which nothing else speaks, while something speaks of the one behind it, is wound the
+//! * A shell that faces a region without other evidence, while there is evidence for the one behind it, is wound the
 //!   wrong way: a solid that is inside out, a room or a sky that looks away from what is in it.
 //! * Where light shines on its back and its front is needed, too, both sides are lit, as those of a sheet are.
-//! * Shading normals of the file that oppose the winding tell that a shell was mirrored.
+//! * Shading normals of the file that oppose the winding show that a shell was mirrored.
 //!
-//! A hollow wall, whose outer shell looks outward and whose inner one looks inward, is as it should be: of the region
-//! between them nothing speaks.
+//! A hollow wall, whose outer shell looks outward and whose inner one looks inward, is correct: there is
+//! no evidence for the region between them.
 
 use glam::Vec3;
 
 use super::shells::Shells;
 
 /// Mean cosine between the shading normals of a shell and the normals of its faces, weighted by area, at or below which the
-/// former oppose the winding: half way between normals that tell nothing and those of a mirrored shell. Those of a smooth
+/// former oppose the winding: half way between normals without information and those of a mirrored shell. Those of a smooth
 /// coarse shape still come to 0.7.
 const OPPOSED: f64 = -0.5;
 
-/// How often the shells are asked again after others have changed their minds. Evidence spreads by one region a time; in
+/// Rounds of evaluating the shells again after others have changed. Evidence spreads by one region a time; in
 /// nested rooms that are all inside out it takes two.
 const ROUNDS: usize = 8;
 

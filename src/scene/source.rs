@@ -26,7 +26,7 @@ impl Stamp {
     }
 }
 
-/// Tells whether a file has changed since it was opened.
+/// Detects whether a file has changed since it was opened.
 #[derive(Debug)]
 pub(super) struct Watch {
     file: File,

@@ -63,7 +63,7 @@ impl Texture {
     /// Read a picture file: 8 and 16 bits a channel are sRGB, floats are linear.
     ///
     /// # Errors
-    /// A clause that says why there is no picture.
+    /// A clause with the reason why there is no picture.
     pub(super) fn read(path: &Path, name: &str, role: Role) -> Result<Picture, String> {
         let decoded = std::panic::catch_unwind(|| decode(path));
         match decoded {

@@ -234,7 +234,7 @@ impl Camera {
     }
 }
 
-/// A camera that glides to where it is told to be.
+/// A camera that moves smoothly to its target.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CameraRig {
     /// Where it is going.

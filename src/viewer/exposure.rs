@@ -56,7 +56,7 @@ impl Histogram {
         Self(counts)
     }
 
-    /// Luminance below which pixels have this share of the weight of all; a pixel weighs what its luminance says.
+    /// Luminance below which pixels have this share of the weight of all; a pixel is weighted by its luminance.
     fn quantile(&self, share: f64, weight: impl Fn(f64) -> f64) -> f64 {
         let luminance = |bin: usize| ((bin as f64 + 0.5) / BINS_PER_EV - SPAN_EV).exp2();
         let weights: Vec<f64> = self

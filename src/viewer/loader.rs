@@ -74,7 +74,7 @@ pub struct LoadedScene {
     pub emitter_count: usize,
     /// Whether there are one-sided faces, whose backs can be shown or looked through.
     pub has_backs: bool,
-    /// Whether all surfaces are grey and all light white, so that one channel tells all.
+    /// Whether all surfaces are grey and all light white, so that one channel is enough.
     pub is_grey: bool,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
@@ -91,7 +91,7 @@ enum Phase {
     ChoosingView,
 }
 
-/// How far a scene is on its way, told by the thread that reads it. Clones tell the same.
+/// Progress of loading a scene, set by the thread that reads it. Clones share it.
 #[derive(Clone, Debug, Default)]
 struct Tracker {
     phase: Arc<AtomicU8>,

@@ -9,7 +9,7 @@ use crate::scene::{Appearance, Material, Scene, Surface, TriangleId};
 pub struct LightControl {
     /// Whether it emits.
     pub is_on: bool,
-    /// Times as bright as the file says.
+    /// Brightness relative to the file.
     pub intensity: f32,
     /// Linear colour; the largest channel of the file's is 1.
     pub color: Vec3,
@@ -101,12 +101,12 @@ impl Materials {
         &self.of_file[index]
     }
 
-    /// Back to what the file says.
+    /// Reset to the values of the file.
     pub fn reset(&mut self) {
         self.now.clone_from(&self.of_file);
     }
 
-    /// Whether anything is not as the file says.
+    /// Whether anything differs from the file.
     pub fn are_changed(&self) -> bool {
         self.now != self.of_file
     }

@@ -1,4 +1,4 @@
-//! Lines over the light: which cluster boxes, which links, and what their colours tell.
+//! Lines over the light: which cluster boxes and links are drawn, and the quantities of their colours.
 
 use serde::{Deserialize, Serialize};
 

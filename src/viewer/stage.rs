@@ -1,7 +1,7 @@
 //! A thread for work that takes too long for a frame of a large scene: handing mesh, light and boxes to the
 //! adapter, choosing and colouring the boxes, looking up the light at the picked point, letting go of what was replaced.
 //!
-//! The window says what it wants to show and goes on with what is there. Only the newest request is fulfilled.
+//! The window requests a picture and continues with the one that is ready. Only the newest request is fulfilled.
 
 use std::{
     any::Any,
@@ -145,7 +145,7 @@ impl Stage {
         self.asked.as_ref().is_some_and(is_of_run).then_some(newest)
     }
 
-    /// Let go of something large where no frame waits for it.
+    /// Drop something large on the thread, where no frame waits for it.
     pub fn drop_later(&self, large: impl Send + 'static) {
         self.order(Order::Drop(Box::new(large)));
     }

@@ -75,7 +75,7 @@ fn native_options(title: &str) -> eframe::NativeOptions {
             ..Default::default()
         },
         persist_window: true,
-        // Our own looks for fonts.
+        // `SystemFonts` finds fonts.
         system_font_fallback: false,
         ..Default::default()
     }
@@ -99,7 +99,7 @@ fn icon() -> egui::IconData {
     eframe::icon_data::from_png_bytes(picture).unwrap_or_default()
 }
 
-/// One sentence for what eframe says.
+/// One sentence for an error of eframe.
 fn describe(error: &eframe::Error) -> ViewerError {
     let text = essence(&error.to_string());
     match error {

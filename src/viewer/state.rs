@@ -152,7 +152,7 @@ impl State {
         loaded.map_or(1.0, |loaded| loaded.scene.radiance_unit)
     }
 
-    /// Whether nothing in the scene has a colour, so that one channel tells all.
+    /// Whether nothing in the scene has a colour, so that one channel is enough.
     pub fn is_grey(&self) -> bool {
         let is_grey = self.loaded.as_ref().is_some_and(|loaded| loaded.is_grey);
         is_grey && (!self.materials.are_changed() || self.materials.are_grey())

@@ -42,11 +42,6 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// Whether a limit cut the solve short.
-    pub fn is_limit(self) -> bool {
-        matches!(self, Self::StepLimit | Self::TimeLimit | Self::MemoryLimit)
-    }
-
     /// Whether there is more to do under the same settings.
     pub fn can_continue(self) -> bool {
         matches!(self, Self::TimeLimit | Self::MemoryLimit | Self::Requested)

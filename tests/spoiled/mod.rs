@@ -1,5 +1,7 @@
 //! Random damage to files, and what every scene that was read promises.
 
+#![allow(dead_code, reason = "each test uses some of it")]
+
 use std::path::PathBuf;
 
 use vecrad::scene::Scene;

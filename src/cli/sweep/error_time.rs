@@ -1,4 +1,4 @@
-//! Error against run time, scene by scene, and the files that tell it.
+//! Error against run time, scene by scene, and the files of the results.
 
 use std::{
     io::{self, Write},
@@ -213,7 +213,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Error over time of every run, baselines dashed, and the noise that errors far below cannot be told from.
+/// Error over time of every run, baselines dashed, and the noise of the reference.
 fn plot(scene: &SceneComparison) -> CurvePlot {
     let mut curves: Vec<Curve> = scene.runs.iter().map(curve).collect();
     let times = || {

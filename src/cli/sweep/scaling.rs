@@ -20,7 +20,7 @@ use crate::{
 /// Triangles of the rooms; the first is the smallest of Sun, Gong and Pan.
 const SIZES: [u32; 6] = [1_022, 4_096, 16_384, 65_536, 262_144, 1_000_000];
 
-/// One size, fully told.
+/// All results of one size.
 #[derive(Serialize)]
 struct Size {
     cost: SizeCost,

@@ -1,8 +1,8 @@
 //! What each omission of the plan saves: the same scene solved with all omissions, without one of them, and with none.
 //!
 //! Times are wall-clock seconds of preparing and stepping, without reading and without pictures. Light is compared where
-//! it arrives, at random points of the surfaces, with that of the run that keeps everything; how far two such runs
-//! differ that have different seeds tells what of a difference is noise.
+//! it arrives, at random points of the surfaces, with that of the run that keeps everything; the
+//! difference of two such runs with different seeds is the noise.
 
 mod exhibits;
 mod table;

@@ -40,7 +40,7 @@ pub struct Builtin {
     pub name: &'static str,
     /// Its description, in a line.
     pub summary: &'static str,
-    /// A view of it that looks good.
+    /// The viewpoint for its picture.
     pub viewpoint: Viewpoint,
     faces: fn() -> SceneBuilder,
 }

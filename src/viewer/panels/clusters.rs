@@ -51,7 +51,7 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
     }
 }
 
-/// Which boxes are drawn, and what their colours tell.
+/// Which boxes are drawn, and the quantity of their colours.
 fn boxes_ui(ui: &mut egui::Ui, state: &mut State, cluster_count: usize) {
     let overlay = &mut state.view.clusters;
     let deepest = state.shown_clusters.deepest.unwrap_or(overlay.level);

@@ -1,4 +1,4 @@
-//! Powers as the panels tell them: in watts where the scene's unit of length is known to be the metre, else relative to
+//! Powers in the panels: in watts where the scene's unit of length is known to be the metre, else relative to
 //! the power that leaves all surfaces of the scene.
 
 use crate::viewer::{figures::figure, state::State};

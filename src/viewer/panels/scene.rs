@@ -1,4 +1,4 @@
-//! Scenes to open: what an empty window says, the list of built-in scenes, the field for a path.
+//! Scenes to open: the text of an empty window, the list of built-in scenes, the field for a path.
 
 use std::path::PathBuf;
 
