@@ -11,6 +11,7 @@
 //! * [`solver`]: one progressive step after the other, as a value without threads, clocks or globals;
 //! * [`mod@reference`]: the truth by other means, sharing no transport code;
 //! * [`metrics`]: error measures and reports;
+//! * [`experiments`]: suites of runs, on omissions, stability and growth with size;
 //! * [`export`] writes files;
 //! * [`worker`]: the solver thread;
 //! * `viewer`: the window and its pictures;
@@ -19,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod experiments;
 pub mod export;
 pub mod geometry;
 pub mod hierarchy;

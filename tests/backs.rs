@@ -11,12 +11,13 @@ use glam::{DVec3, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
+    export::ToneMap,
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
     solver::{DisplayMesh, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
-        render::headless::{self, Subject},
-        view::{ToneMap, ViewMode, ViewSettings},
+        headless::{self, Subject},
+        view::{ViewMode, ViewSettings},
     },
 };
 
@@ -33,11 +34,11 @@ fn scene(faces: &[[usize; 3]], sides: Sides) -> Arc<Scene> {
     for face in faces {
         builder.push_triangle(face.map(|corner| corners[corner]), material);
     }
-    let options = SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).expect("a sheet"))
+    Arc::new(
+        builder
+            .finish(&SceneOptions::with_sides(sides))
+            .expect("a sheet"),
+    )
 }
 
 fn snapshot(mesh: DisplayMesh) -> Snapshot {

@@ -1,9 +1,11 @@
 //! The solvers to race against: stochastic Jacobi radiosity and the path-traced bake, by closed forms and each other.
 
+mod common;
 mod truth_scenes;
 
 use std::{f32::consts::PI, sync::Arc};
 
+use common::assert_close;
 use glam::{DVec3, Vec3};
 use truth_scenes::{Plates, never};
 use vecrad::{
@@ -82,10 +84,7 @@ fn jacobi_fills_a_furnace() {
         let expected = 1.0 / (1.0 - f64::from(reflectance));
         // Irradiance equals radiosity in a furnace. 200,000 rays a bounce: the end of a path is left to chance, by
         // about the root of the rays of the last bounces; 1 % is several times that.
-        assert!(
-            (mean - expected).abs() < 0.01 * expected,
-            "{mean} for {expected}"
-        );
+        assert_close(mean, expected, 0.01, "mean");
         // Each of 216 elements gets some 900 rays a bounce, so 3 % each at worst, less by stratification.
         let worst = lit
             .iter()
@@ -110,10 +109,7 @@ fn jacobi_agrees_with_the_matrix() {
     for (patch, irradiance) in matrix.patches.iter().zip(arrived) {
         let (expected, found) = (f64::from(patch.irradiance.x), f64::from(irradiance.x));
         // Some 2,000 rays or more reach each of the 192 patches (2 % of noise), and the matrix has its own.
-        assert!(
-            (found - expected).abs() < 0.08 * expected,
-            "{patch:?}: {found}"
-        );
+        assert_close(found, expected, 0.08, format_args!("{patch:?}"));
     }
 }
 

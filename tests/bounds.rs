@@ -1,16 +1,18 @@
 //! The interval of a link holds what brute force finds, and the sum over a receiver's links holds its error.
 
+mod common;
 mod truth_scenes;
 
 use std::sync::Arc;
 
+use common::solve;
 use glam::{DVec3, Vec3, Vec4};
 use vecrad::{
     geometry::{Random, RayTree, point_irradiance, triangle_point},
     hierarchy::{Hierarchy, Kind, NodeId, Reading, Tables},
     reference::{MatrixSettings, solve_matrix},
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
-    solver::{Cancel, Direct, SolveSettings, Solver},
+    solver::{Direct, SolveSettings},
     transport::{Estimate, Judge, Judgement, Kernel, PairSampler, PatchSums, luminance},
 };
 
@@ -31,11 +33,9 @@ fn clumps(seed: u64) -> Scene {
             builder.push_triangle(corners, material);
         }
     }
-    let options = SceneOptions {
-        sides: Sides::Two,
-        ..SceneOptions::default()
-    };
-    builder.finish(&options).expect("the triangles are usable")
+    builder
+        .finish(&SceneOptions::with_sides(Sides::Two))
+        .expect("the triangles are usable")
 }
 
 /// Unoccluded irradiance (luminance) of a face, patch by patch in closed form.
@@ -158,13 +158,7 @@ fn the_bound_of_a_receiver_holds_its_error_against_the_full_matrix() {
         max_steps: 2,
         ..SolveSettings::draft()
     };
-    let mut solver =
-        Solver::new(scene.clone(), settings, None, &Cancel::default()).expect("nobody cancels");
-    while !solver
-        .step(&Cancel::default())
-        .is_none_or(|report| report.is_final)
-    {}
-    let snapshot = solver.snapshot();
+    let snapshot = solve(&scene, settings).0.snapshot();
     // The bound is that of one bounce; what sources are wrong by is reflected on.
     let most = |values: &[f32]| values.iter().copied().fold(0.0, f32::max);
     let bound = most(&snapshot.light.uncertainty) / (1.0 - LARGEST_REFLECTANCE);

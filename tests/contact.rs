@@ -2,10 +2,12 @@
 //! bright, however much of a surface lies under an object.
 
 mod boxes;
+mod common;
 
 use std::{f32::consts::PI, f64::consts::TAU};
 
 use boxes::{cuboid, mean_irradiance, solved};
+use common::assert_close;
 use glam::{DVec3, Vec3};
 use vecrad::{
     scene::{Material, MaterialId, SceneBuilder, Sides},
@@ -86,7 +88,7 @@ fn no_smudge_shows_on_what_reaches_into_a_wall() {
     assert!(mean < 0.02 && worst < 0.1, "mean {mean}, worst {worst}");
 }
 
-/// A black box before walls that glow, lit over links alone: at its foot, half of the view is black. What glows beyond
+/// A black box before walls that glow, lit over links alone: at its foot, half of the view is black. What glows behind
 /// the box must not leak there.
 #[test]
 fn links_let_no_light_into_the_corner_at_the_foot_of_an_object() {
@@ -186,9 +188,6 @@ fn what_lies_within_fine_solids_takes_no_light_from_the_room_about_them() {
     let (mean, _, most) = mean_irradiance(&snapshot, is_wall);
     let expected = f64::from(PI * emitted / (1.0 - reflectance));
     // Of the light that falls on the rings a part would be lost at each of ten bounces.
-    assert!(
-        (mean / expected - 1.0).abs() < 0.025,
-        "{mean} of {expected}"
-    );
+    assert_close(mean, expected, 0.025, "mean");
     assert!(f64::from(most) < 1.025 * expected, "{most} of {expected}");
 }

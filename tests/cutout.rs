@@ -2,26 +2,26 @@
 
 #![cfg(feature = "viewer")]
 
+mod common;
 mod display_scenes;
 mod pictures;
 
 use std::{path::Path, process::Command, sync::Arc};
 
+use common::assert_close;
 use glam::{DVec3, Vec3};
 use image::{DynamicImage, Rgba};
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
-    export::{linear_from_srgb, srgb_from_linear},
-    scene::{Material, Scene, SceneBuilder, SceneOptions},
+    export::ToneMap,
+    scene::{Material, Scene, SceneBuilder, SceneOptions, linear_from_srgb, srgb_byte},
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
-        render::{
-            Cutout,
-            headless::{self, HeadlessPicture, Subject},
-        },
+        headless::{self, HeadlessPicture, Subject},
+        render::Cutout,
         theme::PICTURE_BACKGROUND,
-        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+        view::{ClusterOverlay, ViewMode, ViewSettings},
     },
 };
 
@@ -110,7 +110,7 @@ fn laid_over_the_background_it_is_the_opaque_picture() {
         let over = [*r, *g, *b].map(|byte| {
             let front = linear_from_srgb(f32::from(byte) / 255.0);
             let mixed = alpha * front + (1.0 - alpha) * PICTURE_BACKGROUND;
-            (srgb_from_linear(mixed) * 255.0).round() as u8
+            srgb_byte(mixed)
         });
         let [red, green, blue, _] = opaque.display.get_pixel(x, y).0;
         assert_near(over, [red, green, blue], &format!("at {x}, {y}"));
@@ -159,10 +159,7 @@ fn edges_have_no_fringe_and_radiance_is_multiplied_by_alpha() {
     let fov = Camera::looking(Vec3::Z, Vec3::ZERO, Vec3::Y).fov_y_radians;
     let side = 128.0 * 100.0 / (320.0 * (0.5 * fov).tan());
     let expected = 0.5 * side * side;
-    assert!(
-        (covered / expected - 1.0).abs() < 0.03,
-        "{covered} pixels instead of {expected}"
-    );
+    assert_close(covered, expected, 0.03, "covered pixels");
 }
 
 #[test]
@@ -217,7 +214,7 @@ fn the_command_line_leaves_the_background_out() {
             .output()
             .expect("it can be run")
     };
-    // Nothing is drawn, so there is nothing to leave out.
+    // Nothing is drawn, so there is nothing to omit.
     assert_eq!(run(&["--transparent"]).status.code(), Some(2));
     let flags = ["--screenshot", "a.png", "--transparent", "--size", "64x64"];
     let output = run(&flags);

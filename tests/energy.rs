@@ -1,6 +1,7 @@
 //! Power in closed rooms: what is emitted is absorbed.
 
 mod boxes;
+mod common;
 
 use boxes::{cuboid, solved};
 use glam::{DVec3, Vec3};

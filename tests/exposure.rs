@@ -11,18 +11,19 @@ use glam::{DVec3, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
+    export::ToneMap,
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
     solver::{Snapshot, VertexLight},
     viewer::{
         camera::Camera,
-        render::headless::{self, Subject},
-        view::{ToneMap, ViewMode, ViewSettings},
+        headless::{self, Subject},
+        view::{ViewMode, ViewSettings},
     },
 };
 
 const SIZE: [u32; 2] = [160, 120];
 
-/// What a square reflects at the light of this scene, or emits.
+/// The radiance that a square reflects at the light of this scene, or emits.
 #[derive(Clone, Copy)]
 enum Square {
     Reflects(f32),
@@ -54,11 +55,9 @@ fn squares(kinds: &[(Square, usize)]) -> (Arc<Scene>, Snapshot) {
             }
         }
     }
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = builder.finish(&options).expect("squares");
+    let scene = builder
+        .finish(&SceneOptions::with_sides(Sides::One))
+        .expect("squares");
     let mesh = display_scenes::own_triangles(&scene);
     let mut irradiance = Vec::new();
     for &triangle in &mesh.triangle_of {
@@ -111,7 +110,7 @@ fn before(squares: &(Arc<Scene>, Snapshot), place: f64, distance: f32) -> Camera
 /// Linear value of the pixel in the middle.
 fn middle(picture: &RgbaImage) -> f32 {
     let byte = picture.get_pixel(SIZE[0] / 2, SIZE[1] / 2).0[1];
-    vecrad::export::linear_from_srgb(f32::from(byte) / 255.0)
+    vecrad::scene::linear_from_srgb(f32::from(byte) / 255.0)
 }
 
 /// Whether a linear value is the middle gray that light is exposed to, within a bin, the rounding, and a byte.

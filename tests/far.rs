@@ -2,49 +2,41 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod boxes;
+mod common;
+
 use std::{fmt::Write as _, fs, sync::Arc};
 
+use boxes::{cuboid, rectangle};
+use common::solve;
 use glam::{DMat3, DVec3, Vec3};
 use vecrad::{
-    scene::{SceneOptions, read_obj},
-    solver::{Cancel, SolveSettings, Solver},
+    scene::{Material, SceneBuilder, SceneOptions, read_obj},
+    solver::SolveSettings,
 };
 
 /// A room of 4 × 4 × 3 with a lamp under its ceiling and a box on its floor, turned and moved, as an OBJ file.
 fn room(turned: DMat3, origin: DVec3) -> String {
+    let mut builder = SceneBuilder::default();
+    let [grey, lamp] = ["grey", "lamp"]
+        .map(|name| builder.push_material(Material::plain(name, Vec3::ZERO, Vec3::ZERO)));
+    let (low, high) = (DVec3::ZERO, DVec3::new(4.0, 4.0, 3.0));
+    cuboid(&mut builder, low, high, true, grey);
+    let (low, high) = (DVec3::new(1.0, 1.2, 0.0), DVec3::new(1.5, 2.0, 0.8));
+    cuboid(&mut builder, low, high, false, grey);
+    let corner = DVec3::new(1.5, 1.5, 2.9);
+    rectangle(&mut builder, corner, [DVec3::Y, DVec3::X], lamp);
     let mut text = String::from("mtllib a.mtl\n");
-    let mut cuboid = |low: DVec3, high: DVec3, is_inward: bool| {
-        for corner in 0..8 {
-            let pick = |bit: usize, axis: usize| {
-                let end = if corner & bit == 0 { low } else { high };
-                end[axis]
-            };
-            let at = turned * DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)) + origin;
-            writeln!(text, "v {:.7} {:.7} {:.7}", at.x, at.y, at.z).unwrap();
-        }
-        for mut face in [
-            [1, 3, 4, 2],
-            [5, 6, 8, 7],
-            [1, 2, 6, 5],
-            [3, 7, 8, 4],
-            [1, 5, 7, 3],
-            [2, 4, 8, 6],
-        ] {
-            if is_inward {
-                face.reverse();
-            }
-            let [a, b, c, d] = face.map(|corner| corner - 9);
-            writeln!(text, "f {a} {b} {c} {d}").unwrap();
-        }
-    };
-    cuboid(DVec3::ZERO, DVec3::new(4.0, 4.0, 3.0), true);
-    cuboid(DVec3::new(1.0, 1.2, 0.0), DVec3::new(1.5, 2.0, 0.8), false);
-    text += "usemtl lamp\n";
-    for [x, y] in [[1.5, 1.5], [1.5, 2.5], [2.5, 2.5], [2.5, 1.5]] {
-        let at = turned * DVec3::new(x, y, 2.9) + origin;
+    for position in &builder.positions {
+        let at = turned * *position + origin;
         writeln!(text, "v {:.7} {:.7} {:.7}", at.x, at.y, at.z).unwrap();
     }
-    text + "f -4 -3 -2 -1\n"
+    for face in &builder.faces {
+        let [a, b, c] = face.corners.map(|corner| corner + 1);
+        let name = &builder.materials[face.material.index()].name;
+        writeln!(text, "usemtl {name}\nf {a} {b} {c}").unwrap();
+    }
+    text
 }
 
 /// Irradiance at the vertices, and where these are from the middle of the room.
@@ -52,16 +44,18 @@ fn lit(turned: DMat3, origin: DVec3) -> Vec<(Vec3, Vec3)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("room.obj");
     fs::write(&path, room(turned, origin)).unwrap();
-    fs::write(folder.path().join("a.mtl"), "newmtl lamp\nKd 0\nKe 10\n").unwrap();
+    fs::write(
+        folder.path().join("a.mtl"),
+        "newmtl grey\nKd 0.5\nnewmtl lamp\nKd 0\nKe 10\n",
+    )
+    .unwrap();
     let scene = Arc::new(read_obj(&path, &SceneOptions::default()).unwrap());
     let settings = SolveSettings {
         epsilon: 0.2,
         max_steps: 1,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene, settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    let snapshot = solver.snapshot();
+    let snapshot = solve(&scene, settings).0.snapshot();
     let positions = snapshot.mesh.positions.iter().copied();
     let irradiance = snapshot.light.irradiance.iter().copied();
     positions.zip(irradiance).collect()

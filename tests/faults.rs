@@ -1,4 +1,4 @@
-//! What happens to a running program: full disks, folders that vanish, files that change, readers that leave, signals.
+//! Faults while the program runs: full disks, folders that vanish, files that change, readers that leave, signals.
 //! Whatever comes, outputs are whole or absent, nothing is left beside them, and there is a sentence.
 //!
 //! `VECRAD_KILLS=500 cargo test --release --test faults` sends more signals than the suite does.
@@ -18,7 +18,7 @@ use std::{
 
 fn vecrad(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vecrad"));
-    // What is saved elsewhere is to be found here.
+    // Files saved elsewhere are to be found here.
     let elsewhere = folder.join("elsewhere");
     fs::create_dir_all(&elsewhere).unwrap();
     command
@@ -265,7 +265,7 @@ fn signals_at_any_moment_leave_outputs_whole_or_absent() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // Dense at the start, where there is much to set up, and up to and beyond the end.
+        // Dense at the start, where there is much to set up, and up to and past the end.
         let part = (round as f64 + 0.5) / kills as f64;
         sleep(Duration::from_secs_f64(3.0 * part * part));
         let signal = ["-TERM", "-INT", "-HUP"][round as usize % 3];

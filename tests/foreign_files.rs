@@ -43,7 +43,7 @@ fn read(folder: &TempDir) -> Scene {
     try_read(folder.path()).unwrap()
 }
 
-/// What is said but that there is no light.
+/// All warnings but the one that there is no light.
 fn said(scene: &Scene) -> Vec<String> {
     let warnings = scene.warnings.iter();
     let others = warnings.filter(|warning| warning.kind != WarningKind::NoEmitter);
@@ -119,7 +119,7 @@ fn numbers_in_other_notations_are_named_with_their_first_line() {
     let text = format!("{SQUARE}v 1,5 0 0\nv 2,5 0 0\nf 1 2 3 4\nf 1 2 5\nf 1 2 6\n");
     let folder = folder(&[("scene.obj", &text)], &[]);
     let expected = [
-        "scene.obj:9: vertex with a decimal comma; faces that use it are left out; export with decimal points (2 times)",
+        "scene.obj:9: vertex with a decimal comma; faces that use it are omitted; export with decimal points (2 times)",
         "scene.obj:12: skipped a face: a corner is not a finite number (2 times)",
     ];
     assert_eq!(said(&read(&folder)), expected);

@@ -2,11 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod spoiled;
+
 use std::path::{Path, PathBuf};
 
+use spoiled::assert_promises;
 use tempfile::TempDir;
 use vecrad::scene::{
-    ReadError, Scene, SceneOptions, Texture, Warning,
+    ReadError, Scene, SceneOptions, Warning,
     WarningKind::{
         Encoding, FaceSkipped, LineSkipped, MaterialMissing, NoEmitter, TextureMissing,
         Unsupported, ValueClamped,
@@ -32,45 +35,13 @@ fn try_read(obj: impl AsRef<[u8]>, others: &[(&str, &[u8])]) -> Result<Scene, Re
     files.extend_from_slice(others);
     let (_folder, path) = write(&files);
     let scene = read_obj(&path, &SceneOptions::default())?;
-    assert_promises(&scene);
+    let bytes = files.iter().map(|(_, content)| content.len()).sum();
+    assert_promises(&scene, bytes);
     Ok(scene)
 }
 
 fn read(obj: impl AsRef<[u8]>, others: &[(&str, &[u8])]) -> Scene {
     try_read(obj, others).unwrap()
-}
-
-/// What every scene keeps, whatever the file was.
-fn assert_promises(scene: &Scene) {
-    assert!(scene.positions.iter().all(|position| position.is_finite()));
-    assert_eq!(scene.surfaces.len(), scene.triangles.len());
-    assert!(!scene.triangles.is_empty());
-    for triangle in &scene.triangles {
-        assert!(
-            triangle
-                .corners
-                .iter()
-                .all(|&corner| (corner as usize) < scene.positions.len())
-        );
-        assert!(triangle.material.index() < scene.materials.len());
-    }
-    for surface in &scene.surfaces {
-        assert!(surface.area_vector.is_finite() && surface.area_vector.length() > 0.0);
-        assert!(surface.reflectance.min_element() >= 0.0);
-        assert!(surface.reflectance.max_element() <= 0.98);
-        assert!(surface.emission.is_finite() && surface.emission.min_element() >= 0.0);
-    }
-    let textures_fit = |texture: &Texture| {
-        texture.pixels.len() == texture.width as usize * texture.height as usize
-    };
-    assert!(scene.textures.iter().all(textures_fit));
-    assert!(scene.texcoords.is_empty() || scene.texcoords.len() == scene.triangles.len());
-    assert!(scene.normals.is_empty() || scene.normals.len() == scene.triangles.len());
-    let end = scene.objects.iter().fold(0, |end, object| {
-        assert_eq!(object.start.index(), end);
-        object.end.index()
-    });
-    assert_eq!(end, scene.triangles.len());
 }
 
 /// Warnings but the one about the missing light.
@@ -96,12 +67,12 @@ fn hazards_of_the_obj_file_are_cured_with_a_warning() {
         (
             format!("{POINTS}v 1e39 0 0\n{face}f 1 2 5"),
             LineSkipped,
-            "scene.obj:5: vertex that is not a finite number; faces that use it are left out",
+            "scene.obj:5: vertex that is not a finite number; faces that use it are omitted",
         ),
         (
             format!("{POINTS}v 1.#QNAN 0 0\n{face}f 1 2 5"),
             LineSkipped,
-            "scene.obj:5: vertex without three numbers; faces that use it are left out",
+            "scene.obj:5: vertex without three numbers; faces that use it are omitted",
         ),
         (
             format!("{POINTS}{face}f 1 2 5"),
@@ -136,12 +107,12 @@ fn hazards_of_the_obj_file_are_cured_with_a_warning() {
         (
             format!("{POINTS}{face}l 1 2\np 1"),
             Unsupported,
-            "scene.obj:6: lines and points have no surface and were left out (2 times)",
+            "scene.obj:6: lines and points have no surface and were omitted (2 times)",
         ),
         (
             format!("{POINTS}{face}surf 0 1 0 1 1"),
             Unsupported,
-            "scene.obj:6: free-form curves and surfaces (NURBS) were left out; export them as polygons",
+            "scene.obj:6: free-form curves and surfaces (NURBS) were omitted; export them as polygons",
         ),
         (
             format!("{POINTS}vt x\n{face}"),

@@ -91,11 +91,11 @@ fn the_icon_is_what_is_drawn_here() {
     if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
         drawn.save(&path).expect("the folder can be written");
     }
-    let held = image::open(&path).expect("the icon is there").into_rgba8();
-    assert_eq!(held.dimensions(), drawn.dimensions());
+    let stored = image::open(&path).expect("the icon is there").into_rgba8();
+    assert_eq!(stored.dimensions(), drawn.dimensions());
     // Powers are rounded differently by different mathematics libraries.
     let near = |(a, b): (&u8, &u8)| a.abs_diff(*b) <= 1;
-    assert!(held.as_raw().iter().zip(drawn.as_raw()).all(near));
+    assert!(stored.as_raw().iter().zip(drawn.as_raw()).all(near));
     let bytes = std::fs::metadata(&path).expect("it was read").len();
     assert!(bytes < 50_000, "{bytes}");
 }

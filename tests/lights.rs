@@ -1,15 +1,14 @@
 //! Many lamps, against closed forms.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod common;
 
 use std::sync::Arc;
 
+use common::{finish, solve};
 use glam::{DVec3, Vec3};
 use vecrad::{
     geometry::area_vector,
-    scene::{
-        Appearance, Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, TriangleId,
-    },
+    scene::{Appearance, Material, MaterialId, Scene, SceneBuilder, Sides, TriangleId},
     solver::{Cancel, Snapshot, SolveSettings, Solver},
 };
 
@@ -47,23 +46,14 @@ impl Stage {
     }
 
     fn finish(self) -> Arc<Scene> {
-        let options = SceneOptions {
-            sides: Sides::One,
-            ..SceneOptions::default()
-        };
-        Arc::new(self.0.finish(&options).unwrap())
+        finish(self.0, Sides::One)
     }
 }
 
+/// A whole solve, and how many shadow rays it shot.
 fn solved(scene: &Arc<Scene>, settings: SolveSettings) -> (Solver, u64) {
-    let cancel = Cancel::default();
-    let mut solver = Solver::new(scene.clone(), settings, None, &cancel).unwrap();
-    loop {
-        let report = solver.step(&cancel).unwrap();
-        if report.is_final {
-            return (solver, report.shadow_rays);
-        }
-    }
+    let (solver, report) = solve(scene, settings);
+    (solver, report.shadow_rays)
 }
 
 /// Corners of the display triangles of a material, in world coordinates, with their irradiance and their weight: a third of the
@@ -216,12 +206,12 @@ fn colours_of_many_lamps_stay_right_when_one_is_switched_off() {
         }
     };
     check(&solver, 1.0);
-    let mut wished: Vec<Appearance> = scene.appearances();
-    for appearance in &mut wished {
+    let mut requested: Vec<Appearance> = scene.appearances();
+    for appearance in &mut requested {
         if appearance.emission.x > 0.0 {
             appearance.emission = Vec3::ZERO;
         }
     }
-    solver.relight(&wished, &Cancel::default()).unwrap();
+    solver.relight(&requested, &Cancel::default()).unwrap();
     check(&solver, 0.0);
 }

@@ -10,7 +10,7 @@ use vecrad::{
     solver::{Cancel, SolveSettings, Solver},
 };
 
-/// Most bytes that the process held so far.
+/// Most bytes that the process used so far.
 fn peak_bytes() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap();
     let line = status
@@ -23,11 +23,11 @@ fn peak_bytes() -> u64 {
 
 #[test]
 fn the_process_holds_no_more_than_the_limit() {
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = Arc::new(builtin::builtin("cornell", &options).unwrap().unwrap());
+    let scene = Arc::new(
+        builtin::builtin("cornell", &SceneOptions::with_sides(Sides::One))
+            .unwrap()
+            .unwrap(),
+    );
     // Elements without end at first, then links without end.
     for (mesh_tolerance, epsilon, limit) in [(1e-9, 10.0, 320 << 20), (1e-3, 0.0, 96 << 20)] {
         let settings = SolveSettings {
@@ -47,11 +47,11 @@ fn the_process_holds_no_more_than_the_limit() {
             assert!(report.memory_bytes <= limit, "{report:?}");
             is_final = report.is_final;
         }
-        // What the threads of the pool and the allocator keep for themselves comes on top.
-        let held = peak_bytes() - before;
+        // Memory of the thread pool and the allocator comes on top.
+        let growth = peak_bytes() - before;
         assert!(
-            held <= limit + (limit >> 2),
-            "{held} bytes at a limit of {limit}"
+            growth <= limit + (limit >> 2),
+            "{growth} bytes at a limit of {limit}"
         );
     }
 }

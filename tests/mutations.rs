@@ -5,11 +5,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod common;
+mod spoiled;
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use common::{Chance, assert_promises, case_count, folder, spoil};
+use spoiled::{Chance, assert_promises, case_count, folder, spoil};
 use vecrad::scene::{ReadError, Scene, SceneOptions, Warning, WarningKind, read_obj};
 
 /// An OBJ file that is valid but for what a reader must bear anyway: names without a file, lines of other kinds.
@@ -317,7 +317,7 @@ mod sidecar {
         },
     };
 
-    use super::common::{Chance, case_count, spoil};
+    use super::spoiled::{Chance, case_count, spoil};
 
     #[test]
     fn spoiled_sidecars_are_settings_in_range_or_sentences() {
@@ -347,7 +347,7 @@ mod sidecar {
                 0 => spoil(&mut bytes, &mut chance),
                 _ => bytes = with_other_number(&text, &mut chance).into_bytes(),
             }
-            // What is not UTF-8 is refused before.
+            // Text that is not UTF-8 is refused before.
             let Ok(text) = String::from_utf8(bytes) else {
                 continue;
             };
@@ -404,10 +404,10 @@ mod sidecar {
             "1979-05-27",
             "0x7f",
         ];
-        let held = &text[start..end];
-        let value = if held.parse::<i64>().is_ok() && chance.below(8) > 0 {
+        let old = &text[start..end];
+        let value = if old.parse::<i64>().is_ok() && chance.below(8) > 0 {
             chance.pick(&integers)
-        } else if held.parse::<f64>().is_ok() && chance.below(8) > 0 {
+        } else if old.parse::<f64>().is_ok() && chance.below(8) > 0 {
             chance.pick(&floats)
         } else {
             chance.pick(&others)

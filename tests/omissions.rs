@@ -2,10 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::sync::Arc;
 
+use common::assert_close;
 use vecrad::{
-    metrics::omissions::{Comparison, Exhibit, Trial, exhibits},
+    experiments::omissions::{Comparison, Exhibit, Trial, exhibits},
     solver::{Cancel, SolveSettings},
 };
 
@@ -44,7 +47,7 @@ fn quick_scenes_cost_less_as_planned_and_look_alike() {
         for run in &comparison.runs {
             // Two drafts that differ in their mesh: the edge where plates meet is bright on one side only.
             assert!(run.difference < 0.1, "{comparison:?}");
-            assert!((run.power - 1.0).abs() < 0.02, "{comparison:?}");
+            assert_close(run.power, 1.0, 0.02, format_args!("{comparison:?}"));
         }
     }
 }

@@ -132,7 +132,7 @@ fn a_picture_that_is_too_large_is_refused_before_the_work() {
     }
 }
 
-/// What the loader of graphics drivers says of displays that a picture does not need.
+/// Messages of the loader of graphics drivers about displays that a picture does not need.
 #[cfg(feature = "viewer")]
 #[test]
 fn a_picture_is_drawn_without_a_word_of_others() {

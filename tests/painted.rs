@@ -1,17 +1,17 @@
 //! Light of painted surfaces, where it leaves from: lamps in `map_Ke`, dark and bright parts of `map_Kd`. Against closed
 //! forms, sampled and linked, in the clear and with something in the way.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod common;
 
 use std::{f64::consts::PI, sync::Arc};
 
+use common::{finish, solve_validated};
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
     geometry::RayTree,
     reference::{PathSettings, PathTracer, analytic::point_to_polygon},
     scene::{
-        Appearance, Face, Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, Texture,
-        TextureId,
+        Appearance, Face, Material, MaterialId, Scene, SceneBuilder, Sides, Texture, TextureId,
     },
     solver::{Cancel, Direct, Snapshot, SolveSettings, Solver},
 };
@@ -45,23 +45,12 @@ fn quad(builder: &mut SceneBuilder, material: MaterialId, [corner, u, v]: [DVec3
     }
 }
 
-fn finish(builder: SceneBuilder) -> Arc<Scene> {
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).unwrap())
-}
-
 fn solver(scene: &Arc<Scene>, direct: Direct) -> Solver {
     let settings = SolveSettings {
         direct,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver.hierarchy().validate().unwrap();
-    solver
+    solve_validated(scene, settings).0
 }
 
 /// Mean error of the irradiance at vertices that look along a normal, and that are told, and the error that one in twenty
@@ -147,7 +136,7 @@ fn painted_room(has_speck: bool) -> Arc<Scene> {
     if has_speck {
         speck(&mut builder, DVec3::new(0.05, 0.05, 0.5));
     }
-    finish(builder)
+    finish(builder, Sides::One)
 }
 
 /// Beside the ceiling; looks down.
@@ -210,16 +199,16 @@ fn painted_lamps_are_dimmed_and_coloured_with_their_material() {
     for direct in [Direct::Sampled, Direct::Linked] {
         let scene = painted_room(true);
         let mut solver = solver(&scene, direct);
-        let mut wished = scene.appearances();
+        let mut requested = scene.appearances();
         let painted = Vec3::new(1.0, 4.0, 9.0);
-        for (material, appearance) in scene.materials.iter().zip(&mut wished) {
+        for (material, appearance) in scene.materials.iter().zip(&mut requested) {
             match material.name.as_str() {
                 "ceiling" => appearance.emission = painted,
                 "lamp" => appearance.emission = Vec3::ZERO,
                 _ => {}
             }
         }
-        solver.relight(&wished, &Cancel::default()).unwrap();
+        solver.relight(&requested, &Cancel::default()).unwrap();
         solver.finish_relighting(&Cancel::default()).unwrap();
         let right = |point: DVec3| is_told(point).then(|| on_floor(point, painted, Vec3::ZERO));
         let found = errors(&scene, &solver.snapshot(), Vec3::Z, right);
@@ -228,7 +217,7 @@ fn painted_lamps_are_dimmed_and_coloured_with_their_material() {
             found[0] < 0.013 && found[1] < 0.043,
             "{direct:?}: mean and high errors {found:?}"
         );
-        let off: Vec<Appearance> = wished
+        let off: Vec<Appearance> = requested
             .iter()
             .map(|appearance| Appearance {
                 emission: Vec3::ZERO,
@@ -270,7 +259,7 @@ fn paths_see_lamps_where_they_are_painted() {
     }
     assert!(count > 400, "{count}");
     let chi = squares / f64::from(count);
-    assert!(chi < 1.3, "{chi}: errors beyond their noise");
+    assert!(chi < 1.3, "{chi}: errors above their noise");
     // Four standard errors, and what the blurred rims of the lamps change.
     assert!(
         sum.abs() < 4.0 * variance.sqrt() + 1e-3 * right,
@@ -308,7 +297,7 @@ fn painted_floor(picture: Texture, has_speck: bool) -> Arc<Scene> {
     if has_speck {
         speck(&mut builder, DVec3::new(0.05, 0.05, 2.0));
     }
-    finish(builder)
+    finish(builder, Sides::One)
 }
 
 /// Irradiance of the wall, by a sum over small squares of the floor.

@@ -2,8 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::f32::consts::PI;
 
+use common::assert_close;
 use glam::{DVec3, Vec3, Vec4};
 use vecrad::{
     hierarchy::{Hierarchy, NodeId, Reading, Tables},
@@ -18,11 +21,9 @@ fn one_patch(corner: DVec3, legs: [DVec3; 2]) -> (Hierarchy, Tables) {
     let corners =
         [corner, corner + legs[0], corner + legs[1]].map(|point| builder.push_position(point));
     builder.push_triangle(corners, material);
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    let scene = builder.finish(&options).unwrap();
+    let scene = builder
+        .finish(&SceneOptions::with_sides(Sides::One))
+        .unwrap();
     let hierarchy = Hierarchy::new(&scene, 30.0);
     let tables = Tables::new(&hierarchy, |_| Vec4::ONE);
     (hierarchy, tables)
@@ -82,9 +83,6 @@ fn vector_irradiance_pushed_to_a_face_is_equation_12_per_area() {
     for node in [Hierarchy::ROOT, NodeId(1)] {
         let found = kernel.vector_irradiance(node, point).on_face(normal).x;
         // At 900 units the cluster of 71 units saturates by its own form factor, about 0.001.
-        assert!(
-            (found / exact - 1.0).abs() < 5e-3,
-            "{node:?}: {found} {exact}"
-        );
+        assert_close(found, exact, 5e-3, format_args!("{node:?}"));
     }
 }

@@ -51,7 +51,7 @@ fn snapshot(scene: &Scene, step: u32, irradiance: f32) -> Arc<Snapshot> {
     })
 }
 
-/// What is known once it satisfies a condition.
+/// The progress once it satisfies a condition.
 fn wait_for(handle: &TruthHandle, holds: impl Fn(&TruthProgress) -> bool) -> Arc<TruthProgress> {
     let begin = Instant::now();
     loop {

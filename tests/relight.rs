@@ -2,8 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{f32::consts::PI, sync::Arc};
 
+use common::{prepare, solve, step_to_end};
 use glam::{DVec3, Vec3};
 use vecrad::{
     geometry::area_vector,
@@ -21,10 +24,7 @@ fn settings() -> SolveSettings {
 }
 
 fn one_sided() -> SceneOptions {
-    SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    }
+    SceneOptions::with_sides(Sides::One)
 }
 
 fn cornell() -> Arc<Scene> {
@@ -89,12 +89,10 @@ fn two_lamps() -> Arc<Scene> {
 }
 
 fn solved(scene: &Arc<Scene>, settings: SolveSettings) -> Solver {
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver
+    solve(scene, settings).0
 }
 
-/// The light of a solve after other appearances were wished for; all of it presentable.
+/// The light of a solve under other appearances; all of it presentable.
 fn relit(solver: &mut Solver, appearances: &[Appearance]) -> Snapshot {
     let links = solver.links().len();
     let relit = solver.relight(appearances, &Cancel::default()).unwrap();
@@ -193,8 +191,8 @@ fn light_is_in_proportion_to_all_emission() {
         let shot = rays(&mut solver);
         let before = radiance(&solver.snapshot());
         for factor in [1e-3, 0.3, 2.0, 1e4] {
-            let wished = with_emission(&scene, |_| Vec3::splat(factor));
-            let found = radiance(&relit(&mut solver, &wished));
+            let requested = with_emission(&scene, |_| Vec3::splat(factor));
+            let found = radiance(&relit(&mut solver, &requested));
             let expected: Vec<Vec3> = before.iter().map(|light| *light * factor).collect();
             let error = difference(&found, &expected);
             assert!(error < 1e-4, "{direct:?}, factor {factor}: {error}");
@@ -207,7 +205,7 @@ fn light_is_in_proportion_to_all_emission() {
 fn two_lamps_together_are_the_sum_of_each() {
     let scene = two_lamps();
     let mut solver = solved(&scene, settings());
-    let mut of = |wished: &[Appearance]| relit(&mut solver, wished).light.irradiance.clone();
+    let mut of = |requested: &[Appearance]| relit(&mut solver, requested).light.irradiance.clone();
     let only = |kept: &str| {
         let kept = kept.to_owned();
         with_emission(&scene, move |name| {
@@ -272,10 +270,10 @@ fn relit_is_as_a_fresh_solve_within_the_error_of_either() {
         with_reflectance(&scene, "red", Vec3::ZERO),
     ];
     let settings = SolveSettings::draft();
-    for (index, wished) in changes.iter().enumerate() {
+    for (index, requested) in changes.iter().enumerate() {
         let mut solver = solved(&scene, settings.clone());
-        let found = mean_irradiance(&relit(&mut solver, wished));
-        let fresh = solved(&Arc::new(scene.relit(wished)), settings.clone());
+        let found = mean_irradiance(&relit(&mut solver, requested));
+        let fresh = solved(&Arc::new(scene.relit(requested)), settings.clone());
         let expected = mean_irradiance(&fresh.snapshot());
         let error = (found / expected - 1.0).abs().max_element();
         // The energy of a draft is within 3 %.
@@ -325,7 +323,7 @@ fn reflectance_is_black_or_ends_at_the_clamp() {
 #[test]
 fn the_same_bits_on_any_number_of_threads() {
     let scene = two_lamps();
-    let wished = [
+    let requested = [
         with_emission(&scene, |name| {
             Vec3::splat(if name == "warm" { 0.2 } else { 1.0 })
         }),
@@ -335,9 +333,9 @@ fn the_same_bits_on_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.unwrap().install(|| {
             let mut solver = solved(&scene, settings());
-            wished
+            requested
                 .each_ref()
-                .map(|wished| relit(&mut solver, wished).light.irradiance.clone())
+                .map(|requested| relit(&mut solver, requested).light.irradiance.clone())
         })
     };
     assert_eq!(light(1), light(4));
@@ -346,7 +344,7 @@ fn the_same_bits_on_any_number_of_threads() {
 #[test]
 fn before_the_first_step_only_direct_light_changes() {
     let scene = cornell();
-    let mut solver = Solver::new(scene.clone(), settings(), None, &Cancel::default()).unwrap();
+    let mut solver = prepare(&scene, settings());
     let before = radiance(&solver.snapshot());
     let found = radiance(&relit(
         &mut solver,
@@ -354,7 +352,7 @@ fn before_the_first_step_only_direct_light_changes() {
     ));
     let expected: Vec<Vec3> = before.iter().map(|light| *light * 2.0).collect();
     assert!(difference(&found, &expected) < 1e-5);
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    step_to_end(&mut solver, |_, _| {});
     let mean = mean_irradiance(&solver.snapshot());
     let fresh = mean_irradiance(&solved(&scene, settings()).snapshot());
     assert!(
@@ -367,30 +365,30 @@ fn before_the_first_step_only_direct_light_changes() {
 fn what_is_cancelled_can_be_asked_again() {
     let scene = two_lamps();
     let mut solver = solved(&scene, settings());
-    let wished = with_emission(&scene, |name| {
+    let requested = with_emission(&scene, |name| {
         Vec3::splat(if name == "warm" { 0.2 } else { 1.0 })
     });
     let cancelled = Cancel::default();
     cancelled.cancel();
     let before = solver.snapshot().light.clone();
-    assert!(solver.relight(&wished, &cancelled).is_none());
+    assert!(solver.relight(&requested, &cancelled).is_none());
     assert_eq!(*solver.snapshot().light, *before);
-    let found = relit(&mut solver, &wished).light.irradiance.clone();
+    let found = relit(&mut solver, &requested).light.irradiance.clone();
     let mut other = solved(&scene, settings());
-    assert_eq!(found, relit(&mut other, &wished).light.irradiance);
+    assert_eq!(found, relit(&mut other, &requested).light.irradiance);
 }
 
 #[test]
-fn what_is_shown_in_haste_is_nearly_what_is_shown_after() {
+fn the_preview_is_nearly_the_refined_light() {
     let scene = two_lamps();
     let mut solver = solved(&scene, settings());
-    for wished in [
+    for requested in [
         with_reflectance(&scene, "white", Vec3::splat(0.3)),
         with_emission(&scene, |name| {
             Vec3::splat(f32::from(u8::from(name == "warm")))
         }),
     ] {
-        let relit = solver.relight(&wished, &Cancel::default()).unwrap();
+        let relit = solver.relight(&requested, &Cancel::default()).unwrap();
         assert!(relit.is_rough);
         let rough = solver.snapshot();
         solver.finish_relighting(&Cancel::default()).unwrap();

@@ -11,17 +11,15 @@ use glam::{DVec3, Vec2, Vec3};
 use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
-    export::{ColorOptions, ToneMap as ExportToneMap},
+    export::{ColorOptions, ToneMap},
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides, builtin::find_builtin},
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
         cluster_lines,
-        render::{
-            Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
-            headless::{self, HeadlessError, HeadlessPicture, Subject},
-        },
-        view::{ClusterOverlay, ToneMap, ViewMode, ViewSettings},
+        headless::{self, HeadlessError, HeadlessPicture, Subject},
+        render::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target},
+        view::{ClusterOverlay, ViewMode, ViewSettings},
     },
 };
 
@@ -45,11 +43,11 @@ fn scene() -> Arc<Scene> {
         }
     }
     // Both copies of a two-sided face would be needed.
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).expect("two walls"))
+    Arc::new(
+        builder
+            .finish(&SceneOptions::with_sides(Sides::One))
+            .expect("two walls"),
+    )
 }
 
 /// The scene's own triangles under even light.
@@ -127,15 +125,15 @@ fn light_has_the_colours_of_the_exported_vertices() {
     let snapshot = snapshot(&scene, irradiance);
     let reflectance = Vec3::new(0.8, 0.1, 0.1);
     let radiance = reflectance * irradiance / std::f32::consts::PI;
-    for (exposure, tone_map, export_tone_map) in [
-        (0.0, ToneMap::None, ExportToneMap::None),
-        (0.0, ToneMap::Neutral, ExportToneMap::Neutral),
-        (2.5, ToneMap::Neutral, ExportToneMap::Neutral),
-        (-3.0, ToneMap::None, ExportToneMap::None),
+    for (exposure, tone_map) in [
+        (0.0, ToneMap::None),
+        (0.0, ToneMap::Neutral),
+        (2.5, ToneMap::Neutral),
+        (-3.0, ToneMap::None),
     ] {
         let export = ColorOptions {
             exposure_ev: exposure,
-            tone_map: export_tone_map,
+            tone_map,
         };
         let mut view = plain(ViewMode::Radiance);
         view.exposure = exposure;
@@ -155,7 +153,7 @@ fn light_modes_show_what_they_say() {
     let snapshot = snapshot(&scene, irradiance);
     let plain_color = ColorOptions {
         exposure_ev: 0.0,
-        tone_map: ExportToneMap::None,
+        tone_map: ToneMap::None,
     };
     let reflectance = Vec3::new(0.8, 0.1, 0.1);
     let over_pi = 1.0 / std::f32::consts::PI;
@@ -411,13 +409,13 @@ fn measured_errors_are_shown_where_they_are_known() {
         said.expect("a small mesh");
         pictures.push(left(&picture.expect("read back")));
     }
-    let [unknown, none, much, beyond] = pictures[..] else {
+    let [unknown, none, much, excess] = pictures[..] else {
         panic!("four pictures")
     };
     assert!(unknown[0] > 2 * unknown[1], "the red wall: {unknown:?}");
     assert!(none[2] > none[1], "the low end is blue: {none:?}");
     assert!(much[0] > 2 * much[2], "the high end is red: {much:?}");
-    assert_eq!(beyond, [255; 3]);
+    assert_eq!(excess, [255; 3]);
 }
 
 #[test]
@@ -445,7 +443,7 @@ fn emission_scales_light_and_false_colours_alike() {
 }
 
 #[test]
-fn a_mesh_beyond_the_largest_buffer_is_one_sentence() {
+fn a_mesh_above_the_largest_buffer_is_one_sentence() {
     let Some(gpu) = gpu() else { return };
     let scene = scene();
     let snapshot = snapshot(&scene, Vec3::ONE);

@@ -2,12 +2,16 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{f64::consts::TAU, sync::Arc};
 
 use glam::{DVec3, Vec3};
 use vecrad::{
-    scene::{Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, TriangleId},
-    solver::{Cancel, Snapshot, SolveSettings, Solver},
+    geometry::centroid,
+    hierarchy::{Hierarchy, Patch},
+    scene::{Material, MaterialId, Scene, SceneBuilder, Sides, TriangleId},
+    solver::{Snapshot, SolveSettings},
 };
 
 const COLUMN_RADIUS: f64 = 0.4;
@@ -91,11 +95,7 @@ fn hall(turned: usize, sides: Sides) -> Arc<Scene> {
             DVec3::new(x + COLUMN_RADIUS * sin, 4.0 * v, z + COLUMN_RADIUS * cos)
         });
     }
-    let options = SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    };
-    Arc::new(builder.finish(&options).unwrap())
+    common::finish(builder, sides)
 }
 
 fn solve(scene: &Arc<Scene>) -> Snapshot {
@@ -103,9 +103,7 @@ fn solve(scene: &Arc<Scene>) -> Snapshot {
         max_steps: 3,
         ..SolveSettings::draft()
     };
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver.snapshot()
+    common::solve(scene, settings).0.snapshot()
 }
 
 /// Mean irradiance over what is seen in the hall of a material, and over what is within columns.
@@ -159,6 +157,42 @@ fn columns_without_a_core_take_no_light_out_of_a_hall() {
                 (ratio - 1.0).abs() < 0.035 && behind < 0.03 * seen,
                 "{material} {sides:?} {turned}: {ratio} of {seen}, {behind} behind"
             );
+        }
+    }
+}
+
+/// A point of a tube of radius 1 and height 6.
+fn on_tube(u: f64, v: f64) -> DVec3 {
+    let (sin, cos) = (u * TAU).sin_cos();
+    DVec3::new(cos, 6.0 * v, sin)
+}
+
+#[test]
+fn no_cluster_but_the_root_holds_the_inside_and_the_outside_of_a_tube_however_it_is_wound() {
+    for turned in [2, 3, 1000] {
+        // A floor that sees the outside and no more, and shares no edge with it.
+        let mut builder = SceneBuilder::default();
+        let grey = builder.push_material(Material::plain("grey", Vec3::splat(0.5), Vec3::ONE));
+        sheet(&mut builder, grey, [12, 6], turned, on_tube);
+        sheet(&mut builder, grey, [1, 1], turned, |u, v| {
+            DVec3::new(2.0 + 8.0 * u, 0.0, 8.0 * v)
+        });
+        let scene = common::finish(builder, Sides::Two);
+        let hierarchy = Hierarchy::new(&scene, 40.0);
+        let is_outside = |patch: &Patch| {
+            let centre = centroid(scene.corners(patch.triangle));
+            let world = scene.frame.to_world(centre);
+            let normal = patch.normal.as_dvec3();
+            (world.x.hypot(world.z) < 1.01)
+                .then(|| DVec3::new(world.x, 0.0, world.z).dot(normal) > 0.0)
+        };
+        let is_up = |patch: &Patch| (is_outside(patch).is_none()).then_some(patch.normal.y > 0.5);
+        for cluster in &hierarchy.clusters[1..] {
+            let patches = &hierarchy.patches[cluster.patches()];
+            let sides: Vec<bool> = patches.iter().filter_map(is_outside).collect();
+            let floor = patches.iter().filter_map(is_up);
+            let all: Vec<bool> = sides.into_iter().chain(floor).collect();
+            assert!(all.iter().all(|side| *side == all[0]), "{turned}: {all:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The stability suite without its slow cases: every group, each case by the same code as `vecrad report`.
 
 use vecrad::{
-    metrics::stability::{Case, Group, Outcome, stability_cases, stability_markdown},
+    experiments::stability::{Case, Group, Outcome, stability_cases, stability_markdown},
     solver::Cancel,
 };
 

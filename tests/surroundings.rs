@@ -1,11 +1,13 @@
-//! What is far larger or smaller than the rest of a scene must not spoil the light of the rest: a huge ground, a sky of
+//! Objects far larger or smaller than the rest of a scene must not spoil the light of the rest: a huge ground, a sky of
 //! emitting faces, a tiny lamp, long thin faces.
 
 mod boxes;
+mod common;
 
 use std::f64::consts::PI;
 
 use boxes::{cuboid, irradiance_at, mean_irradiance, rectangle, solved};
+use common::assert_close;
 use glam::{DVec3, Vec3};
 use vecrad::{
     scene::{Material, MaterialId, SceneBuilder, Sides},
@@ -56,10 +58,7 @@ fn a_ground_however_large_is_lit_below_a_lamp_as_a_small_one_is() {
         let snapshot = solved(builder, Sides::Auto, SolveSettings::draft());
         let found = f64::from(irradiance_at(&snapshot, Vec3::new(3.0, 0.0, 0.0), Vec3::Z));
         let expected = 100.0 * PI * 4.0 * above_corner(0.5, 0.5, 2.0);
-        assert!(
-            (found / expected - 1.0).abs() < 0.02,
-            "{extent}: {found}, not {expected}"
-        );
+        assert_close(found, expected, 0.02, format_args!("{extent}"));
     }
 }
 
@@ -75,13 +74,9 @@ fn a_tiny_lamp_lights_a_huge_ground() {
         square(&mut builder, DVec3::Z, 0.5 * lamp_side, false, lamp);
         let snapshot = solved(builder, Sides::Auto, SolveSettings::default());
         let below = irradiance_at(&snapshot, Vec3::ZERO, Vec3::Z);
-        assert!((below - 1.0).abs() < 0.01, "{lamp_side}: {below}");
+        assert_close(below, 1.0, 0.01, format_args!("{lamp_side}"));
         let (mean, area, _) = mean_irradiance(&snapshot, |at, normal| at.z < 0.5 && normal.z > 0.9);
-        assert!(
-            (mean * area / PI - 1.0).abs() < 0.02,
-            "{lamp_side}: {}",
-            mean * area
-        );
+        assert_close(mean * area, PI, 0.02, format_args!("{lamp_side}"));
     }
 }
 
@@ -136,10 +131,7 @@ fn light_along_a_plank_is_not_drawn_straight_from_end_to_end() {
         let is_floor = |at: Vec3, normal: Vec3| at.z.abs() < 1e-3 && normal.z > 0.9;
         let (mean, ..) = mean_irradiance(&snapshot, is_floor);
         let expected = floor_mean(length, 4.0, 2.9);
-        assert!(
-            (mean / expected - 1.0).abs() < 0.01,
-            "{count}: {mean}, not {expected}"
-        );
+        assert_close(mean, expected, 0.01, format_args!("{count}"));
     }
 }
 

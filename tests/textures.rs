@@ -2,12 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::{fs, path::Path, sync::Arc};
 
+use common::solve;
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
     scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_obj, write_builtin},
-    solver::{Cancel, LeftOut, Snapshot, SolveSettings, Solver},
+    solver::{Cancel, LeftOut, Snapshot, SolveSettings},
 };
 
 /// A triangle whose material names a picture.
@@ -91,7 +94,7 @@ fn pictures_beside_the_scene_are_read_whatever_their_ending() {
     ] {
         let scene = read(folder, picture);
         assert_eq!(
-            scene.spared.constant_textures, 1,
+            scene.omitted_textures.constant_textures, 1,
             "{picture}: {:?}",
             scene.warnings
         );
@@ -138,7 +141,7 @@ fn pictures_that_promise_too_much_are_refused_before_memory_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (name, bytes) in [
-        // A thousand million pixels: beyond the longest side.
+        // A thousand million pixels: above the longest side.
         ("huge.png", png_header(100_000, 10_000)),
         ("most.png", png_header(u32::MAX >> 1, u32::MAX >> 1)),
         ("huge.bmp", bmp_header(30_000, 30_000)),
@@ -184,7 +187,10 @@ fn nothing_outside_the_folder_and_no_device_is_read() {
     for picture in ["pipe.png", "zero.png", "loop.png"] {
         assert_refused(&folder, picture, "was not found");
     }
-    assert_eq!(read(&folder, "good.png").spared.constant_textures, 1);
+    assert_eq!(
+        read(&folder, "good.png").omitted_textures.constant_textures,
+        1
+    );
     // The same holds for material files.
     let mtl = "newmtl m\nKd 0.1\n";
     fs::write(outer.path().join("secret.mtl"), mtl).unwrap();
@@ -220,10 +226,7 @@ fn read_square(folder: &Path, texcoords: &[[f64; 2]], faces: [[usize; 3]; 2]) ->
 }
 
 fn lit(scene: &Arc<Scene>) -> Snapshot {
-    let settings = SolveSettings::draft();
-    let mut solver = Solver::new(scene.clone(), settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
-    solver.snapshot()
+    solve(scene, SolveSettings::draft()).0.snapshot()
 }
 
 /// Texture coordinates of a point of a triangle.
@@ -316,18 +319,15 @@ fn coordinates_far_from_the_origin_keep_their_digits_and_their_neighbours() {
         (one[2] - one[0], one[1] - one[0]),
         (Vec2::splat(0.5), Vec2::new(0.5, 0.0))
     );
-    // Whole periods may be left out, parts of one may not.
+    // Whole periods may be omitted, parts of one may not.
     assert_eq!(one[0] - one[0].floor(), Vec2::new(0.75, 0.125));
     assert!(lit(&scene).mesh.repeated.is_empty());
 }
 
-/// Names and counts of what is left out.
-fn left_out(scene: &Scene) -> Vec<(&'static str, u64)> {
-    let left_out = LeftOut::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
-    left_out
-        .iter()
-        .map(|left| (left.name, left.count))
-        .collect()
+/// Names and counts of what is omitted.
+fn omissions(scene: &Scene) -> Vec<(&'static str, u64)> {
+    let omitted = LeftOut::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
+    omitted.iter().map(|left| (left.name, left.count)).collect()
 }
 
 #[test]
@@ -355,12 +355,12 @@ fn a_picture_of_one_colour_costs_nothing() {
             scene.materials[0].reflectance,
             scene.surfaces[0].reflectance
         );
-        assert!(left_out(scene).contains(&("constant-textures", 1)));
+        assert!(omissions(scene).contains(&("constant-textures", 1)));
     }
     assert_eq!(large.surfaces, small.surfaces, "whatever the size");
     assert_eq!((spotted.textures.len(), spotted.texcoords.len()), (1, 1));
     assert!(
-        left_out(&spotted)
+        omissions(&spotted)
             .iter()
             .all(|left| left.0 != "constant-textures")
     );
@@ -391,11 +391,11 @@ fn pictures_that_no_face_shows_are_not_read() {
         warnings.filter(missing).count()
     };
     assert_eq!(said(&scene), 0, "{:?}", scene.warnings);
-    assert_eq!(scene.spared.unused_textures, 3);
-    assert!(left_out(&scene).contains(&("unused-textures", 3)));
+    assert_eq!(scene.omitted_textures.unused_textures, 3);
+    assert!(omissions(&scene).contains(&("unused-textures", 3)));
     assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.25));
     // Once a face shows them, they are read.
     let scene = read("vt 0 0\nvt 1 0\nvt 0 1\nusemtl flat\nf 1/1 2/2 3/3");
     assert_eq!(said(&scene), 2, "{:?}", scene.warnings);
-    assert_eq!(scene.spared.unused_textures, 0);
+    assert_eq!(scene.omitted_textures.unused_textures, 0);
 }

@@ -21,12 +21,12 @@ use vecrad::{
         app::App,
         loader::SceneSource,
         messages::Severity,
-        state::RunStatus,
+        run::RunStatus,
         view::{ClusterCut, ClusterRequest, LinkEnd, ViewMode, ViewRequest},
     },
     worker::{Effect, StopReason},
 };
-use windows::{perform, plates, wait_for, window};
+use windows::{ONE_TRIANGLE, perform, plates, wait_for, window};
 
 /// A window that has lit the box, with the middle of its back wall picked.
 fn picked_in_the_box() -> Harness<'static, App> {
@@ -151,7 +151,7 @@ fn light_that_is_finer_than_asked_for_says_so_where_the_run_is_shown() {
         before,
         "nothing moves"
     );
-    // What it says can be done.
+    // The offered actions can be done.
     perform(&mut harness, Action::Reset);
     wait_for(&mut harness, |app| {
         // The light before was a quarter of that.
@@ -610,13 +610,11 @@ fn shown_file(harness: &Harness<'static, App>) -> Option<PathBuf> {
     Some(loaded.source.path()?.to_owned())
 }
 
-const LAMP: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-
 #[test]
 fn a_dropped_scene_is_opened() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let (scene, picture) = (folder.path().join("a.OBJ"), folder.path().join("a.png"));
-    fs::write(&scene, LAMP).expect("it can be written");
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
     fs::write(&picture, [137, 80, 78, 71, 13, 10, 26, 10, 0, 0]).expect("it can be written");
     let mut harness = window(Options::default());
     harness.run_steps(2);
@@ -640,7 +638,7 @@ fn among_several_dropped_files_the_scene_is_found() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let at = |name: &str| folder.path().join(name);
     for name in ["a.mtl", "b.obj", "c.obj"] {
-        fs::write(at(name), LAMP).expect("it can be written");
+        fs::write(at(name), ONE_TRIANGLE).expect("it can be written");
     }
     let mut harness = window(Options::default());
     drop_files(&mut harness, &[&at("a.mtl"), &at("b.obj"), &at("c.obj")]);
@@ -657,7 +655,7 @@ fn a_dropped_folder_is_opened_where_it_holds_one_scene() {
     for (count, sentence) in [(0, "no OBJ file"), (1, ""), (2, "several OBJ files")] {
         if count > 0 {
             let path = folder.path().join(format!("{count}.obj"));
-            fs::write(path, LAMP).expect("it can be written");
+            fs::write(path, ONE_TRIANGLE).expect("it can be written");
         }
         drop_files(&mut harness, &[folder.path()]);
         let (severity, text) = last_message(&harness);
@@ -690,7 +688,7 @@ fn files_held_over_the_window_are_told_what_will_happen() {
 fn the_command_line_goes_before_the_sidecar() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let scene = folder.path().join("a.obj");
-    fs::write(&scene, LAMP).expect("it can be written");
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
     let sidecar = "[view]\nmode = \"normals\"\nedges = true\nexposure = 3.0\nauto_exposure = false\n[settings]\nseed = 77\n";
     fs::write(folder.path().join("a.obj.vecrad.toml"), sidecar).expect("it can be written");
     let open = |view: ViewRequest, settings_are_asked_for| {

@@ -16,6 +16,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use vecrad::{
+    export::ToneMap,
     scene::{SceneOptions, Sides},
     solver::SolveSettings,
     viewer::{
@@ -23,17 +24,17 @@ use vecrad::{
         action::Action,
         app::App,
         camera::AxisView,
+        faults::Faults,
+        figures::figure,
         loader::SceneSource,
         messages::Severity,
-        panels::figure,
-        start::Faults,
-        state::RunStatus,
-        view::{ToneMap, ViewMode, ViewRequest},
+        run::RunStatus,
+        view::{ViewMode, ViewRequest},
     },
 };
-use windows::{perform, plates, wait_for, window};
+use windows::{ONE_TRIANGLE, one_triangle, perform, plates, wait_for, window};
 
-/// What eframe keeps in a file.
+/// The storage that eframe has in a file.
 #[derive(Default)]
 struct Kept(Mutex<HashMap<String, String>>);
 
@@ -68,7 +69,7 @@ fn window_with(kept: Kept, options: Options) -> Harness<'static, App> {
         })
 }
 
-/// What a window leaves behind.
+/// The storage after a window was closed.
 fn kept_by(harness: &mut Harness<'static, App>) -> Kept {
     let mut kept = Kept::default();
     eframe::App::save(harness.state_mut(), &mut kept);
@@ -248,15 +249,7 @@ fn light_of_a_grey_scene_is_one_figure() {
 
 #[test]
 fn a_scene_without_emitters_has_nothing_to_scale() {
-    let folder = tempfile::tempdir().expect("a folder can be made");
-    let scene = folder.path().join("dark.obj");
-    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
-    let mut harness = window(Options {
-        source: Some(SceneSource::File(scene)),
-        settings: SolveSettings::draft(),
-        ..Options::default()
-    });
-    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    let (_folder, harness) = one_triangle("dark.obj");
     for label in ["Emission scale", "Rays per vertex"] {
         assert!(
             // A figure of the progress has the same name.
@@ -400,7 +393,7 @@ fn enter_confirms_a_dialog_and_leaves_the_camera() {
 fn a_typed_path_is_asked_for_again_until_it_can_be_read() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let scene = folder.path().join("lamp.obj");
-    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
     let mut harness = plates();
     harness.state_mut().state.panels.path_text = "/an/older/path.obj".to_owned();
     harness.get_by_label("File").click();
@@ -503,17 +496,14 @@ fn target_is_lit(app: &App) -> bool {
 }
 
 #[test]
-fn a_wall_that_is_painted_lights_what_was_left_out() {
+fn a_wall_that_is_painted_lights_what_was_omitted() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in LAMP_WALL_AND_TARGET {
         fs::write(folder.path().join(name), text).unwrap();
     }
     let mut harness = window(Options {
         source: Some(SceneSource::File(folder.path().join("scene.obj"))),
-        scene_options: SceneOptions {
-            sides: Sides::One,
-            ..SceneOptions::default()
-        },
+        scene_options: SceneOptions::with_sides(Sides::One),
         settings: SolveSettings::draft(),
         ..Options::default()
     });

@@ -18,15 +18,15 @@ use vecrad::{
         Options,
         action::{Action, Scale},
         app::App,
+        faults::Faults,
+        headless,
         loader::SceneSource,
         messages::Severity,
-        render::headless,
-        start::Faults,
-        state::RunStatus,
+        run::RunStatus,
         view::ViewMode,
     },
 };
-use windows::{perform, plates, plates_of_size, wait_for, window};
+use windows::{one_triangle, perform, plates, plates_of_size, wait_for, window};
 
 fn press(harness: &mut Harness<'static, App>, key: Key) {
     harness.key_press(key);
@@ -266,15 +266,7 @@ fn a_colour_is_picked_without_a_missing_glyph() {
 
 #[test]
 fn pictures_are_saved_beside_the_scene() {
-    let folder = tempfile::tempdir().expect("a folder can be made");
-    let scene = folder.path().join("Hall.obj");
-    fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("it can be written");
-    let mut harness = window(Options {
-        source: Some(SceneSource::File(scene)),
-        settings: SolveSettings::draft(),
-        ..Options::default()
-    });
-    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    let (folder, mut harness) = one_triangle("Hall.obj");
     perform(&mut harness, Action::PictureDialog);
     let path = &harness.state().state.panels.picture_text;
     assert_eq!(Path::new(path), folder.path().join("Hall_1.png"));
@@ -387,7 +379,7 @@ fn exposure(harness: &Harness<'static, App>) -> f32 {
 }
 
 /// Frames until the exposure has followed what is shown.
-fn settle(harness: &mut Harness<'static, App>) {
+fn wait_until_steady(harness: &mut Harness<'static, App>) {
     wait_for(harness, |app| {
         let (state, staged) = (&app.state, app.state.staged.as_ref());
         let shown = staged.map(|staged| &staged.wanted.snapshot);
@@ -405,8 +397,8 @@ fn the_exposure_is_there_at_once_and_follows_large_moves_only() {
         return;
     };
     wait_for(&mut harness, |app| app.state.exposure.target.is_some());
-    settle(&mut harness);
-    let settled = exposure(&harness);
+    wait_until_steady(&mut harness);
+    let steady = exposure(&harness);
     // Looking around a little changes nothing.
     harness
         .state_mut()
@@ -415,12 +407,12 @@ fn the_exposure_is_there_at_once_and_follows_large_moves_only() {
         .target
         .orbit(glam::Vec2::new(10.0, 6.0));
     harness.run_steps(60);
-    assert_eq!(exposure(&harness), settled);
+    assert_eq!(exposure(&harness), steady);
     // Close to the lamp there is little else to see; the way to its exposure is a glide.
     let state = &mut harness.state_mut().state;
     state.rig.target.distance *= 0.2;
     state.rig.target.pivot.y += 50.0;
-    let (mut before, mut steps) = (settled, 0);
+    let (mut before, mut steps) = (steady, 0);
     for _ in 0..200 {
         harness.step();
         let now = exposure(&harness);
@@ -429,7 +421,7 @@ fn the_exposure_is_there_at_once_and_follows_large_moves_only() {
         before = now;
     }
     assert!(steps > 3, "{steps} frames of a glide");
-    assert_ne!(exposure(&harness), settled);
+    assert_ne!(exposure(&harness), steady);
 }
 
 #[test]
@@ -437,8 +429,8 @@ fn a_hand_on_the_exposure_and_changed_lamps_keep_it() {
     let Some(mut harness) = drawing_window("plates") else {
         return;
     };
-    settle(&mut harness);
-    let settled = exposure(&harness);
+    wait_until_steady(&mut harness);
+    let steady = exposure(&harness);
     let mut materials = harness.state().state.materials.clone();
     let lamp = materials.lights().next().expect("a plate emits");
     if let Some(light) = &mut materials.now[lamp].light {
@@ -447,11 +439,11 @@ fn a_hand_on_the_exposure_and_changed_lamps_keep_it() {
     perform(&mut harness, Action::Relight(materials));
     wait_for(&mut harness, |app| app.state.run.relit_secs.is_some());
     harness.run_steps(60);
-    assert_eq!(exposure(&harness), settled, "what is dimmed is darker");
+    assert_eq!(exposure(&harness), steady, "what is dimmed is darker");
     perform(&mut harness, Action::ExposureBy(1.0));
     harness.run_steps(30);
-    assert_eq!(exposure(&harness), settled + 1.0);
+    assert_eq!(exposure(&harness), steady + 1.0);
     perform(&mut harness, Action::AutoExposure);
     harness.run_steps(120);
-    assert_eq!(exposure(&harness), settled);
+    assert_eq!(exposure(&harness), steady);
 }

@@ -36,11 +36,9 @@ fn half_hidden() -> Scene {
     square([1.0, -0.5], [2.0, 0.5], 0.0, true);
     square([0.3, -1.0], [1.2, 1.0], 5.0, true);
     square([-0.05, -0.05], [0.05, 0.05], 10.0, false);
-    let options = SceneOptions {
-        sides: Sides::One,
-        ..SceneOptions::default()
-    };
-    builder.finish(&options).expect("the squares are usable")
+    builder
+        .finish(&SceneOptions::with_sides(Sides::One))
+        .expect("the squares are usable")
 }
 
 /// Visible parts of the light and of the area of both squares, whose radiosity is given by whether they are the left one:

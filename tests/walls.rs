@@ -1,8 +1,10 @@
 //! Closed rooms of sheets in bright surroundings: inside it is dark, however the sheets meet.
 
 mod boxes;
+mod common;
 
 use boxes::{cuboid, mean_irradiance, rectangle, solved};
+use common::assert_close;
 use glam::{DQuat, DVec3, Vec3};
 use vecrad::{
     scene::{Material, MaterialId, SceneBuilder, Sides},
@@ -63,7 +65,7 @@ fn light_of(builder: SceneBuilder, turn: DQuat) -> (f64, f64) {
     };
     let (inside, area, _) = mean_irradiance(&snapshot, is_inside);
     let walls = 2.0 * (ROOM.x * ROOM.y + ROOM.y * ROOM.z + ROOM.z * ROOM.x);
-    assert!((area / walls - 1.0).abs() < 1e-3, "{area} of {walls}");
+    assert_close(area, walls, 1e-3, "area");
     let (outside, ..) = mean_irradiance(&snapshot, |at, normal| !is_inside(at, normal));
     (inside, outside)
 }

@@ -28,7 +28,7 @@ const FOREVER: Duration = Duration::from_secs(600);
 /// The node that the fake solver knows of.
 const NODE: Subject = Subject::Cluster(NodeId(0));
 
-/// What the fake solver does, and what it was seen doing.
+/// Script of the fake solver, and a record of its calls.
 #[derive(Default)]
 struct Script {
     /// Time that a step takes unless cancelled.
@@ -51,7 +51,7 @@ struct Script {
     dropped: AtomicU32,
     /// Time that changing the light takes, whether cancelled or not.
     relight_time: Duration,
-    /// Emission that was wished for, each time that the light began to change.
+    /// Emission that was requested, each time that the light began to change.
     relit: Mutex<Vec<f32>>,
     /// How often a rough light was worked out.
     finished: AtomicU32,
@@ -113,7 +113,11 @@ impl Stepper for FakeSolver {
     }
 
     fn relight(&mut self, appearances: &[Appearance], _: &Cancel) -> Option<Relit> {
-        self.script.relit.lock().unwrap().push(wish_in(appearances));
+        self.script
+            .relit
+            .lock()
+            .unwrap()
+            .push(emission_of(appearances));
         thread::sleep(self.script.relight_time);
         Some(Relit {
             report: StepReport {
@@ -121,7 +125,7 @@ impl Stepper for FakeSolver {
                 ..StepReport::default()
             },
             is_rough: true,
-            is_outgrown: false,
+            needs_restart: false,
         })
     }
 
@@ -134,16 +138,16 @@ impl Stepper for FakeSolver {
     }
 }
 
-/// An emission as a wish.
-fn wish(emission: f32) -> Arc<[Appearance]> {
+/// Appearances with this emission.
+fn appearances(emission: f32) -> Arc<[Appearance]> {
     Arc::new([Appearance {
         reflectance: Vec3::splat(0.5),
         emission: Vec3::splat(emission),
     }])
 }
 
-/// The emission in a wish.
-fn wish_in(appearances: &[Appearance]) -> f32 {
+/// The emission of appearances.
+fn emission_of(appearances: &[Appearance]) -> f32 {
     appearances[0].emission.x
 }
 
@@ -157,7 +161,7 @@ fn worker(script: &Arc<Script>) -> WorkerHandle {
     let script = script.clone();
     let make = move |job: Job, _: &Cancel| {
         script.made.fetch_add(1, Ordering::SeqCst);
-        let made_for = job.appearances.as_deref().map(wish_in);
+        let made_for = job.appearances.as_deref().map(emission_of);
         script.made_for.lock().unwrap().push(made_for);
         Some(Box::new(FakeSolver {
             script: script.clone(),
@@ -416,34 +420,57 @@ impl Stubborn {
 
 #[test]
 fn a_new_run_does_not_wait_for_what_cannot_be_interrupted() {
-    let mut held = stubborn(1);
-    held.worker.start(triangle(), short(), one_thread());
-    held.wait_for_begun(1);
-    held.worker.start(triangle(), short(), one_thread());
+    let mut stubborn_worker = stubborn(1);
+    stubborn_worker
+        .worker
+        .start(triangle(), short(), one_thread());
+    stubborn_worker.wait_for_begun(1);
+    stubborn_worker
+        .worker
+        .start(triangle(), short(), one_thread());
     // The first is still being prepared.
-    let events = wait_for(&held.worker, is_finished);
+    let events = wait_for(&stubborn_worker.worker, is_finished);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Converged)));
-    held.release();
-    wait_for_drops(&held.script, 1);
-    assert!(held.worker.next_event(Duration::from_millis(60)).is_none());
-    assert_eq!(held.worker.latest().map(|snapshot| snapshot.step), Some(1));
+    stubborn_worker.release();
+    wait_for_drops(&stubborn_worker.script, 1);
+    assert!(
+        stubborn_worker
+            .worker
+            .next_event(Duration::from_millis(60))
+            .is_none()
+    );
+    assert_eq!(
+        stubborn_worker
+            .worker
+            .latest()
+            .map(|snapshot| snapshot.step),
+        Some(1)
+    );
 }
 
 #[test]
 fn only_so_many_are_left_behind() {
-    let mut held = stubborn(9);
+    let mut stubborn_worker = stubborn(9);
     for count in 1..=3 {
-        held.worker.start(triangle(), short(), one_thread());
-        held.wait_for_begun(count);
+        stubborn_worker
+            .worker
+            .start(triangle(), short(), one_thread());
+        stubborn_worker.wait_for_begun(count);
     }
-    held.worker.start(triangle(), short(), one_thread());
+    stubborn_worker
+        .worker
+        .start(triangle(), short(), one_thread());
     thread::sleep(Duration::from_millis(300));
-    assert_eq!(held.begun.load(Ordering::SeqCst), 3, "the fourth waits");
-    held.release();
-    let events = wait_for(&held.worker, is_finished);
+    assert_eq!(
+        stubborn_worker.begun.load(Ordering::SeqCst),
+        3,
+        "the fourth waits"
+    );
+    stubborn_worker.release();
+    let events = wait_for(&stubborn_worker.worker, is_finished);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Converged)));
-    wait_for_drops(&held.script, 3);
-    assert_eq!(held.begun.load(Ordering::SeqCst), 4);
+    wait_for_drops(&stubborn_worker.script, 3);
+    assert_eq!(stubborn_worker.begun.load(Ordering::SeqCst), 4);
 }
 
 #[test]
@@ -778,13 +805,13 @@ fn is_relit(event: &Event) -> bool {
     matches!(event, Event::Relit { .. })
 }
 
-/// The light is changed and all that it left out is worked out.
+/// The light is changed and all that it omitted is worked out.
 fn is_relit_finely(event: &Event) -> bool {
     matches!(event, Event::Relit { seconds: None, .. })
 }
 
 /// Wait until the light begins to change for the so-manieth time.
-fn wait_for_wishes(script: &Script, count: usize) {
+fn wait_for_requests(script: &Script, count: usize) {
     let begin = Instant::now();
     while script.relit.lock().unwrap().len() < count {
         assert!(begin.elapsed() < PATIENCE, "the light never changed");
@@ -793,7 +820,7 @@ fn wait_for_wishes(script: &Script, count: usize) {
 }
 
 #[test]
-fn of_many_wishes_for_light_only_the_last_is_done() {
+fn of_many_requests_for_light_only_the_last_is_done() {
     let script = Arc::new(Script {
         relight_time: Duration::from_millis(200),
         ..Script::default()
@@ -801,10 +828,10 @@ fn of_many_wishes_for_light_only_the_last_is_done() {
     let mut worker = worker(&script);
     worker.start(triangle(), short(), one_thread());
     wait_for(&worker, is_finished);
-    worker.relight(wish(1.0));
-    wait_for_wishes(&script, 1);
+    worker.relight(appearances(1.0));
+    wait_for_requests(&script, 1);
     for emission in [2.0, 3.0, 4.0] {
-        worker.relight(wish(emission));
+        worker.relight(appearances(emission));
     }
     wait_for(&worker, is_relit_finely);
     assert_eq!(*script.relit.lock().unwrap(), [1.0, 4.0]);
@@ -818,7 +845,7 @@ fn a_finished_run_rests_after_its_light_was_changed_and_can_go_on() {
     let mut worker = worker(&script);
     worker.start(triangle(), short(), one_thread());
     wait_for(&worker, is_finished);
-    worker.relight(wish(2.0));
+    worker.relight(appearances(2.0));
     let events = wait_for(&worker, |event| *event == Event::Paused);
     assert!(is_relit(&events[0]), "{events:?}");
     worker.resume();
@@ -829,7 +856,7 @@ fn a_finished_run_rests_after_its_light_was_changed_and_can_go_on() {
 #[test]
 fn light_is_changed_at_once_and_the_step_under_way_is_made_again() {
     let (script, worker) = within_a_step();
-    worker.relight(wish(2.0));
+    worker.relight(appearances(2.0));
     wait_for(&worker, is_relit);
     wait_for_steps(&script, 2);
     assert_eq!(script.cancelled.load(Ordering::SeqCst), 1);
@@ -843,7 +870,7 @@ fn changed_light_holds_for_a_new_start_on_the_same_scene_only() {
     let mut worker = worker(&script);
     worker.start(triangle(), short(), one_thread());
     wait_for(&worker, is_finished);
-    worker.relight(wish(2.0));
+    worker.relight(appearances(2.0));
     wait_for(&worker, is_relit);
     worker.reset();
     wait_for(&worker, is_finished);

@@ -4,9 +4,10 @@ use std::{fmt::Display, str::FromStr, time::Duration};
 
 use clap::{Args, ValueEnum};
 
+use super::values::name_of;
 use crate::{
-    export::{ColorOptions, MeshOptions, ToneMap, UpAxis},
-    scene::{SceneOptions, Sides},
+    export::{ColorOptions, MeshOptions, ToneMap},
+    scene::{SceneOptions, Sides, UpAxis},
     solver::{Direct, Keep, Method, Omission, Oracle, SolveSettings},
     worker::RunOptions,
 };
@@ -19,7 +20,7 @@ pub enum Preset {
     /// The default
     #[default]
     Normal,
-    /// For the result that is kept
+    /// For the final result
     Final,
 }
 
@@ -28,7 +29,7 @@ pub enum Preset {
 pub struct SceneFlags {
     /// Which sides of faces reflect and emit
     #[arg(long, value_enum, default_value = "auto", help_heading = "Scene")]
-    pub sides: SidesFlag,
+    pub sides: Sides,
     /// Maximum reflectance, 0 to 1
     #[arg(
         long,
@@ -52,7 +53,7 @@ pub struct SceneFlags {
         allow_hyphen_values = true,
         help_heading = "Scene"
     )]
-    pub up: UpFlag,
+    pub up: UpAxis,
 }
 
 impl SceneFlags {
@@ -60,11 +61,7 @@ impl SceneFlags {
     pub fn options(&self) -> SceneOptions {
         let default = SceneOptions::default();
         SceneOptions {
-            sides: match self.sides {
-                SidesFlag::Auto => Sides::Auto,
-                SidesFlag::One => Sides::One,
-                SidesFlag::Two => Sides::Two,
-            },
+            sides: self.sides,
             max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
             mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
         }
@@ -83,33 +80,33 @@ pub struct SettingFlags {
         value_enum,
         help = with_default_name(
             "How clusters store power and area",
-            |flag: &MethodFlag, normal| flag.method() == normal.method
+            |settings| settings.method
         ),
         help_heading = "Settings"
     )]
-    pub method: Option<MethodFlag>,
+    pub method: Option<Method>,
     /// How the error of a link is estimated
     #[arg(
         long,
         value_enum,
         help = with_default_name(
             "How the error of a link is estimated",
-            |flag: &OracleFlag, normal| flag.oracle() == normal.oracle
+            |settings| settings.oracle
         ),
         help_heading = "Settings"
     )]
-    pub oracle: Option<OracleFlag>,
+    pub oracle: Option<Oracle>,
     /// How direct light is computed
     #[arg(
         long,
         value_enum,
         help = with_default_name(
             "How direct light is computed",
-            |flag: &DirectFlag, normal| flag.direct() == normal.direct
+            |settings| settings.direct
         ),
         help_heading = "Settings"
     )]
-    pub direct: Option<DirectFlag>,
+    pub direct: Option<Direct>,
     /// Link threshold ε at the last step
     #[arg(
         long,
@@ -166,10 +163,10 @@ pub struct SettingFlags {
         help_heading = "Settings"
     )]
     pub seed: Option<u64>,
-    /// Do not leave this out where the scene does not need it; may be given several times
+    /// Do not omit this where the scene does not need it; may be given several times
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Settings")]
-    pub keep: Vec<KeepFlag>,
-    /// Leave nothing out that the scene does not need
+    pub keep: Vec<Omission>,
+    /// Omit nothing that the scene does not need
     #[arg(long, conflicts_with = "keep", help_heading = "Settings")]
     pub keep_all: bool,
 }
@@ -183,9 +180,9 @@ impl SettingFlags {
             Preset::Final => SolveSettings::finest(),
         };
         SolveSettings {
-            method: self.method.map_or(preset.method, MethodFlag::method),
-            oracle: self.oracle.map_or(preset.oracle, OracleFlag::oracle),
-            direct: self.direct.map_or(preset.direct, DirectFlag::direct),
+            method: self.method.unwrap_or(preset.method),
+            oracle: self.oracle.unwrap_or(preset.oracle),
+            direct: self.direct.unwrap_or(preset.direct),
             epsilon: self.epsilon.unwrap_or(preset.epsilon),
             samples: self.samples.unwrap_or(preset.samples),
             min_area: self.min_area.unwrap_or(preset.min_area),
@@ -200,8 +197,7 @@ impl SettingFlags {
         if self.keep_all {
             return Keep::ALL;
         }
-        let omissions = self.keep.iter().map(|flag| flag.omission());
-        Keep::from(omissions.collect::<Vec<Omission>>())
+        Keep::from(self.keep.clone())
     }
 
     /// Whether any of them is given.
@@ -240,7 +236,7 @@ pub struct RunFlags {
     pub emission_scale: Option<f32>,
     /// Tone curve of the byte colours [default: neutral]
     #[arg(long, value_enum, help_heading = "Output")]
-    pub tonemap: Option<ToneMapFlag>,
+    pub tonemap: Option<ToneMap>,
 }
 
 impl RunFlags {
@@ -255,19 +251,13 @@ impl RunFlags {
     }
 
     /// How exported files of a scene with this [`crate::scene::Scene::radiance_unit`] look.
-    pub fn export(&self, up: UpFlag, radiance_unit: f32) -> MeshOptions {
+    pub fn export(&self, up: UpAxis, radiance_unit: f32) -> MeshOptions {
         MeshOptions {
             color: ColorOptions {
                 exposure_ev: self.exposure.unwrap_or(0.0),
-                tone_map: match self.tonemap {
-                    Some(ToneMapFlag::None) => ToneMap::None,
-                    Some(ToneMapFlag::Neutral) | None => ToneMap::Neutral,
-                },
+                tone_map: self.tonemap.unwrap_or_default(),
             },
-            up: match up {
-                UpFlag::Y => UpAxis::Y,
-                UpFlag::Z => UpAxis::Z,
-            },
+            up,
             emission_scale: self.emission_scale.unwrap_or(1.0),
             radiance_unit,
         }
@@ -291,19 +281,9 @@ fn with_defaults<T: Display + PartialEq>(text: &str, value: fn(&SolveSettings) -
 }
 
 /// A flag's explanation with the name of its default.
-fn with_default_name<T: ValueEnum>(
-    text: &str,
-    is_default: impl Fn(&T, &SolveSettings) -> bool,
-) -> String {
-    let normal = SolveSettings::default();
-    let name = T::value_variants()
-        .iter()
-        .find(|flag| is_default(flag, &normal))
-        .and_then(|flag| flag.to_possible_value());
-    match name {
-        Some(value) => format!("{text} [default: {}]", value.get_name()),
-        None => text.to_owned(),
-    }
+fn with_default_name<T: ValueEnum>(text: &str, value: fn(&SolveSettings) -> T) -> String {
+    let default = value(&SolveSettings::default());
+    format!("{text} [default: {}]", name_of(&default))
 }
 
 /// `--reference`: what to measure the error against.
@@ -338,17 +318,6 @@ impl FromStr for Reference {
     }
 }
 
-/// `--sides`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SidesFlag {
-    /// Closed shells one-sided, sheets two-sided
-    Auto,
-    /// Counter-clockwise is the front
-    One,
-    /// Both sides
-    Two,
-}
-
 /// `--mtl-color`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MtlColorFlag {
@@ -356,117 +325,6 @@ pub enum MtlColorFlag {
     Linear,
     /// Decoded from sRGB
     Srgb,
-}
-
-/// `--up`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum UpFlag {
-    /// +Y
-    #[value(name = "+Y")]
-    Y,
-    /// +Z
-    #[value(name = "+Z")]
-    Z,
-}
-
-/// `--tonemap`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ToneMapFlag {
-    /// Cut off at white
-    None,
-    /// Khronos PBR Neutral
-    Neutral,
-}
-
-/// `--method`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum MethodFlag {
-    /// Spherical harmonics within bounds
-    Bounded,
-    /// Six vectors along the box normals: the paper
-    SixFace,
-    /// One vector
-    Single,
-    /// Sum over all patches
-    Exact,
-    /// The same in every direction
-    Isotropic,
-}
-
-impl MethodFlag {
-    /// The setting that it names.
-    pub(super) fn method(self) -> Method {
-        match self {
-            Self::Bounded => Method::Bounded,
-            Self::SixFace => Method::SixFace,
-            Self::Single => Method::Single,
-            Self::Exact => Method::Exact,
-            Self::Isotropic => Method::Isotropic,
-        }
-    }
-}
-
-/// `--oracle`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum OracleFlag {
-    /// Bounds over both boxes
-    Interval,
-    /// Largest minus smallest over sample pairs: the paper
-    Samples,
-}
-
-impl OracleFlag {
-    /// The setting that it names.
-    pub(super) fn oracle(self) -> Oracle {
-        match self {
-            Self::Interval => Oracle::Interval,
-            Self::Samples => Oracle::Samples,
-        }
-    }
-}
-
-/// `--direct`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum DirectFlag {
-    /// Shadow rays from every vertex
-    #[value(alias = "auto")]
-    Sampled,
-    /// Over links: the paper
-    Linked,
-}
-
-impl DirectFlag {
-    fn direct(self) -> Direct {
-        match self {
-            Self::Sampled => Direct::Sampled,
-            Self::Linked => Direct::Linked,
-        }
-    }
-}
-
-/// `--keep`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum KeepFlag {
-    /// Surfaces that no light can reach
-    Unlit,
-    /// Rays where nothing can block them
-    Rays,
-    /// Elements where light varies little and nothing casts a shadow
-    Elements,
-    /// Links of clusters where nothing casts a shadow and there are few patches
-    Clusters,
-}
-
-impl KeepFlag {
-    /// What it names.
-    fn omission(self) -> Omission {
-        match self {
-            Self::Unlit => Omission::Unlit,
-            Self::Rays => Omission::Rays,
-            Self::Elements => Omission::Elements,
-            Self::Clusters => Omission::Clusters,
-        }
-    }
 }
 
 fn number(text: &str) -> Result<f32, String> {
@@ -518,9 +376,7 @@ mod tests {
             "seed [default: 1]"
         );
         assert_eq!(
-            with_default_name("a", |flag: &OracleFlag, normal| {
-                flag.oracle() == normal.oracle
-            }),
+            with_default_name("a", |settings| settings.oracle),
             "a [default: interval]"
         );
     }

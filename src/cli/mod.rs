@@ -15,6 +15,7 @@ mod scenes;
 mod solve;
 mod sweep;
 mod truth;
+mod values;
 #[cfg(feature = "viewer")]
 mod window;
 
@@ -65,7 +66,7 @@ pub(crate) enum Outcome {
     StoppedEarly,
 }
 
-/// Read the command line, do what it says, and return the exit code.
+/// Parse the command line, run the command, and return the exit code.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command {
@@ -107,8 +108,7 @@ fn exit_code_of(error: &anyhow::Error) -> ExitCode {
 /// Whether a graphics adapter or a display was missing.
 #[cfg(feature = "viewer")]
 fn needs_graphics(error: &anyhow::Error) -> bool {
-    error.is::<crate::viewer::ViewerError>()
-        || error.is::<crate::viewer::render::headless::HeadlessError>()
+    error.is::<crate::viewer::ViewerError>() || error.is::<crate::viewer::headless::HeadlessError>()
 }
 
 /// Whether a graphics adapter or a display was missing: this build never asks for one.

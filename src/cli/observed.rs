@@ -8,7 +8,7 @@ use crate::{
     worker::{Job, MakeStepper, Stepper},
 };
 
-/// What looks at the snapshots of a scene, the unlit one before the first step included.
+/// Receives the snapshots of a scene, the unlit one before the first step included.
 type Observe = dyn Fn(&Scene, &Snapshot) + Send + Sync;
 
 /// Makes solvers whose snapshots are all handed to `observe` first.

@@ -18,7 +18,7 @@ pub(super) fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Put a sentence on standard error. One that nobody reads is no reason to stop.
+/// Print a sentence to standard error. A closed standard error is ignored.
 pub(super) fn say(sentence: impl Display) {
     let _ = writeln!(io::stderr(), "{sentence}");
 }
@@ -89,7 +89,7 @@ pub(super) fn check_distinct(destinations: &[Destination]) -> Result<()> {
 
 /// Refuse an output that would replace one of these files, which the scene is read from.
 pub(super) fn check_inputs_kept(destinations: &[Destination], inputs: &[PathBuf]) -> Result<()> {
-    // What is not there yet cannot be read from.
+    // A file that does not exist yet cannot be read.
     let existing: Vec<&Destination> = destinations
         .iter()
         .filter(|destination| destination.place.exists())

@@ -6,26 +6,21 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use glam::{DVec3, Vec3};
 
-use super::{
-    RunFlags, UsageError,
-    flags::{ToneMapFlag, UpFlag},
-    output,
-};
+use super::{RunFlags, UsageError, output};
 use crate::{
     geometry::RayTree,
-    scene::{Scene, builtin},
+    scene::{Scene, UpAxis, builtin},
     solver::Snapshot,
     viewer::{
         CameraRequest,
-        camera::UpAxis,
+        headless::{self, Subject},
         loader, opening,
-        render::headless::{self, Subject},
         stderr::StderrCapture,
-        view::{ClusterOverlay, ClusterRequest, ToneMap, ViewMode, ViewRequest, ViewSettings},
+        view::{ClusterOverlay, ClusterRequest, ViewMode, ViewRequest, ViewSettings},
     },
 };
 
-/// What a picture shows, and from where.
+/// Content and camera of a picture.
 #[derive(Clone, Debug, Args)]
 pub struct ViewFlags {
     /// What the surfaces show [default: radiance]
@@ -85,10 +80,7 @@ impl ViewFlags {
             mode: self.mode(),
             emission_scale: run_flags.emission_scale,
             exposure: run_flags.exposure,
-            tone_map: run_flags.tonemap.map(|tone_map| match tone_map {
-                ToneMapFlag::None => ToneMap::None,
-                ToneMapFlag::Neutral => ToneMap::Neutral,
-            }),
+            tone_map: run_flags.tonemap,
             logarithmic: self.logarithmic,
             fixed_range: self.range.map(|range| range.0),
             edges: self.edges,
@@ -101,16 +93,15 @@ impl ViewFlags {
     }
 
     /// From where.
-    pub fn camera(&self, up: UpFlag) -> CameraRequest {
+    pub fn camera(&self, up: UpAxis) -> CameraRequest {
         CameraRequest {
             position: self.camera_position.map(|point| point.0),
             focal_point: self.camera_focal_point.map(|point| point.0),
             view_angle_degrees: self.camera_view_angle,
-            up: match (self.camera_view_up, up) {
-                (Some(direction), _) => Some(direction.0),
-                (None, UpFlag::Y) => Some(UpAxis::Y.vector()),
-                (None, UpFlag::Z) => Some(UpAxis::Z.vector()),
-            },
+            up: Some(
+                self.camera_view_up
+                    .map_or(up.vector(), |direction| direction.0),
+            ),
         }
     }
 }
@@ -177,7 +168,7 @@ impl PictureFlags {
         snapshot: &Snapshot,
         errors: Option<&Arc<Vec<f32>>>,
         run_flags: &RunFlags,
-        up: UpFlag,
+        up: UpAxis,
     ) -> Result<()> {
         let Some(path) = &self.screenshot else {
             return Ok(());

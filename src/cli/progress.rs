@@ -11,7 +11,7 @@ use crate::solver::StepReport;
 /// Time between lines where standard error is not a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(1);
 
-/// Writes progress, unless told to be quiet.
+/// Writes progress, unless it is quiet.
 pub(super) struct Progress {
     is_terminal: bool,
     quiet: bool,

@@ -18,10 +18,10 @@ pub(super) struct SolveReport {
     pub(super) scene: SceneFacts,
     pub(super) settings: SolveSettings,
     pub(super) color: ColorOptions,
-    /// What was skipped because this scene does not need it, and why.
+    /// Omissions, since this scene does not need the omitted parts, with their reasons.
     pub(super) left_out: Vec<LeftOut>,
     pub(super) warnings: Vec<WarningFacts>,
-    /// What the errors of the steps are measured against.
+    /// The reference of the errors of the steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) reference: Option<ReferenceFacts>,
     pub(super) steps: Vec<StepFacts>,
@@ -103,7 +103,7 @@ impl WarningFacts {
     }
 }
 
-/// What errors are measured against.
+/// The reference of errors.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ReferenceFacts {
     pub(super) method: &'static str,
@@ -112,7 +112,7 @@ pub(super) struct ReferenceFacts {
     pub(super) samples: Option<u32>,
     pub(super) points: usize,
     pub(super) surfaces: SampledSurfaces,
-    /// What the errors are means of, in words.
+    /// The surfaces that the errors are means over, in words.
     pub(super) error_of: String,
 }
 
@@ -184,7 +184,7 @@ pub(super) fn core_count() -> usize {
     std::thread::available_parallelism().map_or(1, Into::into)
 }
 
-/// The processor's name where the system tells it in a file.
+/// The processor's name, where the system has it in a file.
 fn processor() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;

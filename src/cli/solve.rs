@@ -68,7 +68,7 @@ pub struct SolveArguments {
     #[cfg(feature = "viewer")]
     #[command(flatten)]
     pub picture: super::picture::PictureFlags,
-    /// Say what is left out because this scene does not need it, and why
+    /// Say what is omitted because this scene does not need it, and why
     #[arg(long, help_heading = "Output")]
     pub explain: bool,
     /// No progress line
@@ -85,13 +85,13 @@ pub struct SolveArguments {
     pub run_flags: RunFlags,
 }
 
-/// What errors are measured against, and errors by step.
+/// The reference of errors, and errors by step.
 struct Measured {
     reference: Option<ReferenceFacts>,
     errors: Errors,
 }
 
-/// What a drained run brought.
+/// The result of a run.
 struct Run {
     steps: Vec<StepReport>,
     prepare_s: f64,
@@ -137,7 +137,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         ..Totals::default()
     };
     let measured = Measured { reference, errors };
-    // What cannot be written does not keep the rest from being written.
+    // A file that cannot be written does not stop the others from being written.
     let report = write_report(arguments, &scene, &run, &measured, totals);
     if run.snapshot.mesh.positions.is_empty() && writes_light(arguments) {
         report?;
@@ -228,7 +228,7 @@ fn writes_light(arguments: &SolveArguments) -> bool {
     arguments.export.is_some() || draws
 }
 
-/// What Ctrl+C and the system's wish to end the program do; a second one is the same.
+/// Reacts to Ctrl+C and to a request of the system to end the program; a second one has the same effect.
 pub(super) struct Interruption {
     /// Set once it came.
     pub(super) flag: Arc<AtomicBool>,
@@ -343,13 +343,13 @@ fn drain(
     })
 }
 
-/// Say what is left out, one line each.
+/// Say what is omitted, one line each.
 fn explain(snapshot: &Snapshot) {
     if snapshot.left_out.is_empty() {
-        output::say("left out: nothing, this scene needs all of it");
+        output::say("omitted: nothing, this scene needs all of it");
     }
-    for left_out in snapshot.left_out.iter() {
-        output::say(format_args!("left out: {left_out}"));
+    for omission in snapshot.left_out.iter() {
+        output::say(format_args!("omitted: {omission}"));
     }
 }
 

@@ -25,9 +25,9 @@ use crate::{
 /// Errors by step, filled while the solve runs.
 pub(super) type Errors = Arc<Mutex<BTreeMap<u32, ErrorMeasures>>>;
 
-/// What measured light is compared with.
+/// The reference that light is compared with.
 pub(super) struct Truth {
-    /// What to say of it.
+    /// Its description.
     pub(super) facts: ReferenceFacts,
     /// Random points with their light.
     points: Vec<ReferencePoint>,

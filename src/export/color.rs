@@ -3,10 +3,12 @@
 //! The viewport's last shader pass does the same, so that an exported vertex has the colour that is seen.
 
 use glam::Vec3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-/// How radiance beyond the display's range is brought into it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+use crate::scene::srgb_byte;
+
+/// How radiance above the range of the display is brought into it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ToneMap {
     /// Cut off at 1.
@@ -14,6 +16,16 @@ pub enum ToneMap {
     /// Khronos PBR Neutral: leaves colours below about 0.8 nearly as they are and rolls off what is brighter.
     #[default]
     Neutral,
+}
+
+impl ToneMap {
+    /// Bring a colour of finite, not negative channels towards 0…1.
+    pub fn apply(self, color: Vec3) -> Vec3 {
+        match self {
+            Self::None => color,
+            Self::Neutral => neutral(color),
+        }
+    }
 }
 
 /// How linear radiance becomes a displayed colour.
@@ -33,24 +45,20 @@ impl ColorOptions {
 
     /// The sRGB bytes that show a radiance.
     pub fn encode(&self, radiance: Vec3) -> [u8; 3] {
-        let exposed = self.exposed(radiance);
-        let mapped = match self.tone_map {
-            ToneMap::None => exposed,
-            ToneMap::Neutral => neutral(exposed),
-        };
-        mapped
+        self.tone_map
+            .apply(self.exposed(radiance))
             .to_array()
-            .map(|x| (srgb_from_linear(x.clamp(0.0, 1.0)) * 255.0).round() as u8)
+            .map(srgb_byte)
     }
 }
 
 /// Khronos PBR Neutral tone curve; takes any colour of finite, not negative channels into 0…1.
-pub fn neutral(color: Vec3) -> Vec3 {
-    /// Brightness from which the curve bends.
+fn neutral(color: Vec3) -> Vec3 {
+    /// Brightness from which the curve is not linear.
     const START: f32 = 0.8 - 0.04;
     /// How fast bright colours turn white.
     const DESATURATION: f32 = 0.15;
-    // Far beyond white the channels are alike anyway, and a square of such numbers would overflow.
+    // Far above white the channels are alike anyway, and a square of such numbers would overflow.
     let color = color.min(Vec3::splat(1e15));
     let smallest = color.min_element();
     let offset = if smallest < 0.08 {
@@ -69,27 +77,10 @@ pub fn neutral(color: Vec3) -> Vec3 {
     (color * (new_peak / peak)).lerp(Vec3::splat(new_peak), white)
 }
 
-/// sRGB encoding of a linear value in 0…1 (IEC 61966-2-1).
-pub fn srgb_from_linear(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
-}
-
-/// Linear value of an sRGB encoding in 0…1 (IEC 61966-2-1).
-pub fn linear_from_srgb(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::linear_from_srgb;
 
     #[test]
     fn every_byte_survives_decoding_and_encoding() {

@@ -6,7 +6,7 @@
 //!
 //! Positions are world units from the node's place, so that single precision suffices far from the origin. glTF is Y-up: a
 //! scene with +Z up stands under a turned root node, its numbers stay. Each side of a two-sided face has triangles of its
-//! own, so that the material is one-sided always. Textures are left out: vertices have their mean.
+//! own, so that the material is one-sided always. Textures are omitted: vertices have their mean.
 
 use std::{
     f64::consts::FRAC_1_SQRT_2,
@@ -17,18 +17,18 @@ use glam::Vec3;
 use serde_json::{Value, json};
 
 use super::{
-    MeshOptions, UpAxis,
+    MeshOptions,
     mesh::{Light, write_vector},
 };
 use crate::{
-    scene::Frame,
+    scene::{Frame, UpAxis},
     solver::{DisplayMesh, Snapshot},
 };
 
 /// Floats of a vertex, three for each of [`ATTRIBUTES`].
 const VERTEX_BYTES: u64 = 4 * 3 * ATTRIBUTES.len() as u64;
 
-/// What a vertex has, in the order of the file.
+/// Attributes of a vertex, in the order of the file.
 const ATTRIBUTES: [&str; 5] = ["POSITION", "NORMAL", "COLOR_0", "_RADIANCE", "_IRRADIANCE"];
 
 /// Three indices of 32 bits.

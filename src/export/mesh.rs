@@ -3,42 +3,21 @@
 use std::{
     f32::consts::FRAC_1_PI,
     io::{self, Write},
-    path::Path,
 };
 
 use glam::Vec3;
 
-use super::{ColorOptions, glb::write_glb, ply::write_ply};
-use crate::{scene::Frame, solver::Snapshot};
+use super::ColorOptions;
+use crate::{scene::UpAxis, solver::Snapshot};
 
-/// Which axis of the scene points up. Coordinates are never turned.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum UpAxis {
-    /// +Y, as most OBJ files.
-    #[default]
-    Y,
-    /// +Z.
-    Z,
-}
-
-impl UpAxis {
-    /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Y => "+Y",
-            Self::Z => "+Z",
-        }
-    }
-}
-
-/// What an exported mesh says beside the numbers of the solve.
+/// Options of an exported mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshOptions {
     /// How displayed colours are made.
     pub color: ColorOptions,
     /// The scene's up axis.
     pub up: UpAxis,
-    /// What all emission, and with it all light, is multiplied by.
+    /// Factor on all emission, and with it on all light.
     pub emission_scale: f32,
     /// Of the scene: see [`crate::scene::Scene::radiance_unit`].
     pub radiance_unit: f32,
@@ -51,65 +30,6 @@ impl Default for MeshOptions {
             up: UpAxis::default(),
             emission_scale: 1.0,
             radiance_unit: 1.0,
-        }
-    }
-}
-
-/// A file format of lit meshes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MeshFormat {
-    /// Binary PLY.
-    Ply,
-    /// Binary glTF 2.0.
-    Glb,
-}
-
-/// The name of a file tells no format.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the exported file must end in .ply or .glb: {0}")]
-pub struct UnknownMeshFormat(String);
-
-impl MeshFormat {
-    /// All, in the order in which they are offered.
-    pub const ALL: [Self; 2] = [Self::Ply, Self::Glb];
-
-    /// How names of such files end, without the dot.
-    pub const fn extension(self) -> &'static str {
-        match self {
-            Self::Ply => "ply",
-            Self::Glb => "glb",
-        }
-    }
-
-    /// The format that the name of a file asks for.
-    ///
-    /// # Errors
-    /// Where it ends otherwise.
-    pub fn of(path: &Path) -> Result<Self, UnknownMeshFormat> {
-        let ends_in = |format: &Self| {
-            path.extension()
-                .is_some_and(|extension| extension.eq_ignore_ascii_case(format.extension()))
-        };
-        Self::ALL
-            .into_iter()
-            .find(ends_in)
-            .ok_or_else(|| UnknownMeshFormat(path.display().to_string()))
-    }
-
-    /// Write the display mesh of a snapshot.
-    ///
-    /// # Errors
-    /// Those of `out`, and one sentence where the mesh does not fit into the format.
-    pub fn write(
-        self,
-        out: &mut dyn Write,
-        snapshot: &Snapshot,
-        frame: &Frame,
-        options: &MeshOptions,
-    ) -> io::Result<()> {
-        match self {
-            Self::Ply => write_ply(out, snapshot, frame, options),
-            Self::Glb => write_glb(out, snapshot, frame, options),
         }
     }
 }
@@ -142,7 +62,7 @@ fn presentable(light: Vec3) -> Vec3 {
     light.map(|x| if x > 0.0 { x.min(f32::MAX) } else { 0.0 })
 }
 
-/// Light times two factors. What single precision cannot hold keeps its colour.
+/// Light times two factors. Values above the range of single precision keep their colour.
 fn scaled(light: Vec3, [first, second]: [f64; 2]) -> Vec3 {
     let scaled = presentable(light).as_dvec3() * first * second;
     let excess = scaled.max_element() / f64::from(f32::MAX);
@@ -183,17 +103,6 @@ pub(super) mod tests {
             mesh: Arc::new(mesh),
             light: Arc::new(light),
             ..Snapshot::default()
-        }
-    }
-
-    #[test]
-    fn the_name_of_a_file_tells_its_format() {
-        let of = |name: &str| MeshFormat::of(Path::new(name));
-        assert_eq!(of("a/lit.PLY"), Ok(MeshFormat::Ply));
-        assert_eq!(of("lit.ply.glb"), Ok(MeshFormat::Glb));
-        for name in ["lit.obj", "glb", "lit.", ".ply"] {
-            let said = of(name).unwrap_err().to_string();
-            assert!(said.contains(".ply or .glb") && said.ends_with(name));
         }
     }
 

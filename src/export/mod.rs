@@ -3,11 +3,13 @@
 mod color;
 mod glb;
 mod mesh;
+mod mesh_format;
 mod plot;
 mod ply;
 mod table;
 
-pub use color::{ColorOptions, ToneMap, linear_from_srgb, neutral, srgb_from_linear};
-pub use mesh::{MeshFormat, MeshOptions, UnknownMeshFormat, UpAxis};
+pub use color::{ColorOptions, ToneMap};
+pub use mesh::MeshOptions;
+pub use mesh_format::{MeshFormat, UnknownMeshFormat};
 pub use plot::{Curve, CurvePlot};
 pub use table::write_csv;

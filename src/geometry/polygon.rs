@@ -11,7 +11,7 @@ use glam::{BVec4A, Vec3, Vec4};
 
 use super::Vectors4;
 
-/// Beyond this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
+/// At a distance of more than this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
 /// angles of the edges cancel in single precision, until nothing but rounding is left.
 const FAR: f32 = 64.0;
 
@@ -208,13 +208,13 @@ fn above_horizon([a, b, c]: [Vec3; 3], [of_a, of_b, of_c]: [f32; 3]) -> Option<[
     })
 }
 
-/// What is left where only the first corner lies above the horizon.
+/// The part above the horizon, where only the first corner lies above it.
 fn tip([a, b, c]: [Vec3; 3], [of_a, of_b, of_c]: [f32; 3]) -> [Vec3; 4] {
     let last = a.lerp(c, of_a / (of_a - of_c));
     [a, a.lerp(b, of_a / (of_a - of_b)), last, last]
 }
 
-/// What is left where only the first corner lies below the horizon.
+/// The part above the horizon, where only the first corner lies below it.
 fn stump([a, b, c]: [Vec3; 3], [of_a, of_b, of_c]: [f32; 3]) -> [Vec3; 4] {
     [
         a.lerp(b, of_a / (of_a - of_b)),

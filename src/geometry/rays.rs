@@ -37,7 +37,7 @@ const BUILD: BvhBuildParams = BvhBuildParams {
     ..BvhBuildParams::medium_build()
 };
 
-/// What a ray meets first.
+/// The first hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The triangle.
@@ -135,7 +135,7 @@ impl RayTree {
         })
     }
 
-    /// The nearest triangle along a ray of unit direction, leaving out the one that it starts on. Of two in one place, back
+    /// The nearest triangle along a ray of unit direction, except the one that it starts on. Of two in one place, back
     /// to back, it is the one whose front is met.
     pub fn closest(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Option<Hit> {
         if self.is_clear() {

@@ -81,17 +81,17 @@ impl PatchTree {
         grow(scene, sheets, lit_sides(scene), &[], cancelled)
     }
 
-    /// The tree over the patches that are not left out, of which there is at least one; the others follow in their order.
+    /// The tree over the patches that are not omitted, of which there is at least one; the others follow in their order.
     /// `None` when cancelled.
     pub fn without(
         &self,
         scene: &Scene,
         sheets: Option<&SheetSides>,
-        left_out: &[bool],
+        omitted: &[bool],
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
         let of = |is_out: bool| {
-            let flagged = self.patches.iter().zip(left_out);
+            let flagged = self.patches.iter().zip(omitted);
             let chosen = flagged.filter(move |(_, flag)| **flag == is_out);
             chosen.map(|(patch, _)| Item::of(scene, patch.triangle, patch.is_back))
         };
@@ -108,7 +108,7 @@ impl PatchTree {
     }
 
     /// The patches that clusters hold; light is computed for these.
-    pub fn held(&self) -> std::ops::Range<usize> {
+    pub fn active_patches(&self) -> std::ops::Range<usize> {
         self.clusters[0].patches()
     }
 }
@@ -368,10 +368,7 @@ mod tests {
 
     #[test]
     fn the_two_sides_of_a_wall_come_into_the_clusters_of_their_rooms() {
-        let options = SceneOptions {
-            sides: Sides::One,
-            ..SceneOptions::default()
-        };
+        let options = SceneOptions::with_sides(Sides::One);
         let scene = stability::rooms_with_pin_hole(0.5)
             .finish(&options)
             .unwrap();

@@ -21,7 +21,7 @@ pub(super) struct ElementColors {
     varied: Vec<Varied>,
 }
 
-/// What textures show on an element.
+/// Mean colours of textures on an element.
 #[derive(Clone, Copy, Debug)]
 struct Varied {
     means: TextureMeans,
@@ -51,7 +51,7 @@ impl ElementColors {
         }
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.slots.as_slice()) + size_of_val(self.varied.as_slice())
     }
@@ -97,7 +97,7 @@ impl Hierarchy {
     }
 
     /// Parts of a patch, none within another, that emit evenly as far as elements tell: leaves, and elements all of whose
-    /// leaves emit the same. What emits nothing is left out.
+    /// leaves emit the same. Elements that emit nothing are omitted.
     pub fn emitting_parts(&self, patch: usize) -> Vec<usize> {
         let mut parts = Vec::new();
         self.collect_even(patch, &mut parts);
@@ -169,7 +169,7 @@ impl Hierarchy {
         }
     }
 
-    /// What textures show on an element.
+    /// Mean colours of textures on an element.
     fn look(&self, scene: &Scene, appearances: &[Appearance], element: usize) -> Varied {
         let triangle = self.patch_of(element).triangle;
         let whole = scene.corners(triangle);
@@ -227,7 +227,7 @@ impl Hierarchy {
     }
 }
 
-/// What a material shows of its textures on a part of a triangle.
+/// Mean colours of the textures of a material on a part of a triangle.
 fn shown(
     scene: &Scene,
     appearances: &[Appearance],

@@ -29,7 +29,7 @@ pub enum Reading {
     Isotropic,
 }
 
-/// What one number of a moment is: a scalar, or RGB with a fourth channel (see `Tables`).
+/// One number of a moment: a scalar, or RGB with a fourth channel (see `Tables`).
 pub trait Quantity:
     Copy
     + Default

@@ -110,7 +110,7 @@ impl EdgeLeaves {
             .chain(places.map(|&(element, _)| element))
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.starts.as_slice())
             + size_of_val(self.of_patches.as_slice())

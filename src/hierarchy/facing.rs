@@ -1,6 +1,6 @@
-//! What can face what: tests of planes against the boxes of the light tree, before any light is computed.
+//! Which patches face each other: tests of planes against the boxes of the light tree, before any light is computed.
 //!
-//! Two patches exchange light only where each has a part before the plane of the other. What no chain of such pairs
+//! Two patches exchange light only where each has a part before the plane of the other. Patches that no chain of such pairs
 //! joins to an emitter stays dark, whatever stands between. And where everything that light is computed for lies on one
 //! side of the plane of each triangle, nothing stands between anything: the triangle can at most touch a line of sight.
 
@@ -10,18 +10,18 @@ use rayon::prelude::*;
 use super::{Patch, PatchTree};
 use crate::{
     geometry::centroid,
-    scene::{Awakened, Scene},
+    scene::{ActiveMaterials, Scene},
 };
 
 /// What is nearer to a plane than this lies in it, in frame units. Positions are rounded to 4e-6 there and normals tilted
 /// by 6e-8, over 100 units: below 2e-5 flat walls would rise over themselves. Rays start at twice this distance, so they
-/// cannot tell either. What it leaves out is the light between surfaces that rise over each other by less than a
+/// cannot tell either. What it omits is the light between surfaces that rise over each other by less than a
 /// two-millionth of the scene.
 const IN_PLANE: f32 = 5e-5;
 
 /// Nodes of the tree that are looked at for one patch. Fewer, and patches that nothing lights are kept; more, and scenes of
 /// many sheets wait.
-const MOST_VISITS: u32 = 128;
+const MAX_NODES: u32 = 128;
 
 /// Rounds of the flood. Light that needs more chained pairs is taken to reach everything: usual scenes need three.
 const MOST_ROUNDS: u32 = 32;
@@ -76,12 +76,12 @@ struct Marked {
 impl PatchTree {
     /// Which patches light may be exchanged with: those that no chain of patches that face each other joins to an emitter
     /// are false, and so are emitters that nothing faces. Conservative: true where it takes long to tell. Materials that are
-    /// awakened count as if they emitted or reflected.
-    pub fn lit(&self, scene: &Scene, awakened: &Awakened) -> Vec<bool> {
+    /// active count as if they emitted or reflected.
+    pub fn lit(&self, scene: &Scene, active: &ActiveMaterials) -> Vec<bool> {
         let material = |patch: &Patch| scene.triangles[patch.triangle.index()].material;
-        let emits = |patch: &Patch| patch.emission != Vec3::ZERO || awakened.emits(material(patch));
+        let emits = |patch: &Patch| patch.emission != Vec3::ZERO || active.emits(material(patch));
         let reflects =
-            |patch: &Patch| patch.reflectance != Vec3::ZERO || awakened.reflects(material(patch));
+            |patch: &Patch| patch.reflectance != Vec3::ZERO || active.reflects(material(patch));
         let all = self.marked(|_| true);
         let mut lit: Vec<bool> = self
             .patches
@@ -160,7 +160,7 @@ impl PatchTree {
         pending: &mut Vec<usize>,
     ) -> bool {
         let plane = Plane::of(scene, patch);
-        let (smallest, mut visits) = marked.smallest;
+        let (smallest, mut node_count) = marked.smallest;
         pending.clear();
         pending.push(smallest);
         while let Some(index) = pending.pop() {
@@ -168,8 +168,8 @@ impl PatchTree {
             if !marked.clusters[index] || !plane.sees_box(cluster.min, cluster.max) {
                 continue;
             }
-            visits += 1;
-            if visits > MOST_VISITS {
+            node_count += 1;
+            if node_count > MAX_NODES {
                 return true;
             }
             if !cluster.is_leaf() {
@@ -206,7 +206,7 @@ impl PatchTree {
         !first.par_iter().any(blocks) && !(0..count).into_par_iter().any(|at| blocks(&at))
     }
 
-    /// Whether any held patch has a part before a plane.
+    /// Whether any active patch has a part before a plane.
     fn rises(&self, scene: &Scene, plane: Plane) -> bool {
         let mut pending = vec![0usize];
         while let Some(index) = pending.pop() {
@@ -226,11 +226,11 @@ impl PatchTree {
         false
     }
 
-    /// Whether the held patches close a surface: each edge between two points belongs to two of them that run along it in
+    /// Whether the active patches close a surface: each edge between two points belongs to two of them that run along it in
     /// opposite senses.
     pub fn is_closed(&self, scene: &Scene) -> bool {
-        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(self.held().len() * 3);
-        for patch in &self.patches[self.held()] {
+        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(self.active_patches().len() * 3);
+        for patch in &self.patches[self.active_patches()] {
             let [a, b, c] = scene.triangles[patch.triangle.index()].corners;
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 edges.push((from.min(to), from.max(to), (from < to) != patch.is_back));
@@ -270,11 +270,7 @@ mod tests {
             builder.push_triangle([a, b, c], MaterialId(material));
             builder.push_triangle([a, c, d], MaterialId(material));
         }
-        let options = SceneOptions {
-            sides,
-            ..SceneOptions::default()
-        };
-        builder.finish(&options).unwrap()
+        builder.finish(&SceneOptions::with_sides(sides)).unwrap()
     }
 
     fn tree(scene: &Scene) -> PatchTree {
@@ -284,7 +280,7 @@ mod tests {
     /// For each parallelogram, whether light may reach its front.
     fn fronts(scene: &Scene) -> Vec<bool> {
         let tree = tree(scene);
-        let lit = tree.lit(scene, &Awakened::default());
+        let lit = tree.lit(scene, &ActiveMaterials::default());
         let mut fronts = vec![false; scene.triangles.len() / 2];
         for (patch, is_lit) in tree.patches.iter().zip(lit) {
             fronts[patch.triangle.index() / 2] |= is_lit && !patch.is_back;
@@ -339,14 +335,14 @@ mod tests {
         ];
         let room = scene(Sides::Two, &walls);
         let both = tree(&room);
-        let lit = both.lit(&room, &Awakened::default());
+        let lit = both.lit(&room, &ActiveMaterials::default());
         let dark: Vec<bool> = lit.iter().map(|lit| !lit).collect();
         for (patch, &is_dark) in both.patches.iter().zip(&dark) {
             assert_eq!(patch.is_back, is_dark);
         }
         assert!(!both.is_closed(&room), "two sides share each edge");
         let inside = both.without(&room, None, &dark, &|| false).unwrap();
-        assert_eq!(inside.held(), 0..12);
+        assert_eq!(inside.active_patches(), 0..12);
         assert_eq!(inside.patches.len(), 24);
         assert!(inside.is_clear(&room) && inside.is_closed(&room));
 

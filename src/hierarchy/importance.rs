@@ -39,7 +39,7 @@ impl Importance {
             .sum();
         // The mean irradiance if all light arrives.
         let received = power / whole.max(f64::MIN_POSITIVE);
-        // What emits no more than that is seen by what it reflects, too.
+        // A patch that emits no more than that is seen by its reflected light, too.
         let emits = |patch: &Patch| emitted(patch) > (1.0 + SLACK) * received;
         let emitting: f64 = patches
             .iter()
@@ -83,7 +83,7 @@ impl Importance {
         self.measures[patch]
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.weights.as_slice()) + size_of_val(self.measures.as_slice())
     }

@@ -45,7 +45,7 @@ pub struct Element {
     pub level: u8,
     /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that is
     /// not known.
-    pub covered: u8,
+    pub inside_solid: u8,
     /// Number of children: 0, 2 or 4.
     pub child_count: u8,
     /// Mean of the corners.
@@ -60,30 +60,30 @@ impl Element {
     /// Stands for missing children.
     pub const LEAF: u32 = u32::MAX;
 
-    /// Stands for [`Element::covered`] where it is not known.
+    /// Stands for [`Element::inside_solid`] where it is not known.
     pub const UNPROBED: u8 = u8::MAX;
 
-    /// [`Element::covered`] where all of it lies within a solid.
-    const BURIED: u8 = 0b1111;
+    /// [`Element::inside_solid`] where all of it lies within a solid.
+    const ALL_INSIDE: u8 = 0b1111;
 
     /// Whether it lies within a solid in part.
     pub fn is_contact(&self) -> bool {
-        !matches!(self.covered, 0 | Self::BURIED | Self::UNPROBED)
+        !matches!(self.inside_solid, 0 | Self::ALL_INSIDE | Self::UNPROBED)
     }
 
     /// Whether all of it lies within a solid.
-    pub fn is_buried(&self) -> bool {
-        self.covered == Self::BURIED
+    pub fn is_inside_solid(&self) -> bool {
+        self.inside_solid == Self::ALL_INSIDE
     }
 
     /// Whether none of it is known to lie within a solid.
-    pub fn is_open(&self) -> bool {
-        matches!(self.covered, 0 | Self::UNPROBED)
+    pub fn is_outside_solids(&self) -> bool {
+        matches!(self.inside_solid, 0 | Self::UNPROBED)
     }
 
     /// Whether a corner is known to lie within a solid.
-    pub fn is_covered(&self, side: usize) -> bool {
-        self.covered != Self::UNPROBED && self.covered & (1 << side) != 0
+    pub fn is_inside_solid_at(&self, side: usize) -> bool {
+        self.inside_solid != Self::UNPROBED && self.inside_solid & (1 << side) != 0
     }
 
     /// Whether it has no children.
@@ -127,7 +127,7 @@ pub struct Mesh {
     /// All elements; the patches come first, in order.
     pub elements: Vec<Element>,
     /// Number of the patches for which light is computed; the elements of those that follow are never divided.
-    held: u32,
+    active_count: u32,
     /// Midpoint of the edge between two points, lower index first.
     point_between: EdgeMap<u32>,
     /// Midpoint vertex of the edge between two vertices, lower index first.
@@ -141,11 +141,11 @@ fn edge(a: u32, b: u32) -> Edge {
 }
 
 impl Mesh {
-    /// One element per patch, of which the first `held` may be divided; `None` when cancelled.
+    /// One element per patch, of which the first `active_count` may be divided; `None` when cancelled.
     pub(super) fn new(
         scene: &Scene,
         patches: &[Patch],
-        held: usize,
+        active_count: usize,
         crease_degrees: f32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
@@ -162,7 +162,7 @@ impl Mesh {
             points: scene.positions.clone(),
             vertices,
             elements: Vec::new(),
-            held: held as u32,
+            active_count: active_count as u32,
             point_between: EdgeMap::default(),
             vertex_between: EdgeMap::default(),
             leaves_at: None,
@@ -200,7 +200,7 @@ impl Mesh {
             patch,
             parent,
             level,
-            covered: Element::UNPROBED,
+            inside_solid: Element::UNPROBED,
             child_count: 0,
             centroid,
             radius,
@@ -262,13 +262,13 @@ impl Mesh {
     }
 
     /// The leaves for which light is computed, in order.
-    pub fn held_leaves(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn active_leaves(&self) -> impl Iterator<Item = usize> + '_ {
         self.leaves().filter(|&leaf| self.is_held(leaf))
     }
 
     /// Whether light is computed for an element.
     pub fn is_held(&self, element: usize) -> bool {
-        self.elements[element].patch < self.held
+        self.elements[element].patch < self.active_count
     }
 
     /// Whether so many elements are enough for dividing these, and about as many neighbours as balance asks.
@@ -320,7 +320,7 @@ impl Mesh {
 
     /// The edges of the patches that light is computed for.
     fn patch_edges(&self) -> impl Iterator<Item = (u32, [Edge; 3])> + Clone + '_ {
-        (0..self.held).map(|patch| {
+        (0..self.active_count).map(|patch| {
             let vertices = self.elements[patch as usize].vertices;
             (patch, self.point_edges(vertices))
         })
@@ -460,7 +460,7 @@ impl Mesh {
         triangles
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         /// A hash table keeps about an eighth of its slots free and a byte of control per slot.
         const SLOT: usize = 16;
@@ -520,7 +520,7 @@ fn share_vertices(
             };
             let best = match run.len() {
                 0..=2 => down.first(),
-                // What stands between two faces parts them, however smoothly they go on.
+                // A face that stands between two others parts them, however smoothly they join.
                 _ => next_around(scene, patches, one, run),
             };
             let Some(other) = best else { continue };

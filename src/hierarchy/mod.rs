@@ -88,9 +88,9 @@ pub struct Patch {
     pub normal: Vec3,
     /// Area, above 0 unless it underflows.
     pub area: f32,
-    /// Mean reflectance; that of an element is told by [`Hierarchy::reflectance_of`].
+    /// Mean reflectance; for an element see [`Hierarchy::reflectance_of`].
     pub reflectance: Vec3,
-    /// Mean emitted radiance; that of an element is told by [`Hierarchy::emission_of`].
+    /// Mean emitted radiance; for an element see [`Hierarchy::emission_of`].
     pub emission: Vec3,
 }
 
@@ -171,7 +171,7 @@ impl Hierarchy {
         Self::build(scene, crease_degrees, &|| false).expect("nothing stops it")
     }
 
-    /// As [`Self::new`], or `None` once `cancelled` says so.
+    /// As [`Self::new`], or `None` once `cancelled` returns true.
     pub fn build(
         scene: &Scene,
         crease_degrees: f32,
@@ -190,9 +190,9 @@ impl Hierarchy {
         crease_degrees: f32,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<Self> {
-        let held = tree.held().end;
+        let active = tree.active_patches().end;
         let PatchTree { clusters, patches } = tree;
-        let mesh = Mesh::new(scene, &patches, held, crease_degrees, cancelled)?;
+        let mesh = Mesh::new(scene, &patches, active, crease_degrees, cancelled)?;
         let mut sides = vec![[u32::MAX; 2]; scene.triangles.len()];
         for (index, patch) in patches.iter().enumerate() {
             sides[patch.triangle.index()][usize::from(patch.is_back)] = index as u32;
@@ -214,14 +214,14 @@ impl Hierarchy {
     pub const ROOT: NodeId = NodeId(0);
 
     /// The patches that clusters hold. For the others no light is computed.
-    pub fn held(&self) -> std::ops::Range<usize> {
+    pub fn active_patches(&self) -> std::ops::Range<usize> {
         self.clusters[0].patches()
     }
 
     /// The patch that a ray of the given direction meets on a triangle, if a cluster holds it: if light is computed for it.
     pub fn patch_met(&self, triangle: TriangleId, direction: Vec3) -> Option<usize> {
         let patch = self.side_met(triangle, direction)?;
-        self.held().contains(&patch).then_some(patch)
+        self.active_patches().contains(&patch).then_some(patch)
     }
 
     /// The patch that a ray of the given direction meets on a triangle, unless it is the back of a one-sided surface.
@@ -232,9 +232,9 @@ impl Hierarchy {
         (patch != u32::MAX).then_some(patch as usize)
     }
 
-    /// The clusters that hold a patch, the root first; none where it is left out.
+    /// The clusters that hold a patch, the root first; none where it is omitted.
     pub fn clusters_over(&self, patch: usize) -> impl Iterator<Item = usize> + '_ {
-        let root = self.held().contains(&patch).then_some(0);
+        let root = self.active_patches().contains(&patch).then_some(0);
         std::iter::successors(root, move |&index: &usize| {
             let cluster = &self.clusters[index];
             let first = cluster.first_child as usize;
@@ -245,10 +245,10 @@ impl Hierarchy {
         })
     }
 
-    /// Patches that one task should visit: no more than `most`, and fewer where there are few, since their elements are
+    /// Patches that one task should process: no more than `most`, and fewer where there are few, since their elements are
     /// many. The same on any number of threads.
     pub fn task_patches(&self, most: u32) -> u32 {
-        (self.held().len() as u32 / LEAST_TASKS).clamp(1, most)
+        (self.active_patches().len() as u32 / LEAST_TASKS).clamp(1, most)
     }
 
     /// The largest clusters with few enough patches, in the order of the patches.
@@ -282,7 +282,7 @@ impl Hierarchy {
         self.clusters.len() + self.mesh.elements.len()
     }
 
-    /// What a node is.
+    /// The kind of a node.
     pub fn kind(&self, node: NodeId) -> Kind {
         let clusters = self.clusters.len();
         if node.index() < clusters {
@@ -382,7 +382,7 @@ impl Hierarchy {
     }
 
     /// The part of the scene's area that an element, or a point on it that stands for so much area, has for errors of what
-    /// it receives, 0…1. What is huge beside all that counts is as large as that.
+    /// it receives, 0…1. Nodes much larger than all that counts have 1.
     pub fn share_of_area(&self, element: usize, area: f32) -> f32 {
         let patch = self.mesh.elements[element].patch as usize;
         let weight = match self.emission_of(element) == Vec3::ZERO {
@@ -412,7 +412,7 @@ impl Hierarchy {
         &self.patches[self.mesh.elements[element].patch as usize]
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.clusters.as_slice())
             + size_of_val(self.patches.as_slice())

@@ -1,4 +1,4 @@
-//! The two sides of sheets, told apart over whole surfaces.
+//! The two sides of sheets, distinguished over whole surfaces.
 //!
 //! A sheet separates two spaces, and what one of its sides sees the other does not. A cluster that holds both sides of a
 //! tube has faces that look the same way and yet do not see the same: one visibility for all of them lights the inside of
@@ -28,7 +28,7 @@ pub struct SheetSides {
 }
 
 impl SheetSides {
-    /// Tell the sides of a scene apart; `None` where no surface has two. Makes the ray tree of the scene where it is needed
+    /// Find the sides of a scene; `None` where no surface has two. Makes the ray tree of the scene where it is needed
     /// and not there yet.
     pub fn of(scene: &Scene, rays: &mut Option<Arc<RayTree>>) -> Option<Self> {
         let corners: Vec<[u32; 3]> = scene.triangles.iter().map(|face| face.corners).collect();
@@ -102,7 +102,7 @@ impl Sides {
 
     /// Join sides of surfaces that see each other, those first that see most.
     fn join_by_sight(&mut self, scene: &Scene, rays: &RayTree) {
-        // How many more rays tell that the least sides of two surfaces belong together than that they do not.
+        // The number of rays that join the smallest sides of two surfaces, less the number that join the others.
         let mut votes: BTreeMap<[u32; 2], i32> = BTreeMap::new();
         for [from, met] in sights(scene, rays) {
             let ((a, a_turned), (b, b_turned)) = (self.surface(from), self.surface(met));
@@ -212,88 +212,34 @@ mod tests {
         scene::{Material, SceneBuilder, SceneOptions, Sides as Sidedness},
     };
 
-    /// A grid of `count` quads over places in the unit square, every `turned`-th triangle wound the other way.
-    fn grid(
-        builder: &mut SceneBuilder,
-        count: [usize; 2],
-        turned: usize,
-        place: impl Fn(f64, f64) -> DVec3,
-    ) {
-        let material = builder.materials.len() as u32 - 1;
-        let at = |i: usize, j: usize| place(i as f64 / count[0] as f64, j as f64 / count[1] as f64);
-        for i in 0..count[0] {
-            for j in 0..count[1] {
-                let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
-                let [a, b, c, d] = corners.map(|(i, j)| builder.push_position(at(i, j)));
-                for [p, q, r] in [[a, b, c], [a, c, d]] {
-                    let number = builder.faces.len();
-                    let corners = match number % turned {
-                        0 => [p, r, q],
-                        _ => [p, q, r],
-                    };
-                    builder.push_triangle(corners, crate::scene::MaterialId(material));
-                }
-            }
-        }
-    }
-
-    fn scene_of(fill: impl Fn(&mut SceneBuilder)) -> Scene {
-        let mut builder = SceneBuilder::default();
-        builder.push_material(Material::plain("grey", Vec3::splat(0.5), Vec3::ONE));
-        fill(&mut builder);
-        let options = SceneOptions {
-            sides: Sidedness::Two,
-            ..SceneOptions::default()
-        };
-        builder.finish(&options).unwrap()
-    }
-
-    /// A point of a tube of radius 1 and height 6.
-    fn on_tube(u: f64, v: f64) -> DVec3 {
-        let (sin, cos) = (u * std::f64::consts::TAU).sin_cos();
-        DVec3::new(cos, 6.0 * v, sin)
-    }
-
-    #[test]
-    fn no_cluster_but_the_root_holds_the_inside_and_the_outside_of_a_tube_however_it_is_wound() {
-        for turned in [2, 3, 1000] {
-            // A floor that sees the outside and no more, and shares no edge with it.
-            let scene = scene_of(|builder| {
-                grid(builder, [12, 6], turned, on_tube);
-                grid(builder, [1, 1], turned, |u, v| {
-                    DVec3::new(2.0 + 8.0 * u, 0.0, 8.0 * v)
-                });
-            });
-            let hierarchy = Hierarchy::new(&scene, 40.0);
-            let is_outside = |patch: &crate::hierarchy::Patch| {
-                let centre = crate::geometry::centroid(scene.corners(patch.triangle));
-                let world = scene.frame.to_world(centre);
-                let normal = patch.normal.as_dvec3();
-                (world.x.hypot(world.z) < 1.01)
-                    .then(|| DVec3::new(world.x, 0.0, world.z).dot(normal) > 0.0)
-            };
-            let is_up = |patch: &crate::hierarchy::Patch| {
-                (is_outside(patch).is_none()).then_some(patch.normal.y > 0.5)
-            };
-            for cluster in &hierarchy.clusters[1..] {
-                let patches = &hierarchy.patches[cluster.patches()];
-                let sides: Vec<bool> = patches.iter().filter_map(is_outside).collect();
-                let floor = patches.iter().filter_map(is_up);
-                let all: Vec<bool> = sides.into_iter().chain(floor).collect();
-                assert!(all.iter().all(|side| *side == all[0]), "{turned}: {all:?}");
-            }
-        }
-    }
-
     #[test]
     fn surfaces_with_one_side_alone_are_left_as_they_are() {
-        let strip = |u: f64, v: f64| {
-            let (sin, cos) = (u * std::f64::consts::TAU).sin_cos();
-            let (half_sin, half_cos) = (u * std::f64::consts::PI).sin_cos();
-            let out = 3.0 + (v - 0.5) * half_cos;
-            DVec3::new(out * cos, (v - 0.5) * half_sin, out * sin)
+        const QUADS: u32 = 24;
+        let mut builder = SceneBuilder::default();
+        let grey = Material::plain("grey", Vec3::splat(0.5), Vec3::ONE);
+        let material = builder.push_material(grey);
+        // The edges of a Möbius strip meet after a turn with their ends exchanged.
+        let on_strip = |number: u32, across: f64| {
+            let turn = std::f64::consts::TAU * f64::from(number) / f64::from(QUADS);
+            let (sin, cos) = turn.sin_cos();
+            let (half_sin, half_cos) = (0.5 * turn).sin_cos();
+            let out = 3.0 + across * half_cos;
+            DVec3::new(out * cos, across * half_sin, out * sin)
         };
-        let scene = scene_of(|builder| grid(builder, [24, 2], 1000, strip));
+        let mut corner = |number, across| builder.push_position(on_strip(number, across));
+        let ends: Vec<[u32; 3]> = (0..=QUADS)
+            .map(|number| [-0.5, 0.0, 0.5].map(|across| corner(number, across)))
+            .collect();
+        for pair in ends.windows(2) {
+            for half in 0..2 {
+                let [a, b] = [pair[0][half], pair[1][half]];
+                let [c, d] = [pair[1][half + 1], pair[0][half + 1]];
+                builder.push_triangle([a, b, c], material);
+                builder.push_triangle([a, c, d], material);
+            }
+        }
+        let options = SceneOptions::with_sides(Sidedness::Two);
+        let scene = builder.finish(&options).unwrap();
         let sides = SheetSides::of(&scene, &mut None).unwrap();
         for index in 0..scene.triangles.len() as u32 {
             let [front, back] =

@@ -77,7 +77,7 @@ fn end_below(clusters: &[Cluster], mut at: usize) -> usize {
     while !clusters[at].is_leaf() {
         let first = clusters[at].first_child as usize;
         end = first + 2;
-        // What is below the second child comes last.
+        // The nodes below the second child come last.
         at = if clusters[first + 1].is_leaf() {
             first
         } else {

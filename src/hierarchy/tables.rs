@@ -1,4 +1,4 @@
-//! What every node shows as a source: directional moments of clusters, radiosity of elements.
+//! Every node as a source: directional moments of clusters, radiosity of elements.
 //!
 //! Four channels travel together: red, green, blue, and in `w` what a radiosity of 1 everywhere would give. As a source
 //! `w` holds projected area, as irradiance the sum of form factors, which must be 1 in a closed scene.
@@ -7,6 +7,8 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Subtrees};
+
+use crate::scene::LUMINANCE;
 
 /// Source tables of all nodes.
 #[derive(Clone, Debug, Default)]
@@ -133,7 +135,7 @@ impl Tables {
         }
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.clusters.as_slice())
             + size_of_val(self.brightest.as_slice())
@@ -143,7 +145,7 @@ impl Tables {
     }
 }
 
-/// What clusters are pulled from.
+/// The source that clusters are pulled from.
 #[derive(Clone, Copy)]
 struct Level<'a> {
     hierarchy: &'a Hierarchy,
@@ -221,5 +223,5 @@ impl Slices<'_> {
 
 /// Luminance of linear RGB (Rec. 709), by which errors of colours are weighed; `w` does not count.
 pub fn luminance(color: Vec4) -> f32 {
-    color.dot(Vec4::new(0.2126, 0.7152, 0.0722, 0.0))
+    color.dot(LUMINANCE.extend(0.0))
 }

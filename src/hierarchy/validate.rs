@@ -112,7 +112,7 @@ impl Hierarchy {
 
     /// No edge of a leaf carries more than one hanging point.
     fn validate_balance(&self) -> Result<(), String> {
-        for leaf in self.mesh.held_leaves() {
+        for leaf in self.mesh.active_leaves() {
             if self.mesh.hangs_twice(leaf) {
                 return Err(format!("element {leaf}: a neighbour is two levels finer"));
             }

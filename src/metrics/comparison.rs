@@ -5,16 +5,16 @@ use serde::Serialize;
 use super::{Measurement, Runner, Trajectory, error_text, smallest_error};
 use crate::reference::SampledSurfaces;
 
-/// Errors for which the table tells the time.
+/// Errors for which the table has the time.
 pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 
 /// Errors at which runs are compared with the bake.
 const RATIO_TARGETS: [f64; 2] = [0.1, 0.05];
 
-/// What errors are measured against.
+/// The reference of errors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReferenceFacts {
-    /// What the errors are means of.
+    /// The surfaces that the errors are means over.
     pub surfaces: SampledSurfaces,
     /// Surface points.
     pub points: usize,
@@ -33,7 +33,7 @@ pub struct SceneComparison {
     pub scene: String,
     /// Its triangles.
     pub triangles: usize,
-    /// What errors are measured against.
+    /// The reference of errors.
     pub reference: ReferenceFacts,
     /// The runs, in the order of the plan.
     pub runs: Vec<Trajectory>,
@@ -81,7 +81,7 @@ impl SceneComparison {
             .min_by(f64::total_cmp)
     }
 
-    /// The smallest error that can be told from none.
+    /// The smallest error that is distinguishable from 0.
     pub fn smallest_error(&self) -> f64 {
         smallest_error(self.reference.noise_floor)
     }

@@ -1,14 +1,14 @@
 //! Error of measured radiance against path-traced points, with the reference's own noise taken out.
 //!
 //! With x the luminance measured, r that of the reference and s its standard error, over n points:
-//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. What means over the points are means of is told
-//! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are left out, since their own light would
+//! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. The surfaces that means over the points stand for are given
+//! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are omitted, since their own light would
 //! dwarf the rest; where every point emits, all count.
 
 use glam::Vec3;
 use serde::Serialize;
 
-use crate::reference::{ReferencePoint, luminance};
+use crate::{reference::ReferencePoint, scene::luminance};
 
 /// Stands for the scale of a black reference, so that no figure divides by 0.
 const SMALLEST_SCALE: f64 = 1e-300;
@@ -23,7 +23,7 @@ pub struct ErrorMeasures {
     /// The same with the reference's noise still in it.
     pub relative_rms_noisy: f64,
     /// `relative_rms` without the worst 1 % of the points, which are mostly leaks under contact edges. Only points that
-    /// differ by more than the reference's noise can explain are left out.
+    /// differ by more than the reference's noise can explain are omitted.
     pub relative_rms_trimmed: f64,
     /// Mean measured over mean reference; 1 is right, absent where the reference is black.
     pub energy_ratio: Option<f64>,
@@ -35,7 +35,7 @@ pub struct ErrorMeasures {
     pub p95_pointwise: f64,
     /// Median of the difference over the reference at the same point.
     pub median_pointwise: f64,
-    /// Root mean square of the reference's standard error, relative: errors far below it cannot be told.
+    /// Root mean square of the reference's standard error, relative: errors far below it cannot be measured.
     pub noise_floor: f64,
     /// Root mean square of the reference, W·sr⁻¹·m⁻².
     pub reference_rms: f64,
@@ -45,12 +45,12 @@ pub struct ErrorMeasures {
     pub nonfinite: usize,
 }
 
-/// Noise-corrected errors below this share of the reference's noise cannot be told from none. Trimming drops points whose
+/// Noise-corrected errors below this share of the reference's noise cannot be distinguished from 0. Trimming drops points whose
 /// noise is large, so what is subtracted from the others is a little too much: by 0.3 of the noise where that is Gaussian
 /// and even. A smaller share calls noise an error of 0; a larger one hides what longer references would confirm.
 const RELIABLE_SHARE: f64 = 0.3;
 
-/// The smallest error that can be told from none under a reference with this noise; all relative.
+/// The smallest error that is distinguishable from 0 under a reference with this noise; all relative.
 pub fn smallest_error(noise_floor: f64) -> f64 {
     RELIABLE_SHARE * noise_floor
 }
@@ -174,7 +174,7 @@ fn luminance_measures(samples: &[Sample]) -> ErrorMeasures {
     }
 }
 
-/// Standard errors of the reference by which a point must differ to be left out. Smaller, and noise is trimmed away and
+/// Standard errors of the reference by which a point must differ to be omitted. Smaller, and noise is trimmed away and
 /// then subtracted once more; larger, and nothing can be trimmed under a noisy reference.
 const OUTLIER_DEVIATIONS: f64 = 4.0;
 
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn emitters_are_left_out_unless_all_emit() {
+    fn emitters_are_omitted_unless_all_emit() {
         let reference = [point(1.0, 0.0, 0.0), point(1.0, 50.0, 0.0)];
         let error = measure_error(&values(&[1.0, 0.0]), &reference).unwrap();
         assert_eq!(error.points, 1);

@@ -3,15 +3,11 @@
 mod comparison;
 mod error;
 mod lookup;
-pub mod omissions;
-mod scaling;
-pub mod stability;
 mod trajectory;
 mod vertex;
 
 pub use comparison::{ReferenceFacts, Row, SceneComparison, TARGETS, digits, grouped};
 pub use error::{ErrorMeasures, error_text, measure_error, smallest_error};
 pub use lookup::MeshLookup;
-pub use scaling::{COST_KINDS, CostKind, SizeCost, exponent_of, fitted_exponent, scaling_markdown};
-pub use trajectory::{CUT_SHORT_MARK, Crossing, Measurement, Runner, Trajectory};
+pub use trajectory::{CUT_SHORT_MARK, Crossing, Measurement, Runner, Trajectory, middle};
 pub use vertex::VertexReference;

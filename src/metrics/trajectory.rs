@@ -10,7 +10,7 @@ use crate::solver::SolveSettings;
 pub struct Measurement {
     /// Number of the step or pass, from 1.
     pub step: u32,
-    /// Seconds of computing, preparation included, measuring left out; the median where a run was repeated.
+    /// Seconds of computing, preparation included, measuring excluded; the median where a run was repeated.
     pub time_s: f64,
     /// Link threshold of the step, for solver runs.
     pub epsilon: Option<f32>,
@@ -22,13 +22,13 @@ pub struct Measurement {
     pub links: u64,
     /// Elements that receive light, or vertices of a bake.
     pub elements: u64,
-    /// Bytes held.
+    /// Bytes in use.
     pub memory_bytes: u64,
     /// How far off the light is.
     pub error: ErrorMeasures,
 }
 
-/// What ran.
+/// The runner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Runner {
@@ -43,9 +43,9 @@ pub enum Runner {
 /// A run as it was measured: error over time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trajectory {
-    /// What to call it in plots and tables.
+    /// Its label in plots and tables.
     pub label: String,
-    /// What ran.
+    /// The runner.
     pub runner: Runner,
     /// Its settings, for solver runs.
     pub settings: Option<SolveSettings>,
@@ -164,7 +164,7 @@ fn median(values: Vec<f64>) -> f64 {
 }
 
 /// The middle value, or the lower of two.
-pub(super) fn middle(mut values: Vec<f64>) -> Option<f64> {
+pub fn middle(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len().saturating_sub(1) / 2;
     values.get(middle).copied()

@@ -11,16 +11,16 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     geometry::RayTree,
-    reference::{BakePoint, bake, luminance},
-    scene::{Scene, TriangleId},
+    reference::{BakePoint, bake},
+    scene::{Scene, TriangleId, luminance},
     solver::{DisplayMesh, VertexLight},
 };
 
-/// Vertices traced between two looks at what else is to be done. Fewer leave threads idle at the end of a piece, more
+/// Vertices traced between two checks for other tasks. Fewer leave threads idle at the end of a piece, more
 /// keep a new snapshot waiting.
 const PIECE: usize = 4096;
 
-/// What is known of one vertex.
+/// Sums of one vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sums {
     /// Irradiance, summed over passes.
@@ -48,7 +48,7 @@ pub struct VertexReference {
 }
 
 impl VertexReference {
-    /// Samples a vertex and pass: one evenly spread group, the least that a scatter can be told from.
+    /// Samples a vertex and pass: one evenly spread group, the least that yields a variance.
     pub const SAMPLES_PER_PASS: u32 = 8;
 
     /// Nothing known yet about the vertices of a mesh.
@@ -71,8 +71,8 @@ impl VertexReference {
             .collect();
         let mut moved = Self::new(mesh, self.seed);
         for (vertex, sums) in moved.sums.iter_mut().enumerate() {
-            if let Some(held) = known.get(&place(mesh, vertex)) {
-                *sums = *held;
+            if let Some(earlier) = known.get(&place(mesh, vertex)) {
+                *sums = *earlier;
             }
         }
         moved
@@ -132,7 +132,7 @@ impl VertexReference {
     }
 
     /// Luminance by which the radiance of each vertex errs under this light, without the reference's noise, in units
-    /// of `unit` W·sr⁻¹·m⁻². `None` before two passes, from which the noise cannot be told, and for light of another
+    /// of `unit` W·sr⁻¹·m⁻². `None` before two passes, which yield no noise, and for light of another
     /// mesh.
     pub fn errors(&self, light: &VertexLight, unit: f64) -> Option<Vec<f32>> {
         if self.passes < 2 || light.irradiance.len() != self.points.len() {

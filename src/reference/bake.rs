@@ -103,7 +103,7 @@ impl<'a> VertexBake<'a> {
         self.ray_count
     }
 
-    /// Bytes held, with the ray tree.
+    /// Bytes in use, with the ray tree.
     pub fn memory_bytes(&self) -> usize {
         self.rays.memory_bytes()
             + size_of_val(self.starts.as_slice())

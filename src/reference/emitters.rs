@@ -4,8 +4,7 @@ use glam::{Vec2, Vec3};
 
 use crate::{
     geometry::triangle_point,
-    reference::luminance,
-    scene::{Scene, TriangleId},
+    scene::{Scene, TriangleId, luminance},
 };
 
 /// A point on an emitter.

@@ -17,7 +17,7 @@ use crate::{
 /// Bounces before Russian roulette begins. Earlier, noise grows; later, dark scenes waste rays.
 const SURE_BOUNCES: u32 = 3;
 
-/// Bounces after which a path is cut. At the reflectance clamp of 0.98 it leaves out a share of 1e-36; it only ends
+/// Bounces after which a path is cut. At the reflectance clamp of 0.98 it omits a share of 1e-36; it only ends
 /// the paths of a closed scene whose clamp was raised to 1.
 const MAX_BOUNCES: u32 = 4096;
 
@@ -54,9 +54,9 @@ impl Bounce {
     }
 }
 
-/// What an estimate needs to know.
+/// The inputs of an estimate.
 pub(super) struct Estimator<'a> {
-    /// What is lit.
+    /// The scene.
     pub(super) scene: &'a Scene,
     /// Its rays.
     pub(super) rays: &'a RayTree,
@@ -64,7 +64,7 @@ pub(super) struct Estimator<'a> {
     pub(super) emitters: &'a Emitters,
 }
 
-/// What a ray meets on a side that reflects.
+/// A hit on a side that reflects.
 struct Arrival {
     point: PathPoint,
     reflectance: Vec3,
@@ -132,7 +132,7 @@ impl Estimator<'_> {
         self.scene.emission_at(sample.triangle, sample.barycentric) * weight
     }
 
-    /// What lies at a hit, if that side reflects or emits.
+    /// The surface at a hit, if that side reflects or emits.
     fn arrive(&self, from: PathPoint, direction: Vec3, hit: Hit) -> Option<Arrival> {
         let source_cosine = self.lit_cosine(hit.triangle, direction);
         if source_cosine <= 0.0 {

@@ -171,7 +171,7 @@ impl StochasticJacobi {
             .collect()
     }
 
-    /// What turns weighted sums into means.
+    /// The factors from weighted sums to means.
     fn scale(&self) -> f64 {
         if self.weight > 0.0 {
             1.0 / self.weight
@@ -194,7 +194,7 @@ impl StochasticJacobi {
         self.ray_count
     }
 
-    /// Bytes held, with the ray tree.
+    /// Bytes in use, with the ray tree.
     pub fn memory_bytes(&self) -> usize {
         self.rays.memory_bytes()
             + self.mesh.memory_bytes()
@@ -257,7 +257,7 @@ impl StochasticJacobi {
     }
 }
 
-/// What a ray is chosen by: the power of all channels.
+/// The weight by which a ray is chosen: the power of all channels.
 fn importance(power: DVec3) -> f64 {
     power.element_sum()
 }

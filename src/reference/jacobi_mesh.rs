@@ -1,7 +1,7 @@
 //! Equal elements for stochastic Jacobi radiosity: triangles as they are, large ones cut into n² alike.
 //!
 //! Elements carry what arrives; vertices average it, so that light is shown without facets. Elements of neighbouring
-//! triangles share a vertex where their corners coincide and their faces bend little.
+//! triangles share a vertex where their corners coincide and the angle between their faces is small.
 
 use std::collections::HashMap;
 
@@ -176,7 +176,7 @@ impl ElementMesh {
         self.vertex_count
     }
 
-    /// Bytes held.
+    /// Bytes in use.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.sides.as_slice())
             + size_of_val(self.side_of.as_slice())

@@ -44,9 +44,9 @@ pub enum MatrixError {
     TooLarge {
         /// Sides of triangles that receive light.
         patches: usize,
-        /// What it would take.
+        /// The memory it would take.
         mebibytes: u64,
-        /// What it may take.
+        /// The memory it may take.
         limit_mebibytes: u64,
     },
     /// The caller asked to stop.
@@ -89,7 +89,7 @@ const MAX_SWEEPS: u32 = 5000;
 /// Fill and solve the matrix of a scene. `rays` is its ray tree; `cancel` is asked before every row.
 ///
 /// # Errors
-/// [`MatrixError::TooLarge`] beyond the memory limit, [`MatrixError::Cancelled`] when `cancel` came true.
+/// [`MatrixError::TooLarge`] above the memory limit, [`MatrixError::Cancelled`] when `cancel` came true.
 pub fn solve_matrix(
     scene: &Scene,
     rays: &RayTree,

@@ -13,17 +13,12 @@ mod jacobi;
 mod jacobi_mesh;
 mod matrix;
 mod path_trace;
+mod point;
 mod points;
 
 pub use bake::{BakePoint, VertexBake, bake};
 pub use jacobi::{JacobiSettings, StochasticJacobi};
 pub use matrix::{MatrixError, MatrixPatch, MatrixSettings, MatrixSolution, solve_matrix};
-pub use path_trace::{PathSettings, PathTraced, PathTracer, ReferencePoint};
+pub use path_trace::{PathSettings, PathTraced, PathTracer};
+pub use point::ReferencePoint;
 pub use points::{SampledSurfaces, sample_points};
-
-use glam::Vec3;
-
-/// Luminance of linear RGB (Rec. 709).
-pub fn luminance(rgb: Vec3) -> f32 {
-    rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}

@@ -1,6 +1,6 @@
 //! Irradiance at random surface points by path tracing, pass by pass, with its standard error.
 //!
-//! Where the points lie, and what means over them are means of, is told in [`super::points`]. Each takes its samples in
+//! For the points, and the surfaces that they stand for, see [`super::points`]. Each takes its samples in
 //! groups; a group covers the hemisphere with a randomly shifted low-discrepancy sequence, and since groups are
 //! independent their scatter gives an unbiased variance. All random numbers belong to a point and a group, so the
 //! result does not depend on threads.
@@ -13,15 +13,15 @@ use rayon::prelude::*;
 use super::{
     emitters::Emitters,
     estimator::{Bounce, Estimator, PathPoint},
-    luminance,
+    point::ReferencePoint,
     points::{SampledSurfaces, sample_points},
 };
 use crate::{
     geometry::{Random, RayTree, low_discrepancy_2d},
-    scene::{Scene, TriangleId},
+    scene::{Scene, luminance},
 };
 
-/// Samples of a group. Fewer lose stratification, more leave too few groups to tell the variance from.
+/// Samples of a group. Fewer lose stratification, more leave too few groups to estimate the variance.
 const GROUP: u32 = 8;
 
 /// How a path-traced reference is made.
@@ -45,44 +45,12 @@ impl Default for PathSettings {
     }
 }
 
-/// A point of the reference.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReferencePoint {
-    /// The triangle it lies on.
-    pub triangle: TriangleId,
-    /// Whether it lies on the back of a two-sided triangle.
-    pub is_back: bool,
-    /// Its place in the triangle; sums to 1.
-    pub barycentric: Vec3,
-    /// Position in frame units.
-    pub position: Vec3,
-    /// Unit normal towards the lit side.
-    pub normal: Vec3,
-    /// Reflectance there.
-    pub reflectance: Vec3,
-    /// Emitted radiance there, W·sr⁻¹·m⁻².
-    pub emission: Vec3,
-    /// Irradiance, W/m²; 0 before the first pass.
-    pub irradiance: Vec3,
-    /// Standard error of the luminance of the irradiance, W/m².
-    pub irradiance_error: f32,
-    /// Standard error of the luminance of the radiance, W·sr⁻¹·m⁻².
-    pub standard_error: f32,
-}
-
-impl ReferencePoint {
-    /// Radiance that leaves the point, emitted and reflected, W·sr⁻¹·m⁻².
-    pub fn radiance(&self) -> Vec3 {
-        self.emission + self.reflectance * self.irradiance * std::f32::consts::FRAC_1_PI
-    }
-}
-
 /// A reference as it stands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathTraced {
     /// Random points.
     pub points: Vec<ReferencePoint>,
-    /// What means over them are means of.
+    /// The surfaces that they stand for.
     pub surfaces: SampledSurfaces,
     /// Samples taken at each point so far.
     pub samples: u32,

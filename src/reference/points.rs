@@ -1,8 +1,8 @@
-//! Where the reference looks: random points of the surfaces whose light may be wrong.
+//! The points of the reference: random points of the surfaces whose light is to be measured.
 //!
 //! Points lie on sides that reflect and do not emit all over: elsewhere there is no error to see, and a sky would take
 //! nearly all of them. They are uniform over the area, so plain means over them are area-weighted. Where most of the area
-//! lies far beyond the objects of the scene (a ground to the horizon, a dome), two groups count alike, each weighted by
+//! lies far outside the objects of the scene (a ground to the horizon, a dome), two groups count alike, each weighted by
 //! area: what lies within reach of the objects, and the surroundings. Both have half of the points, so that plain means
 //! over all points are means of both groups.
 
@@ -17,7 +17,7 @@ use crate::{
     scene::{DisjointSets, Scene, TriangleId},
 };
 
-/// What means over the points of a reference are means of.
+/// The surfaces that the points of a reference stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SampledSurfaces {
     /// Whether nothing reflects without emitting, so that all surfaces count.
@@ -36,7 +36,7 @@ impl fmt::Display for SampledSurfaces {
             None => Ok(()),
             Some(reach) => write!(
                 f,
-                " within two groups that count alike: up to {} units from the objects, and the surroundings beyond",
+                " within two groups that count alike: up to {} units from the objects, and the surroundings outside",
                 rounded(reach)
             ),
         }
@@ -504,11 +504,10 @@ mod tests {
         }
 
         fn sample(self) -> (Scene, Vec<ReferencePoint>, SampledSurfaces) {
-            let options = SceneOptions {
-                sides: Sides::One,
-                ..SceneOptions::default()
-            };
-            let scene = self.0.finish(&options).unwrap();
+            let scene = self
+                .0
+                .finish(&SceneOptions::with_sides(Sides::One))
+                .unwrap();
             let rays = RayTree::new(&scene);
             let (points, surfaces) = sample_points(&scene, &rays, COUNT, 1);
             assert_eq!(points.len(), COUNT as usize);
@@ -705,8 +704,11 @@ mod tests {
                 reach: 1.0,
             };
             let (inside, outside) = region.split(&scene, &sides);
-            let [within, beyond] = [area(&inside), area(&outside)];
-            assert!((within + beyond - total).abs() < 1e-9 * total, "{a} {b}");
+            let [within, outside_area] = [area(&inside), area(&outside)];
+            assert!(
+                (within + outside_area - total).abs() < 1e-9 * total,
+                "{a} {b}"
+            );
             for piece in inside.iter().chain(&outside) {
                 let middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) / 3.0;
                 let [u, v, w] = scene.corners(piece.side.triangle).map(|at| at.as_dvec3());

@@ -10,9 +10,9 @@ use super::clean::{Notes, ObjCleaner};
 /// Chunks that may wait for the parser. Fewer, and both wait for each other's slow ones; more only hold memory.
 const CHUNKS_AHEAD: usize = 16;
 
-/// What the parser made of the clean text and what was noted meanwhile; `None` for what panicked.
+/// The results of the parser and of the cleaner; `None` where one panicked.
 pub(super) struct Parsed<T> {
-    /// What the parser returned.
+    /// The result of the parser.
     pub(super) value: Option<T>,
     /// Notes of the cleaner.
     pub(super) notes: Option<Notes>,
@@ -38,7 +38,7 @@ pub(super) fn parse_ahead<T>(
         };
         // The clean text is valid for the parser; should it panic nevertheless, the window must survive.
         let value = std::panic::catch_unwind(AssertUnwindSafe(|| parse(&mut text))).ok();
-        // The cleaner stops where nobody reads on.
+        // The cleaner stops when the parser stops reading.
         drop(text);
         Ok(Parsed {
             value,
@@ -47,7 +47,7 @@ pub(super) fn parse_ahead<T>(
     })
 }
 
-/// Send chunks until there are no more or nobody wants them.
+/// Send chunks until there are no more or the receiver is gone.
 fn clean(mut cleaner: ObjCleaner<impl BufRead>, sender: &SyncSender<Vec<u8>>) -> Notes {
     while let Some(chunk) = cleaner.next_chunk() {
         if sender.send(chunk).is_err() {

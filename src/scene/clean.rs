@@ -4,7 +4,7 @@
 //! The parser reads nothing but ASCII `v`, `vt`, `vn`, `f` and `o` statements. Its `o` names are numbers of
 //! [`Segment`]s. The first `vt` and the first `vn` it sees are not numbers: they stand for "none".
 //! Faces that follow each other are handed over as one long face, which it reads several times faster than many short
-//! ones; [`FaceNote`] says where each ends.
+//! ones; [`FaceNote`] has the end of each.
 
 use std::collections::HashMap;
 use std::io::BufRead;
@@ -51,7 +51,7 @@ pub(super) struct ForeignNumber {
     pub(super) line: usize,
 }
 
-/// What was noted beside the text.
+/// Notes of the cleaner.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     /// Segments by the number that the parser sees as their name.
@@ -60,11 +60,11 @@ pub(super) struct Notes {
     pub(super) faces: Vec<FaceNote>,
     /// Names of `usemtl`, in order of first use.
     pub(super) materials: Vec<Mention>,
-    /// What follows `mtllib`, each once.
+    /// Arguments of `mtllib`, each once.
     pub(super) libraries: Vec<Mention>,
     /// The first number of a vertex in a notation that cannot be read.
     pub(super) foreign_number: Option<ForeignNumber>,
-    /// Faces that were left out.
+    /// Faces that were omitted.
     pub(super) skipped_faces: usize,
     /// OBJ statements that were understood.
     pub(super) statements: usize,
@@ -72,7 +72,7 @@ pub(super) struct Notes {
     pub(super) any_text: bool,
     /// The error that ended reading.
     pub(super) failure: Option<String>,
-    /// What was cured or skipped.
+    /// Corrections and omissions.
     pub(super) log: WarningLog,
 }
 
@@ -87,7 +87,7 @@ pub(super) struct ObjCleaner<R> {
     clean: Vec<u8>,
     /// Whether the clean text ends within a face, which the next one continues.
     in_face: bool,
-    /// What was found.
+    /// Notes so far.
     pub(super) notes: Notes,
     position_count: i64,
     texcoord_count: i64,
@@ -187,15 +187,15 @@ impl<R: BufRead> ObjCleaner<R> {
             b"" | [b'#', ..] => return,
             b"l" | b"p" => (
                 WarningKind::Unsupported,
-                "lines and points have no surface and were left out",
+                "lines and points have no surface and were omitted",
             ),
             b"curv" | b"curv2" | b"surf" => (
                 WarningKind::Unsupported,
-                "free-form curves and surfaces (NURBS) were left out; export them as polygons",
+                "free-form curves and surfaces (NURBS) were omitted; export them as polygons",
             ),
             b"call" | b"csh" => (
                 WarningKind::Unsupported,
-                "calls of other files and commands were left out",
+                "calls of other files and commands were omitted",
             ),
             // Smoothing, display hints and the details of free-form surfaces change nothing here.
             b"s" | b"mg" | b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"parm" | b"trim"
@@ -226,12 +226,12 @@ impl<R: BufRead> ObjCleaner<R> {
                     let first = ForeignNumber { notation, line };
                     self.notes.foreign_number.get_or_insert(first);
                     let Notation { name, cure } = notation;
-                    &format!("vertex with {name}; faces that use it are left out; {cure}")
+                    &format!("vertex with {name}; faces that use it are omitted; {cure}")
                 }
                 None if trouble == Number::NotFinite => {
-                    "vertex that is not a finite number; faces that use it are left out"
+                    "vertex that is not a finite number; faces that use it are omitted"
                 }
-                None => "vertex without three numbers; faces that use it are left out",
+                None => "vertex without three numbers; faces that use it are omitted",
             };
             self.note(WarningKind::LineSkipped, message, line);
         } else if rest.nth(2).is_some() {
@@ -345,7 +345,7 @@ impl<R: BufRead> ObjCleaner<R> {
                 count: 1,
             });
         } else {
-            let message = "skipped an mtllib beyond the first thousand";
+            let message = "skipped an mtllib after the first thousand";
             self.note(WarningKind::LineSkipped, message, line);
         }
     }
@@ -463,7 +463,7 @@ fn parse_corner(word: &[u8]) -> Result<[Option<i64>; 3], Reason> {
     Ok(corner)
 }
 
-/// A decimal integer; beyond 18 digits it saturates, which is out of every range.
+/// A decimal integer; with more than 18 digits it saturates, which is out of every range.
 fn parse_integer(word: &[u8]) -> Option<i64> {
     let (negative, digits) = match word {
         [b'-', digits @ ..] => (true, digits),
@@ -567,7 +567,7 @@ mod tests {
     }
 
     #[test]
-    fn indices_beyond_all_range_are_refused() {
+    fn indices_out_of_all_range_are_refused() {
         for corner in [
             "0",
             "4",

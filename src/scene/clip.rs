@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 
-/// Triangles beyond so many are sorted to both sides of a line before they are cut out. Fewer cut polygons along lines for
+/// More triangles than this are sorted to both sides of a line before they are cut out. Fewer cut polygons along lines for
 /// nothing, more compare every piece with every triangle.
 const MANY: usize = 32;
 
@@ -14,9 +14,9 @@ const DEEPEST: u32 = 16;
 /// Polygons that a set of triangles leaves of one, and those that it covers; together they are the whole but for slivers.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
-    /// What no triangle covers.
+    /// Parts that no triangle covers.
     pub(super) open: Vec<Vec<DVec2>>,
-    /// What one covers.
+    /// Parts that one covers.
     pub(super) covered: Vec<Vec<DVec2>>,
 }
 
@@ -31,16 +31,16 @@ pub(super) fn turned_left([a, b, c]: [DVec2; 3]) -> [DVec2; 3] {
 
 /// Whether an edge of one of two convex polygons leaves them apart, or overlapping by no more than `width`.
 pub(super) fn are_apart(a: &[DVec2], b: &[DVec2], width: f64) -> bool {
-    let is_beyond = |a: &[DVec2], b: &[DVec2]| {
+    let is_apart = |a: &[DVec2], b: &[DVec2]| {
         edges(a).any(|edge| {
             let depth = b.iter().map(|&corner| edge.left_of(corner));
             depth.fold(f64::MIN, f64::max) <= width
         })
     };
-    is_beyond(a, b) || is_beyond(b, a)
+    is_apart(a, b) || is_apart(b, a)
 }
 
-/// Cut triangles out of a polygon. Pieces less wide than `least` are left out.
+/// Cut triangles out of a polygon. Pieces less wide than `least` are omitted.
 pub(super) fn cut_out(polygon: Vec<DVec2>, triangles: &[[DVec2; 3]], least: f64) -> Parts {
     let mut parts = Parts::default();
     cut_into(&mut parts, polygon, triangles, least, 0);

@@ -17,7 +17,7 @@ pub(super) const COPLANAR: f64 = 4e-7;
 /// overlap, more misses narrow faces.
 pub(super) const TOUCHING: f64 = 2e-6;
 
-/// What distances about a point are told apart by: how far from the origin it lies, at least half of what the frame fits.
+/// Scale of the distances about a point: how far from the origin it lies, at least half of what the frame fits.
 pub(super) fn reach(at: DVec3) -> f64 {
     at.abs().max_element().max(0.5 * super::Frame::EXTENT)
 }
@@ -32,7 +32,7 @@ const NORMAL_CELLS: f64 = 64.0;
 /// Cells of planes per unit of their distance from the origin, likewise.
 const DISTANCE_CELLS: f64 = 8.0;
 
-/// Triangles that each triangle of a plane overlaps at most, on average. What lies in so many layers is a heap in which
+/// Triangles that each triangle of a plane overlaps at most, on average. Triangles in more layers are a heap in which
 /// nothing is anyone's back: it is left as it is. Fewer gives up on doubled meshes, more takes long on heaps.
 const MOST_LAYERS: usize = 64;
 

@@ -36,10 +36,10 @@ const MOST_CORNERS: usize = 512;
 /// crosses everything. Fewer leave rooms of many sheets uncut, more let what crosses outweigh the scene.
 const MOST_LINES_IN_ALL: usize = 1 << 11;
 
-/// What is nearer than this lies in one place, frame units: half of the distance that rays keep from their ends.
+/// Points nearer than this are one place, frame units: half of the distance that rays keep from their ends.
 const SAME_PLACE: f64 = 5e-5;
 
-/// And relative to the distance from the origin: what single precision tells apart.
+/// The same relative to the distance from the origin: the resolution of single precision.
 const SAME_PLACE_RELATIVE: f64 = 5e-7;
 
 /// Cut the faces of a scene. Parts keep what their face has; their textures are averaged anew.
@@ -281,7 +281,7 @@ struct Points {
     known: HashMap<[i64; 3], Vec<u32>>,
 }
 
-/// What a triangle is cut into: corners with their barycentric coordinates on it; empty where it stays whole.
+/// The parts of a triangle: corners with their barycentric coordinates on it; empty where it stays whole.
 #[derive(Clone, Debug, Default)]
 struct Parts(Vec<[(u32, DVec3); 3]>);
 

@@ -1,39 +1,10 @@
 //! How bright the solver's numbers are: any emission that single precision holds is brought into a range in which sums
 //! and squares over a scene neither overflow nor vanish, and light is multiplied back on its way out.
 
-use glam::Vec3;
-
-use super::{SceneBuilder, TextureId};
-
-/// Brightest emission of a channel in units of the scene. The square of the power of a bright frame, 1e5 square units of
-/// area, must stay below what single precision holds: much more overflows. Less would scale scenes for no reason; the
-/// sun's surface has 2e7 W·sr⁻¹·m⁻².
-const MOST: f32 = 1e12;
-
-/// Scenes whose brightest emission is less are scaled, too. Much less, and squares of light that has been reflected
-/// vanish; more would scale scenes for no reason.
-const LEAST: f32 = 1e-12;
-
-/// A channel that is neither negative nor infinite nor no number.
-pub(super) fn cured(channel: f32) -> f32 {
-    if channel.is_finite() {
-        channel.max(0.0)
-    } else {
-        0.0
-    }
-}
-
-/// Emission in units of the scene, within its range; of what is too bright the colour stays.
-pub(super) fn limited(emission: Vec3) -> Vec3 {
-    let emission = emission.map(cured);
-    let brightest = emission.max_element();
-    if brightest > MOST {
-        // Divided first, so that nothing overflows.
-        emission / brightest * MOST
-    } else {
-        emission
-    }
-}
+use super::{
+    SceneBuilder, TextureId,
+    ranges::{MAX_EMISSION, MIN_BRIGHTEST_EMISSION},
+};
 
 impl SceneBuilder {
     /// Divide all emission by one power of two, so that the brightest comes into range, and return that: 1 where it is
@@ -67,7 +38,7 @@ impl SceneBuilder {
             let most = material.emission_texture.map_or(1.0, of_texture).max(1.0);
             brightest = brightest.max(emission.max_element() * most);
         }
-        let [least, most] = [LEAST, MOST].map(f64::from);
+        let [least, most] = [MIN_BRIGHTEST_EMISSION, MAX_EMISSION].map(f64::from);
         let exponent = if brightest > most {
             (brightest / most).log2().ceil()
         } else if brightest > 0.0 && brightest < least {
@@ -75,7 +46,7 @@ impl SceneBuilder {
         } else {
             0.0
         };
-        // Textures times their factors may be beyond single precision by far; so is then what comes out.
+        // Textures times their factors may be far outside single precision; so may be the result.
         let unit = exponent.clamp(-126.0, 127.0).exp2();
         for (material, emission) in self.materials.iter_mut().zip(emissions) {
             let largest = emission.max_element() / unit;
@@ -85,7 +56,7 @@ impl SceneBuilder {
         unit as f32
     }
 
-    /// Divide textures that are brighter than [`MOST`] by powers of two. By texture: by what, and its brightest channel
+    /// Divide textures that are brighter than [`MAX_EMISSION`] by powers of two. By texture: by what, and its brightest channel
     /// then.
     fn scale_textures(&mut self) -> Vec<(f64, f32)> {
         let mut emits = vec![false; self.textures.len()];
@@ -105,7 +76,7 @@ impl SceneBuilder {
                 }
                 let channels = texture.pixels.iter().map(|pixel| pixel.max_element());
                 let brightest = channels.fold(0.0, f32::max);
-                if brightest <= MOST {
+                if brightest <= MAX_EMISSION {
                     return (1.0, brightest);
                 }
                 let factor = f64::from(brightest).log2().ceil().exp2();
@@ -120,7 +91,7 @@ impl SceneBuilder {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec3, Vec2};
+    use glam::{DVec3, Vec2, Vec3};
 
     use super::*;
     use crate::scene::{
@@ -157,7 +128,7 @@ mod tests {
 
     fn assert_emission(scene: &Scene, triangle: usize, expected: DVec3) {
         let emission = scene.surfaces[triangle].emission;
-        assert!(emission.max_element() <= MOST);
+        assert!(emission.max_element() <= MAX_EMISSION);
         let emission = emission.as_dvec3() * f64::from(scene.radiance_unit);
         let difference = (emission - expected).abs().max_element();
         assert!(
@@ -176,7 +147,7 @@ mod tests {
             assert_emission(&scene, 1, bright.as_dvec3());
             let is_scaled = !(1e-12..=1e12).contains(&most);
             assert_eq!(scene.radiance_unit != 1.0, is_scaled, "{most}");
-            assert!(scene.surfaces[1].emission.x >= 0.9 * LEAST);
+            assert!(scene.surfaces[1].emission.x >= 0.9 * MIN_BRIGHTEST_EMISSION);
             let clamped = |kind| kind == WarningKind::ValueClamped;
             assert!(!scene.warnings.iter().any(|warning| clamped(warning.kind)));
         }
@@ -189,26 +160,26 @@ mod tests {
             let pixels = [pixels[0], pixels[1] * 0.5];
             let scene = scene(&[Vec3::splat(emission), Vec3::splat(1e-3)], Some(pixels));
             let mean = scene.surfaces[0].emission;
-            assert!(mean.is_finite() && mean.x <= MOST);
+            assert!(mean.is_finite() && mean.x <= MAX_EMISSION);
             let mean = mean.as_dvec3() * f64::from(scene.radiance_unit);
             let share = mean.x / f64::from(emission) / f64::from(pixel);
             assert!(share > 0.5 && share < 1.0, "{share}");
             assert!((mean.y / mean.x - 0.5).abs() < 1e-6);
         }
-        let beyond = scene(&[Vec3::splat(1e38)], Some([Vec3::splat(1e38); 2]));
-        assert!(beyond.radiance_unit.is_finite());
-        assert!(beyond.surfaces[0].emission.x <= MOST);
+        let brightest = scene(&[Vec3::splat(1e38)], Some([Vec3::splat(1e38); 2]));
+        assert!(brightest.radiance_unit.is_finite());
+        assert!(brightest.surfaces[0].emission.x <= MAX_EMISSION);
     }
 
     #[test]
-    fn wishes_beyond_the_range_keep_their_colour() {
+    fn appearances_out_of_range_keep_their_colour() {
         let scene = scene(&[Vec3::ONE], None);
-        let wish = Appearance {
+        let request = Appearance {
             reflectance: Vec3::ZERO,
             emission: Vec3::new(f32::MAX, 1e38, 0.0),
         };
-        let allowed = scene.allowed(&[wish])[0].emission;
-        assert!(allowed.x <= MOST && allowed.x > 0.99 * MOST);
+        let allowed = scene.allowed(&[request])[0].emission;
+        assert!(allowed.x <= MAX_EMISSION && allowed.x > 0.99 * MAX_EMISSION);
         assert!((allowed.y / allowed.x - 1e38 / f32::MAX).abs() < 1e-6);
         assert_eq!(scene.appearances().len(), 1);
         assert_eq!(scene.triangles[0].material, MaterialId(0));

@@ -19,6 +19,11 @@ impl Frame {
     /// Much smaller, and ray tests on fine meshes underflow; much larger, and they overflow.
     pub const EXTENT: f64 = 100.0;
 
+    /// Area times unit normal in frame units of a triangle in world coordinates.
+    pub(super) fn area_vector(&self, [a, b, c]: [DVec3; 3]) -> Vec3 {
+        ((b - a).cross(c - a) * (0.5 * self.scale * self.scale)).as_vec3()
+    }
+
     /// The frame that fits a box of world coordinates. A box without extent keeps its scale.
     pub fn fitting(min: DVec3, max: DVec3) -> Self {
         let extent = (max - min).max_element();

@@ -9,7 +9,7 @@ use super::mtl::MtlMaterial;
 /// A material with the file it comes from.
 #[derive(Debug)]
 pub(super) struct Defined {
-    /// What the file says.
+    /// The material as in the file.
     pub(super) material: MtlMaterial,
     /// Name of the file, without its folder.
     pub(super) file: String,

@@ -70,7 +70,7 @@ impl SceneBuilder {
             let Some((id, variant)) = *wanted else {
                 continue;
             };
-            // The first takes the place of the original, which nobody else needs.
+            // The first takes the place of the original, which is not needed otherwise.
             if variants[id.index()][0] == variant {
                 continue;
             }
@@ -106,7 +106,7 @@ fn most(texture: &Texture) -> f32 {
     pixels.fold(0.0, |most, pixel| pixel.max_element().max(most))
 }
 
-/// What the pixels lose in the mean where, times the factor, they end at 1; of the channel that loses most.
+/// Mean loss of the pixels when they are multiplied by the factor and clamped to 1; of the channel that loses most.
 fn mean_loss(texture: &Texture, factor: Vec3) -> f32 {
     let excess = |pixel: &Vec3| (*pixel * factor - 1.0).max(Vec3::ZERO).as_dvec3();
     let sum: DVec3 = texture.pixels.iter().map(excess).sum();

@@ -53,7 +53,7 @@ impl<R: BufRead> LogicalLines<R> {
         Ok(Some(first))
     }
 
-    /// What only the first line has.
+    /// The byte-order mark of the first line.
     fn begin(&mut self, log: &mut WarningLog, file: &str) {
         if self.text.starts_with(b"\xef\xbb\xbf") {
             self.text.drain(..3);
@@ -142,7 +142,7 @@ impl<R: BufRead> LogicalLines<R> {
     }
 }
 
-/// Text from bytes. What is not UTF-8 becomes one character a byte, so that different names stay different.
+/// Text from bytes. Bytes that are not UTF-8 become one character each, so that different names stay different.
 pub(super) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),
@@ -210,12 +210,12 @@ pub(super) fn label(text: &str) -> &str {
     name
 }
 
-/// What a word is as a number.
+/// A word read as a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     /// A number that single precision can hold.
     Finite,
-    /// NaN, an infinity, or beyond single precision.
+    /// NaN, an infinity, or outside single precision.
     NotFinite,
     /// A number but for a comma, as in `0,5`. It may be a decimal comma or stand between thousands or numbers.
     Comma,
@@ -285,9 +285,9 @@ impl Number {
 /// A way to write numbers that is not that of OBJ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Notation {
-    /// What such a number has.
+    /// The notation, in words.
     pub(super) name: &'static str,
-    /// What to do about it.
+    /// The remedy, in words.
     pub(super) cure: &'static str,
 }
 

@@ -27,13 +27,13 @@ pub(super) enum Missing {
 #[derive(Debug)]
 pub(super) struct SceneFolder {
     root: PathBuf,
-    /// The root without symbolic links, where it can be told.
+    /// The root without symbolic links, where it is known.
     followed_root: Option<PathBuf>,
     /// Folders that were searched, relative to the root.
     listings: HashMap<PathBuf, Listing>,
 }
 
-/// What a folder holds, by names in one letter case and Unicode form.
+/// The entries of a folder, by names in one letter case and Unicode form.
 type Listing = HashMap<String, Vec<OsString>>;
 
 /// Bytes of a name at most: file systems allow no longer ones.
@@ -61,7 +61,7 @@ impl SceneFolder {
     /// fit the longest end of its path. Symbolic links are followed where they stay inside.
     ///
     /// # Errors
-    /// What keeps the last name from being found.
+    /// Why the last name was not found.
     pub(super) fn locate(
         &mut self,
         folder: &Path,
@@ -158,7 +158,7 @@ impl SceneFolder {
         found
     }
 
-    /// What a folder inside the root holds.
+    /// The entries of a folder inside the root.
     fn listing(&mut self, path: &Path) -> &Listing {
         if !self.listings.contains_key(path) {
             let listing = self.read_listing(path);

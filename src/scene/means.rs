@@ -23,7 +23,7 @@ impl TextureMeans {
         emission: Vec3::ONE,
     };
 
-    /// What a material of this appearance shows there. Its reflectance is at most `most` per channel.
+    /// The mean appearance of a material there. Its reflectance is at most `most` per channel.
     pub fn times(&self, appearance: &Appearance, most: f32) -> Appearance {
         let reflectance = appearance.reflectance * self.reflectance;
         Appearance {

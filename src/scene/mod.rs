@@ -1,4 +1,4 @@
-//! What is lit: triangles with reflectance, emission and sidedness, in a frame of known size.
+//! Scenes: triangles with reflectance, emission and sidedness, in a frame of known size.
 //!
 //! A [`Scene`] is made by [`SceneBuilder`], whatever it comes from (an OBJ file, a built-in scene, a test), so that
 //! every scene obeys the same promises: finite positions in the unit frame, no zero-area triangle, reflectance below
@@ -6,15 +6,19 @@
 //! Units: radiance in units of [`Scene::radiance_unit`], lengths in units of the frame (see [`Frame`]).
 
 mod ahead;
+mod appearance;
 mod build;
+mod builder;
 pub mod builtin;
 mod clean;
 mod clip;
+mod color;
 mod coplanar;
 mod crossings;
 mod edges;
 mod emission;
 mod encoding;
+mod fit;
 mod frame;
 mod library;
 mod limited;
@@ -24,32 +28,42 @@ mod means;
 mod mtl;
 mod nesting;
 mod obj;
+mod omitted_textures;
+mod options;
 mod orientation;
 mod overlay;
 mod progress;
+mod ranges;
+mod read_error;
 mod relight;
+mod shells;
 mod sidedness;
 mod size_classes;
 mod source;
-mod spared;
 mod texture;
 mod texture_statement;
 mod triangulate;
+mod up_axis;
+mod usable;
 mod warning;
 mod whole;
 mod write;
 
-pub use build::{BuildError, Face, SceneBuilder, SceneOptions, Sides, Source};
+pub use appearance::Appearance;
+pub use builder::{BuildError, Face, SceneBuilder, Source};
+pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use frame::Frame;
 pub use means::TextureMeans;
-pub use obj::{ReadError, read_obj, read_obj_with_progress};
+pub use obj::{read_obj, read_obj_with_progress};
+pub use options::{SceneOptions, Sides};
 pub use overlay::DOUBLED;
 pub use progress::ReadProgress;
-pub use relight::{Appearance, Awakened};
+pub use read_error::ReadError;
+pub use relight::ActiveMaterials;
 pub use size_classes::SizeClasses;
-pub use spared::Spared;
-pub use texture::Texture;
+pub use texture::{OmittedTextures, Texture};
+pub use up_axis::UpAxis;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
@@ -126,7 +140,7 @@ impl Material {
 pub struct Triangle {
     /// Indices into [`Scene::positions`].
     pub corners: [u32; 3],
-    /// What it is made of.
+    /// Its material.
     pub material: MaterialId,
     /// Whether the back reflects and emits as the front does. The back of a one-sided triangle is black but blocks.
     pub two_sided: bool,
@@ -160,7 +174,7 @@ pub struct Object {
 /// A scene ready to be lit.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What to call it in titles and reports: the file's stem or the built-in name.
+    /// Its name in titles and reports: the file's stem or the built-in name.
     pub name: String,
     /// The files that it comes from: the OBJ file, then MTL files and pictures that were found, those that no face shows
     /// included. Empty for generated scenes.
@@ -186,16 +200,16 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
-    /// What was skipped, cured or clamped on the way in.
+    /// Warnings: what was skipped, corrected or clamped.
     pub warnings: Vec<Warning>,
-    /// Textures that were left out on the way in.
-    pub spared: Spared,
+    /// Textures that were omitted on the way in.
+    pub omitted_textures: OmittedTextures,
     /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
     pub max_reflectance: f32,
     /// The textures, ready for means.
     averages: Arc<TextureAverages>,
-    /// What emission 1 stands for, W·sr⁻¹·m⁻²: emission here and light computed from it are multiplied by this on their way
-    /// out. A power of two, and 1 unless the file's brightest emission is beyond 1e-12 … 1e12.
+    /// The radiance of emission 1, W·sr⁻¹·m⁻²: emission here and light computed from it are multiplied by this on their way
+    /// out. A power of two, and 1 unless the file's brightest emission is outside 1e-12 … 1e12.
     pub radiance_unit: f32,
 }
 

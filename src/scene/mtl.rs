@@ -14,7 +14,7 @@ use super::warning::{WarningKind, WarningLog};
 /// A material as the file gives it; values are not yet checked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MtlMaterial {
-    /// What follows `newmtl`, without ASCII spaces around it.
+    /// The argument of `newmtl`, without ASCII spaces around it.
     pub(super) name: String,
     /// Line of `newmtl`.
     pub(super) line: usize,

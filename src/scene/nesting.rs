@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use super::Triangle;
 use super::coplanar::reach;
-use super::sidedness::Shells;
+use super::shells::Shells;
 
 /// Points of a shell that are asked where they lie, where there are few shells; odd, so that a majority is never a tie.
-/// Fewer mistake an object that pokes out of a wall for one beyond it, more take longer.
+/// Fewer mistake an object that pokes out of a wall for one behind it, more take longer.
 const POINTS: usize = 7;
 
 /// Points of all shells together, where each has more than one. More take memory in scenes of many leaves.
@@ -42,7 +42,7 @@ pub(super) fn parents(
         .map(|holder| {
             let faces = members.of_shell(holder);
             let inside = points.held_by(holder, faces, triangles, positions);
-            inside.into_iter().map(|held| (held, holder)).collect()
+            inside.into_iter().map(|inner| (inner, holder)).collect()
         })
         .collect();
     // Of coincident shells back to back, the one that looks inward lies within the other.
@@ -57,11 +57,11 @@ pub(super) fn parents(
             .is_lt()
     };
     let mut parents: Vec<Option<u32>> = vec![None; count];
-    for (held, holder) in holders.into_iter().flatten() {
-        if holds_space[held as usize] && !is_smaller(held, holder) {
+    for (inner, holder) in holders.into_iter().flatten() {
+        if holds_space[inner as usize] && !is_smaller(inner, holder) {
             continue;
         }
-        let parent = &mut parents[held as usize];
+        let parent = &mut parents[inner as usize];
         if parent.is_none_or(|known| is_smaller(holder, known)) {
             *parent = Some(holder);
         }
@@ -329,7 +329,7 @@ fn crossed(
             (to.1, from.1, -1.0)
         };
         let side = (to - from).truncate().perp_dot((at - from).truncate());
-        // What lies on the edge is given to one of its sides.
+        // A point on the edge counts for one of its sides.
         let is_left = (side >= 0.0) == (sign > 0.0);
         (side * sign, is_left)
     };

@@ -1,7 +1,7 @@
 //! Reading an OBJ file with its MTL files and textures into a [`Scene`].
 //!
-//! The file passes [`ObjCleaner`], beside it the parser, then [`Triangulator`], and ends in [`SceneBuilder`]. What can be
-//! skipped is skipped, counted and named with its line; only what leaves no scene is an error.
+//! The file passes [`ObjCleaner`], beside it the parser, then [`Triangulator`], and ends in [`SceneBuilder`]. Parts that can
+//! be skipped are skipped, counted and named with their lines; only a file without a usable face is an error.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -11,100 +11,23 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::ahead::parse_ahead;
-use super::build::{BuildError, Face, SceneBuilder, SceneOptions, Source};
+use super::builder::{BuildError, Face, SceneBuilder, Source};
 use super::clean::{FaceNote, ForeignNumber, MAX_LIBRARIES, Mention, Notes, ObjCleaner};
+use super::color::linear_from_srgb;
 use super::library::{Defined, Library};
 use super::lines::{Notation, spellings};
 use super::locate::{Missing, SceneFolder};
 use super::mtl::{MtlMaterial, read_mtl};
+use super::options::SceneOptions;
 use super::progress::ReadProgress;
+use super::read_error::ReadError;
 use super::source;
-use super::texture::{Role, linear_from_srgb};
+use super::texture::Role;
 use super::texture_statement::{TextureReference, TextureStatement};
 use super::triangulate::{Doubt, MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
+use super::whole::folder_of;
 use super::{Material, MaterialId, Scene, Texture, TextureId};
-
-/// Why an OBJ file gives no scene.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// No file of that name.
-    #[error("there is no such file; check the name: {}", path.display())]
-    NotFound {
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// A folder instead of a file.
-    #[error("this is a folder; name the OBJ file in it: {}", path.display())]
-    Folder {
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// A pipe or a device: it may have no end.
-    #[error("this is a pipe or a device; save the scene to a file first: {}", path.display())]
-    NotFile {
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// The system refuses to read it.
-    #[error("the file cannot be read ({reason}); check its permissions and the disk: {}", path.display())]
-    Unreadable {
-        /// What the system says.
-        reason: String,
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// Nothing but white space.
-    #[error("the file is empty; export the scene again: {}", path.display())]
-    Empty {
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// Another format.
-    #[error("this is not an OBJ text file; export the scene as Wavefront OBJ: {}", path.display())]
-    NotObj {
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// No face is left to light.
-    #[error("there are no usable faces{detail}; export the surfaces as polygons: {}", path.display())]
-    NoFaces {
-        /// Why they went, starting with a separator, or empty.
-        detail: String,
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// Numbers in a notation that cannot be read, and nothing else to light.
-    #[error("line {line} has {notation} in a vertex, so no usable faces are left; {cure}: {}", path.display())]
-    ForeignNumbers {
-        /// The first line of them.
-        line: usize,
-        /// How they are written.
-        notation: &'static str,
-        /// What to do about it.
-        cure: &'static str,
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// More than the program can index.
-    #[error("there are too many triangles or vertices ({count}, at most {limit}); split the scene: {}", path.display())]
-    TooLarge {
-        /// How many there are.
-        count: usize,
-        /// How many there may be.
-        limit: usize,
-        /// What was asked for.
-        path: PathBuf,
-    },
-    /// The parser gave up on text that was cleaned for it.
-    #[error("the OBJ parser gave up ({reason}); export the scene again with another program: {}", path.display())]
-    Parser {
-        /// What the parser says.
-        reason: String,
-        /// What was asked for.
-        path: PathBuf,
-    },
-}
 
 /// Read an OBJ file.
 ///
@@ -114,7 +37,7 @@ pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError>
     read_obj_with_progress(path, options, &ReadProgress::default())
 }
 
-/// Read an OBJ file and tell another thread how much of it has been read.
+/// Read an OBJ file and report to another thread how much of it has been read.
 ///
 /// # Errors
 /// As [`read_obj`].
@@ -138,7 +61,7 @@ pub fn read_obj_with_progress(
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     let mut import = Import {
         options,
-        folder: SceneFolder::new(folder_of(path)),
+        folder: SceneFolder::new(folder_of(path).to_owned()),
         builder: SceneBuilder {
             source: Source {
                 name: stem.to_string_lossy().into_owned(),
@@ -158,13 +81,6 @@ pub fn read_obj_with_progress(
     import.models(&models);
     drop(models);
     import.finish(path)
-}
-
-fn folder_of(path: &Path) -> PathBuf {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
-        _ => PathBuf::from("."),
-    }
 }
 
 /// Run the parser over the clean text.
@@ -245,7 +161,7 @@ impl Transparent {
     }
 }
 
-/// What the faces of a material can show.
+/// Texture coordinates of the faces of a material.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shown {
     has_faces: bool,
@@ -324,7 +240,7 @@ impl Import<'_> {
         self.warn_of_transparent(&transparent);
     }
 
-    /// What the faces of each material that is mentioned can show.
+    /// By material that is mentioned: whether its faces have texture coordinates.
     fn shown(&self, models: &[tobj::Model]) -> Vec<Shown> {
         let mut shown = vec![Shown::default(); self.notes.materials.len()];
         for model in models {
@@ -332,7 +248,7 @@ impl Import<'_> {
             let segment = segment.and_then(|segment| self.notes.segments.get(segment));
             if let Some(material) = segment.and_then(|segment| segment.material) {
                 shown[material].has_faces |= !model.mesh.indices.is_empty();
-                // What is not finite stands for none.
+                // Non-finite coordinates stand for none.
                 let mut texcoords = model.mesh.texcoords.iter();
                 shown[material].has_texcoords |= texcoords.any(|at| at.is_finite());
             }
@@ -449,7 +365,7 @@ impl Import<'_> {
             }
             Err(error) => {
                 let message =
-                    format!("material file '{file}' was left out: it cannot be read ({error})");
+                    format!("material file '{file}' was omitted: it cannot be read ({error})");
                 log.note(WarningKind::MaterialMissing, &message, "", 0);
             }
         }
@@ -475,7 +391,7 @@ impl Import<'_> {
                 return self.texture(map.as_ref()?, defined, role);
             }
             if let Some(map) = map {
-                self.builder.spared.unused_textures += 1;
+                self.builder.omitted_textures.unused_textures += 1;
                 self.note_unread(map, defined);
             }
             None
@@ -548,7 +464,7 @@ impl Import<'_> {
         let mut readings = statement.readings();
         let names: Vec<&str> = readings.iter().map(|reading| &*reading.name).collect();
         let located = self.folder.locate(&defined.folder, &names);
-        // What is nowhere is named without all that may surround a name.
+        // A missing file is named without quotes and other marks around its name.
         let meant = located
             .as_ref()
             .map_or(readings.len() - 1, |(number, _)| *number);
@@ -703,7 +619,7 @@ impl Import<'_> {
     fn push_face(&mut self, corners: &Corners, which: [usize; 3], base: usize, line: u32) {
         let index = |corner: usize| {
             let index = corners.mesh.indices[corners.start + corner] as usize + base;
-            // Beyond the range it stays out of range, and the builder says so.
+            // Out of range it stays out of range, and the builder says so.
             u32::try_from(index).unwrap_or(u32::MAX)
         };
         self.builder.faces.push(Face {

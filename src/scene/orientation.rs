@@ -1,27 +1,27 @@
 //! Which side of a closed shell is meant to be lit, where its winding cannot be what was meant.
 //!
 //! Closed shells divide space into regions: the inside of each, without what lies within shells in it, and the outside of
-//! all. A shell bounds two, and its winding says which of them it faces. Of that other things bear witness: sheets and
-//! lamps lie in a region that is seen, and so do the shells that face it.
+//! all. A shell bounds two, and its winding says which of them it faces. Other objects are evidence of which regions are seen:
+//! sheets and lamps lie in a region that is seen, and shells face one.
 //!
-//! * A shell that faces a region of which nothing else speaks, while something speaks of the one behind it, is wound the
+//! * A shell that faces a region without other evidence, while there is evidence for the one behind it, is wound the
 //!   wrong way: a solid that is inside out, a room or a sky that looks away from what is in it.
 //! * Where light shines on its back and its front is needed, too, both sides are lit, as those of a sheet are.
-//! * Shading normals of the file that oppose the winding tell that a shell was mirrored.
+//! * Shading normals of the file that oppose the winding show that a shell was mirrored.
 //!
-//! A hollow wall, whose outer shell looks outward and whose inner one looks inward, is as it should be: of the region
-//! between them nothing speaks.
+//! A hollow wall, whose outer shell looks outward and whose inner one looks inward, is correct: there is
+//! no evidence for the region between them.
 
 use glam::Vec3;
 
-use super::sidedness::Shells;
+use super::shells::Shells;
 
 /// Mean cosine between the shading normals of a shell and the normals of its faces, weighted by area, at or below which the
-/// former oppose the winding: half way between normals that tell nothing and those of a mirrored shell. Those of a smooth
+/// former oppose the winding: half way between normals without information and those of a mirrored shell. Those of a smooth
 /// coarse shape still come to 0.7.
 const OPPOSED: f64 = -0.5;
 
-/// How often the shells are asked again after others have changed their minds. Evidence spreads by one region a time; in
+/// Rounds of evaluating the shells again after others have changed. Evidence spreads by one region a time; in
 /// nested rooms that are all inside out it takes two.
 const ROUNDS: usize = 8;
 
@@ -34,7 +34,7 @@ enum Emission {
     Whole,
 }
 
-/// What becomes of a closed shell.
+/// How a closed shell is lit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Facing {
     /// It is lit where the file's winding says.
@@ -45,7 +45,7 @@ pub(super) enum Facing {
     Both,
 }
 
-/// What is known of the faces beside their corners.
+/// Properties of the faces, apart from their corners.
 pub(super) struct Evidence<'a> {
     /// Whether each triangle emits.
     pub(super) emits: &'a (dyn Fn(usize) -> bool + Sync),
@@ -72,7 +72,7 @@ pub(super) struct Regions {
     bounds: Vec<u32>,
 }
 
-/// What speaks of a region.
+/// Evidence that a region is seen.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     /// Things in it, or facing it and nothing else.
@@ -199,7 +199,7 @@ impl Regions {
         }
     }
 
-    /// What a shell says of the region inside and of the one outside.
+    /// The evidence of a shell for the region inside and for the one outside.
     fn says(&self, shell: usize, facing: Facing) -> [Tally; 2] {
         let is_sure = facing != Facing::Both;
         let shines = self.emission[shell] != Emission::None;
@@ -222,7 +222,7 @@ impl Regions {
         tallies
     }
 
-    /// What is meant of a closed shell by what others say of its two regions; `facing` is what it says itself so far.
+    /// How a closed shell is lit, by the evidence of others for its two regions; `facing` is its present state.
     fn judge(&self, shell: usize, facing: Facing, tallies: &[Tally]) -> Facing {
         let [own_inside, own_outside] = self.says(shell, facing);
         let inside = tallies[shell + 1].without(own_inside);
@@ -366,11 +366,10 @@ mod tests {
         }
 
         fn scene(&self, sides: Sides) -> Scene {
-            let options = SceneOptions {
-                sides,
-                ..SceneOptions::default()
-            };
-            self.0.clone().finish(&options).expect("it has faces")
+            self.0
+                .clone()
+                .finish(&SceneOptions::with_sides(sides))
+                .expect("it has faces")
         }
 
         /// How each cube is lit, in order, and how many the warning counts.

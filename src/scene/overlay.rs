@@ -1,4 +1,4 @@
-//! What becomes of faces that lie over each other in one plane: no light is there twice, and no two of them flicker.
+//! Faces that lie over each other in one plane are cut, so that no light is counted twice and no two of them flicker.
 //!
 //! Of faces that look the same way, the first in the file stays, and later ones lose what it covers. Of faces that look
 //! opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are covered in part are cut
@@ -7,9 +7,9 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::build::ShelledTriangles;
 use super::clip::{cut_out, turned_left};
 use super::coplanar::{Overlaps, TOUCHING, TOUCHING_SHARE, in_plane, projected, reach};
+use super::shells::ShelledTriangles;
 use super::{Face, Frame, SceneBuilder, Triangle};
 
 /// Why a face is skipped that lies on earlier ones.
@@ -18,7 +18,7 @@ pub const DOUBLED: &str = "it lies on another one that looks the same way";
 /// Why a part of a face is skipped.
 const PARTLY_DOUBLED: &str = "it lay on another face that looks the same way, and was cut off";
 
-/// What is done about a face.
+/// The treatment of a face.
 enum Fate {
     /// Its back is covered.
     OneSided,
@@ -189,7 +189,7 @@ fn cut_face(face: &Face, piece: &Piece, corners: [u32; 3]) -> Face {
     }
 }
 
-/// What becomes of a face that overlaps others; nothing where it stays as it is.
+/// The treatment of a face that overlaps others; `None` where it stays as it is.
 fn fate(
     face: u32,
     others: &[u32],
@@ -295,7 +295,7 @@ impl Piece {
     }
 }
 
-/// Pieces of less than about this share of their face are left out: between corners that lie on a line.
+/// Pieces of less than about this share of their face are omitted: between corners that lie on a line.
 const LEAST_SHARE: f64 = 1e-9;
 
 #[cfg(test)]
@@ -343,11 +343,10 @@ mod tests {
         }
 
         fn scene(&self, sides: Sides) -> Scene {
-            let options = SceneOptions {
-                sides,
-                ..SceneOptions::default()
-            };
-            self.0.clone().finish(&options).expect("it has faces")
+            self.0
+                .clone()
+                .finish(&SceneOptions::with_sides(sides))
+                .expect("it has faces")
         }
     }
 

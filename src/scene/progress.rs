@@ -4,7 +4,7 @@ use std::io::{self, BufRead, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes of a file that have been read, and all that there are. Clones tell the same.
+/// Bytes of a file that have been read, and its length. Clones share them.
 #[derive(Clone, Debug, Default)]
 pub struct ReadProgress(Arc<Counts>);
 

@@ -1,65 +1,31 @@
-//! The same triangles under other light: what a material reflects and emits may be changed after a scene was read.
+//! The same triangles with other reflectance and emission of materials.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Material, MaterialId, Scene, Surface, TriangleId, emission::limited};
+use super::{Appearance, MaterialId, Scene, Surface, TriangleId};
 
-/// How a material reflects and emits, without its name and its textures. Linear RGB.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Appearance {
-    /// Diffuse reflectance (`Kd`); multiplies the texture.
-    pub reflectance: Vec3,
-    /// Emitted radiance (`Ke`) in units of [`Scene::radiance_unit`]; multiplies the texture.
-    pub emission: Vec3,
-}
-
-impl Appearance {
-    /// That of a material.
-    pub fn of(material: &Material) -> Self {
-        Self {
-            reflectance: material.reflectance,
-            emission: material.emission,
-        }
-    }
-
-    /// With reflectance from 0 to the most there may be, and emission in range.
-    fn within(self, most: f32) -> Self {
-        let bounded = |x: f32| {
-            if x.is_finite() {
-                x.clamp(0.0, most)
-            } else {
-                0.0
-            }
-        };
-        Self {
-            reflectance: self.reflectance.map(bounded),
-            emission: limited(self.emission),
-        }
-    }
-}
-
-/// Materials that may emit or reflect, though the scene as it was read says that they do not.
+/// Materials that emit or reflect under other appearances, but not in the scene as it was read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Awakened {
+pub struct ActiveMaterials {
     /// By material; none where it is shorter.
     emit: Vec<bool>,
     /// Likewise.
     reflect: Vec<bool>,
 }
 
-impl Awakened {
-    /// Whether a material emits that the scene says does not.
+impl ActiveMaterials {
+    /// Whether a material emits that does not in the scene.
     pub fn emits(&self, material: MaterialId) -> bool {
         self.emit.get(material.index()) == Some(&true)
     }
 
-    /// Whether a material reflects that the scene says does not.
+    /// Whether a material reflects that does not in the scene.
     pub fn reflects(&self, material: MaterialId) -> bool {
         self.reflect.get(material.index()) == Some(&true)
     }
 
-    /// Whether no other material is awake than here.
+    /// Whether all materials that are active in the other are active here.
     pub fn covers(&self, other: &Self) -> bool {
         let covers = |own: &[bool], other: &[bool]| {
             let is_own = |at: usize| own.get(at) == Some(&true);
@@ -68,7 +34,7 @@ impl Awakened {
         covers(&self.emit, &other.emit) && covers(&self.reflect, &other.reflect)
     }
 
-    /// What is awake in either.
+    /// The materials that are active in either.
     pub fn joined(&self, other: &Self) -> Self {
         let join = |own: &[bool], other: &[bool]| {
             let is = |of: &[bool], at: usize| of.get(at) == Some(&true);
@@ -83,16 +49,16 @@ impl Awakened {
 }
 
 impl Scene {
-    /// Which materials are awake when they look so, one for each.
-    pub fn awakened(&self, appearances: &[Appearance]) -> Awakened {
+    /// The materials that are active under these appearances, one for each material.
+    pub fn active_materials(&self, appearances: &[Appearance]) -> ActiveMaterials {
         let pairs = || self.materials.iter().zip(appearances);
-        let wakes = |before: Vec3, now: Vec3| before == Vec3::ZERO && now != Vec3::ZERO;
-        Awakened {
+        let activates = |before: Vec3, now: Vec3| before == Vec3::ZERO && now != Vec3::ZERO;
+        ActiveMaterials {
             emit: pairs()
-                .map(|(material, now)| wakes(material.emission, now.emission))
+                .map(|(material, now)| activates(material.emission, now.emission))
                 .collect(),
             reflect: pairs()
-                .map(|(material, now)| wakes(material.reflectance, now.reflectance))
+                .map(|(material, now)| activates(material.reflectance, now.reflectance))
                 .collect(),
         }
     }
@@ -102,17 +68,17 @@ impl Scene {
         self.materials.iter().map(Appearance::of).collect()
     }
 
-    /// What becomes of wished appearances: one for each material, in the ranges that materials have. Materials that
-    /// nothing is wished for stay as they are.
-    pub fn allowed(&self, wished: &[Appearance]) -> Vec<Appearance> {
+    /// Appearances brought into their ranges, one for each material. Materials without a new appearance stay as they
+    /// are.
+    pub fn allowed(&self, requested: &[Appearance]) -> Vec<Appearance> {
         let mut allowed = self.appearances();
-        for (appearance, wish) in allowed.iter_mut().zip(wished) {
-            *appearance = wish.within(self.max_reflectance);
+        for (appearance, request) in allowed.iter_mut().zip(requested) {
+            *appearance = request.within(self.max_reflectance);
         }
         allowed
     }
 
-    /// The surfaces that the triangles have when materials look so.
+    /// The surfaces of the triangles under these appearances.
     pub fn surfaces_under(&self, appearances: &[Appearance]) -> Vec<Surface> {
         let allowed = self.allowed(appearances);
         let changed: Vec<bool> = allowed
@@ -141,7 +107,7 @@ impl Scene {
             .collect()
     }
 
-    /// The scene with materials that look so.
+    /// The scene with these appearances.
     pub fn relit(&self, appearances: &[Appearance]) -> Self {
         let mut relit = Self {
             surfaces: self.surfaces_under(appearances),
@@ -160,7 +126,7 @@ mod tests {
     use glam::{DVec3, Vec2};
 
     use super::*;
-    use crate::scene::{Face, SceneBuilder, SceneOptions, Texture, TextureId};
+    use crate::scene::{Face, Material, SceneBuilder, SceneOptions, Texture, TextureId};
 
     /// A triangle under a grey texture, and one without.
     fn scene() -> Scene {
@@ -206,37 +172,37 @@ mod tests {
         let mean = textured.reflectance / 0.8;
         assert!(mean.cmpgt(Vec3::splat(0.4)).all() && mean.cmplt(Vec3::splat(0.6)).all());
         assert!((textured.emission / 6.0 - mean).abs().max_element() < 1e-6);
-        assert_eq!(plain, scene().surfaces[1], "nothing was wished for it");
+        assert_eq!(plain, scene().surfaces[1], "it has no new appearance");
         assert_eq!(relit.appearances()[0], grey(0.8, 6.0));
     }
 
     #[test]
-    fn wishes_end_at_what_materials_can_be() {
+    fn appearances_are_brought_into_the_ranges_of_materials() {
         let scene = scene();
-        let wished = [grey(7.0, -1.0), grey(f32::NAN, f32::INFINITY)];
-        let allowed = scene.allowed(&wished);
+        let requested = [grey(7.0, -1.0), grey(f32::NAN, f32::INFINITY)];
+        let allowed = scene.allowed(&requested);
         assert_eq!(allowed[0], grey(scene.max_reflectance, 0.0));
         assert_eq!(allowed[1], grey(0.0, 0.0));
-        for surface in scene.surfaces_under(&wished) {
+        for surface in scene.surfaces_under(&requested) {
             assert!(surface.reflectance.max_element() <= scene.max_reflectance);
             assert_eq!(surface.emission, Vec3::ZERO);
         }
     }
 
     #[test]
-    fn only_what_was_black_or_dark_is_awakened() {
+    fn only_black_or_dark_materials_become_active() {
         let scene = scene();
-        assert_eq!(scene.awakened(&scene.appearances()), {
-            Awakened {
+        assert_eq!(scene.active_materials(&scene.appearances()), {
+            ActiveMaterials {
                 emit: vec![false; 2],
                 reflect: vec![false; 2],
             }
         });
-        let painted = scene.awakened(&[grey(0.5, 0.0), grey(0.0, 0.0)]);
-        let lit = scene.awakened(&[grey(0.0, 1.0), grey(0.9, 7.0)]);
+        let painted = scene.active_materials(&[grey(0.5, 0.0), grey(0.0, 0.0)]);
+        let lit = scene.active_materials(&[grey(0.0, 1.0), grey(0.9, 7.0)]);
         assert!(painted.reflects(MaterialId(0)) && !painted.emits(MaterialId(0)));
         assert!(lit.emits(MaterialId(0)) && !lit.emits(MaterialId(1)));
-        let (both, none) = (painted.joined(&lit), Awakened::default());
+        let (both, none) = (painted.joined(&lit), ActiveMaterials::default());
         assert!(both.covers(&painted) && both.covers(&lit) && both.covers(&none));
         assert!(!painted.covers(&lit) && !none.covers(&lit));
         assert_eq!(none.joined(&lit), lit);

@@ -1,27 +1,132 @@
-//! Shells of a scene, and which faces are two-sided: sheets are, faces of a consistently wound closed shell are not.
-//!
-//! A shell is a set of triangles connected by shared edges. It is closed and consistently wound when every directed
-//! edge meets its opposite exactly once.
+//! Which faces are two-sided, and which are turned: sheets are lit on both sides, faces of a consistently wound closed
+//! shell on one.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
-use super::coplanar::{COPLANAR, reach};
-use super::orientation::Facing;
-use super::{DisjointSets, Sides, Triangle, half_edges};
+use super::nesting;
+use super::orientation::{Evidence, Facing, Regions};
+use super::shells::{ShelledTriangles, Shells};
+use super::{Face, SceneBuilder, SceneOptions, Sides, Triangle, Warning, WarningKind};
 
-/// The shells of a scene.
-#[derive(Clone, Debug)]
-pub(super) struct Shells {
-    /// Shell of each triangle.
-    pub(super) of_triangle: Vec<u32>,
-    /// By shell: whether it is closed and consistently wound.
-    pub(super) closed: Vec<bool>,
-    /// By shell: six times the volume that it encloses, negative where it looks inward; 0 where it is open or flat.
-    pub(super) volume: Vec<f64>,
+impl SceneBuilder {
+    /// Triangles in the frame with their sidedness. Shells that are wound the wrong way are turned.
+    pub(super) fn triangles(
+        &mut self,
+        corner_of: &[u32],
+        positions: &[Vec3],
+        options: &SceneOptions,
+    ) -> ShelledTriangles {
+        let make = |face: &Face| Triangle {
+            corners: face.corners.map(|corner| corner_of[corner as usize]),
+            material: face.material,
+            two_sided: false,
+            bounds_solid: false,
+        };
+        let mut list: Vec<Triangle> = self.faces.iter().map(make).collect();
+        debug_assert!(positions.iter().all(|position| position.is_finite()));
+        let shells = Shells::of(&list, positions);
+        let facings = self.orient(&mut list, &shells, positions, options.sides);
+        let flags = two_sided(&shells, &facings, options.sides);
+        for (triangle, two_sided) in list.iter_mut().zip(flags) {
+            triangle.two_sided = two_sided;
+            triangle.bounds_solid &= !two_sided;
+        }
+        ShelledTriangles { list, shells }
+    }
+
+    /// Find out which side of each shell is meant, turn those that are wound otherwise, and mark those that bound solids.
+    fn orient(
+        &mut self,
+        list: &mut [Triangle],
+        shells: &Shells,
+        positions: &[Vec3],
+        sides: Sides,
+    ) -> Vec<Facing> {
+        let parents = nesting::parents(shells, list, positions);
+        let (regions, meant) = {
+            let regions = Regions::new(
+                shells,
+                &parents,
+                &Evidence {
+                    emits: &|triangle| {
+                        let material = list[triangle].material;
+                        self.materials[material.index()].emission != Vec3::ZERO
+                    },
+                    area_vector: &|triangle| {
+                        let corners = list[triangle].corners;
+                        let [a, b, c] = corners.map(|corner| positions[corner as usize]);
+                        (b - a).cross(c - a) * 0.5
+                    },
+                    normals: &|triangle| self.faces[triangle].normals,
+                },
+            );
+            let meant = regions.facings();
+            (regions, meant)
+        };
+        self.warn_of_orientation(shells, &regions, &meant, sides);
+        let facings = match sides {
+            Sides::Auto => meant,
+            Sides::One | Sides::Two => vec![Facing::AsWound; meant.len()],
+        };
+        let solids = regions.solids(&facings);
+        let faces = self.faces.iter_mut().zip(list);
+        for ((face, triangle), &shell) in faces.zip(&shells.of_triangle) {
+            triangle.bounds_solid = solids[shell as usize];
+            if facings[shell as usize] == Facing::Turned {
+                triangle.corners.swap(1, 2);
+                face.turn();
+            }
+        }
+        facings
+    }
+
+    /// Say which shells are not lit as they are wound, or would not be.
+    fn warn_of_orientation(
+        &mut self,
+        shells: &Shells,
+        regions: &Regions,
+        meant: &[Facing],
+        sides: Sides,
+    ) {
+        let is_odd = |shell: usize| {
+            meant[shell] != Facing::AsWound || sides == Sides::One && regions.is_opposed(shell)
+        };
+        let odd: Vec<usize> = (0..meant.len()).filter(|&shell| is_odd(shell)).collect();
+        let is_first = |shell: &u32| odd.first() == Some(&(*shell as usize));
+        let Some(first) = shells.of_triangle.iter().position(is_first) else {
+            return;
+        };
+        let of_kind = |kind: Facing| odd.iter().filter(|&&shell| meant[shell] == kind).count();
+        let message = match (sides, of_kind(Facing::Turned), of_kind(Facing::Both)) {
+            (Sides::Two, _, _) => return,
+            (Sides::One, _, _) => {
+                "the faces of a surface look away from what they should light, or light falls on their black backs; flip \
+                 them, or use --sides auto"
+            }
+            (Sides::Auto, _, 0) => {
+                "the faces of a closed surface looked away from what they should light and were turned; --sides one keeps \
+                 their winding"
+            }
+            (Sides::Auto, 0, _) => {
+                "light falls on the backs of a closed surface, so it is lit on both sides; --sides one keeps the backs black"
+            }
+            (Sides::Auto, _, _) => {
+                "the faces of a closed surface looked away from what they should light and were turned or are lit on both \
+                 sides; --sides one keeps their winding"
+            }
+        };
+        let line = self.faces[first].line as usize;
+        self.warnings.push(Warning {
+            kind: WarningKind::Orientation,
+            message: message.to_owned(),
+            count: odd.len(),
+            place: (line > 0).then(|| (self.source.file.clone(), line)),
+        });
+    }
 }
 
 /// One flag per triangle; `facings` by shell.
-pub(super) fn two_sided(shells: &Shells, facings: &[Facing], sides: Sides) -> Vec<bool> {
+fn two_sided(shells: &Shells, facings: &[Facing], sides: Sides) -> Vec<bool> {
     let flag = |&shell: &u32| match sides {
         Sides::Auto => !shells.closed[shell as usize] || facings[shell as usize] == Facing::Both,
         Sides::One => false,
@@ -30,114 +135,10 @@ pub(super) fn two_sided(shells: &Shells, facings: &[Facing], sides: Sides) -> Ve
     shells.of_triangle.iter().map(flag).collect()
 }
 
-impl Shells {
-    /// Find the shells.
-    pub(super) fn of(triangles: &[Triangle], positions: &[Vec3]) -> Self {
-        let edges = half_edges(triangles.iter().map(|triangle| triangle.corners));
-        // Connect triangles over shared edges.
-        let mut forest = DisjointSets::new(triangles.len());
-        let mut open = Vec::new();
-        for group in edges.chunk_by(|a, b| a.ends == b.ends) {
-            for pair in group.windows(2) {
-                forest.join(pair[0].triangle, pair[1].triangle);
-            }
-            if group.len() != 2 || group[0].is_forward == group[1].is_forward {
-                open.push(group[0].triangle);
-            }
-        }
-        // Number the shells in the order of their first triangles.
-        let mut number = vec![u32::MAX; triangles.len()];
-        let mut count = 0;
-        let mut of_triangle = Vec::with_capacity(triangles.len());
-        for triangle in 0..triangles.len() as u32 {
-            let root = forest.root(triangle) as usize;
-            if number[root] == u32::MAX {
-                number[root] = count;
-                count += 1;
-            }
-            of_triangle.push(number[root]);
-        }
-        let mut closed = vec![true; count as usize];
-        for triangle in open {
-            closed[of_triangle[triangle as usize] as usize] = false;
-        }
-        let volume = volumes(triangles, positions, &of_triangle, &closed);
-        Self {
-            of_triangle,
-            closed,
-            volume,
-        }
-    }
-}
-
-/// See [`Shells::volume`].
-fn volumes(
-    triangles: &[Triangle],
-    positions: &[Vec3],
-    of_triangle: &[u32],
-    closed: &[bool],
-) -> Vec<f64> {
-    /// What is summed over a shell.
-    #[derive(Clone, Copy, Default)]
-    struct Sums {
-        /// A corner; what is far from the origin keeps its digits when it is measured from there.
-        origin: Option<DVec3>,
-        volume: f64,
-        double_area: f64,
-    }
-    let mut sums = vec![Sums::default(); closed.len()];
-    for (triangle, &shell) in triangles.iter().zip(of_triangle) {
-        if !closed[shell as usize] {
-            continue;
-        }
-        let sums = &mut sums[shell as usize];
-        let corners = triangle
-            .corners
-            .map(|corner| positions[corner as usize].as_dvec3());
-        let origin = *sums.origin.get_or_insert(corners[0]);
-        let [a, b, c] = corners.map(|corner| corner - origin);
-        sums.volume += a.dot(b.cross(c));
-        sums.double_area += (b - a).cross(c - a).length();
-    }
-    let volume = |sums: &Sums| {
-        // Of a plate, the quotient is three halves of its thickness.
-        let thickness = COPLANAR * reach(sums.origin.unwrap_or_default());
-        let is_flat = sums.volume.abs() <= sums.double_area * thickness;
-        if is_flat { 0.0 } else { sums.volume }
-    };
-    sums.iter().map(volume).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::MaterialId;
-
-    fn triangles(corners: &[[u32; 3]]) -> Vec<Triangle> {
-        let make = |&corners: &[u32; 3]| Triangle {
-            corners,
-            material: MaterialId(0),
-            two_sided: false,
-            bounds_solid: false,
-        };
-        corners.iter().map(make).collect()
-    }
-
-    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
-
-    const POSITIONS: [Vec3; 7] = [
-        Vec3::ZERO,
-        Vec3::X,
-        Vec3::Y,
-        Vec3::Z,
-        Vec3::NEG_X,
-        Vec3::NEG_Y,
-        Vec3::NEG_Z,
-    ];
-
-    fn shells(corners: &[[u32; 3]]) -> Shells {
-        Shells::of(&triangles(corners), &POSITIONS)
-    }
+    use crate::scene::shells::tests::{TETRAHEDRON, shells};
 
     fn flags(corners: &[[u32; 3]]) -> Vec<bool> {
         let shells = shells(corners);
@@ -163,15 +164,5 @@ mod tests {
         let mut doubled = TETRAHEDRON.to_vec();
         doubled.push(TETRAHEDRON[0]);
         assert_eq!(flags(&doubled), [true; 5]);
-    }
-
-    #[test]
-    fn volumes_tell_which_way_shells_look_and_flat_ones_have_none() {
-        assert_eq!(shells(&TETRAHEDRON).volume, [1.0]);
-        let inward = TETRAHEDRON.map(|[a, b, c]| [a, c, b]);
-        assert_eq!(shells(&inward).volume, [-1.0]);
-        assert_eq!(shells(&TETRAHEDRON[1..]).volume, [0.0]);
-        let plate = shells(&[[1, 2, 3], [1, 3, 2]]);
-        assert_eq!((plate.closed, plate.volume), (vec![true], vec![0.0]));
     }
 }

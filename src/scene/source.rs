@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::encoding::DecodedText;
 use super::lines::split_keyword;
-use super::obj::ReadError;
+use super::read_error::ReadError;
 
 /// Length and time of change, by which a change is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl Stamp {
     }
 }
 
-/// Tells whether a file has changed since it was opened.
+/// Detects whether a file has changed since it was opened.
 #[derive(Debug)]
 pub(super) struct Watch {
     file: File,

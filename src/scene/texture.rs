@@ -6,7 +6,8 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel, Primitive, Rgba};
 
-use super::emission::cured;
+use super::color::linear_from_srgb;
+use super::ranges::finite_non_negative;
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,6 +41,15 @@ impl Texture {
     }
 }
 
+/// Textures that were omitted while a scene was read. Of a picture that several materials name, each name counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OmittedTextures {
+    /// Of one colour, which the material has instead.
+    pub constant_textures: usize,
+    /// Shown by no face.
+    pub unused_textures: usize,
+}
+
 /// Pixels kept of one picture; larger ones are averaged down. Light needs means, and twelve bytes a pixel add up.
 const MAX_PIXELS: usize = 1 << 24;
 
@@ -53,7 +63,7 @@ impl Texture {
     /// Read a picture file: 8 and 16 bits a channel are sRGB, floats are linear.
     ///
     /// # Errors
-    /// A clause that says why there is no picture.
+    /// A clause with the reason why there is no picture.
     pub(super) fn read(path: &Path, name: &str, role: Role) -> Result<Picture, String> {
         let decoded = std::panic::catch_unwind(|| decode(path));
         match decoded {
@@ -88,15 +98,15 @@ impl Texture {
                 return covered(&picture.into_rgba16(), name, role, word, share);
             }
             DynamicImage::ImageRgba32F(pixels) => {
-                // What is no number hides nothing.
+                // NaN counts as opaque.
                 let share = |alpha: f32| if alpha < 1.0 { alpha.max(0.0) } else { 1.0 };
-                return covered(&pixels, name, role, cured, share);
+                return covered(&pixels, name, role, finite_non_negative, share);
             }
             DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_) => {
                 averaged(&picture.into_rgb16(), |pixel| color_of(pixel.0, word)).into_texture(name)
             }
             DynamicImage::ImageRgb32F(pixels) => {
-                averaged(&pixels, |pixel| color_of(pixel.0, cured)).into_texture(name)
+                averaged(&pixels, |pixel| color_of(pixel.0, finite_non_negative)).into_texture(name)
             }
             // Takes no copy where it is of this kind already.
             _ => averaged(&picture.into_rgb8(), |pixel| color_of(pixel.0, byte)).into_texture(name),
@@ -151,7 +161,7 @@ fn color_of<T: Copy, const N: usize>(channels: [T; N], linear: impl Fn(T) -> f32
     Vec3::new(red, green, blue)
 }
 
-/// What a picture is for, which decides what its transparent pixels stand for.
+/// The role of a picture, which decides the meaning of its transparent pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Role {
     /// It reflects: hidden pixels have the mean colour of the others, so that none is too bright or dark by what nobody
@@ -282,15 +292,6 @@ fn decode(path: &Path) -> image::ImageResult<DynamicImage> {
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
     reader.decode()
-}
-
-/// The sRGB curve backwards, continued beyond 1.
-pub(super) fn linear_from_srgb(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
 }
 
 /// Samples of a triangle at most, its parts together; at this many the mean of a halved texture is good to about a percent.

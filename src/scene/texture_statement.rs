@@ -35,7 +35,7 @@ const LONGEST_STATEMENT: usize = 8192;
 const MOST_READINGS: usize = 32;
 
 impl TextureStatement {
-    /// What follows the keyword; nothing if there is no name in it, or one beyond all length.
+    /// The name after the keyword; empty if there is no name in it, or one that is too long.
     pub(super) fn of(text: &str) -> Option<Self> {
         if text.len() > LONGEST_STATEMENT {
             return None;
@@ -100,7 +100,7 @@ fn name_ends(text: &str) -> Vec<usize> {
     ends
 }
 
-/// What options say.
+/// The values of options.
 #[derive(Clone, Debug)]
 struct Options {
     scale: DVec2,

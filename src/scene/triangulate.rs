@@ -25,7 +25,7 @@ pub(super) enum Doubt {
     CrossesItself,
 }
 
-/// How far both of two edges must reach beyond each other to cross, as a share of the polygon's extent. Smaller, and
+/// How far both of two edges must reach past each other to cross, as a share of the polygon's extent. Smaller, and
 /// corners that only touch an edge cross it by the rounding of the file's digits; larger, and crossings of thin parts are
 /// missed.
 const CROSSING_DEPTH: f64 = 1e-5;
@@ -154,7 +154,7 @@ impl Triangulator {
         let mut kept = 0;
         for start in (0..self.triangles.len()).step_by(3) {
             let corners = [0, 1, 2].map(|corner| polygon[self.triangles[start + corner] as usize]);
-            if !super::build::is_degenerate(corners) {
+            if !super::usable::is_degenerate(corners) {
                 self.triangles.copy_within(start..start + 3, kept);
                 kept += 3;
             }
@@ -310,7 +310,7 @@ mod tests {
                 false,
             ),
             (
-                "corner beyond another edge",
+                "corner past another edge",
                 vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, -0.1], [0.0, 4.0]],
                 true,
             ),

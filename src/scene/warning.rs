@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-/// What kind of trouble, for grouping and for tests.
+/// Kind of a warning, for grouping and for tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum WarningKind {
-    /// A face was left out: bad index, non-finite or too few corners, zero area.
+    /// A face was omitted: bad index, non-finite or too few corners, zero area.
     FaceSkipped,
     /// A line of the OBJ or MTL file could not be used.
     LineSkipped,
@@ -32,7 +32,7 @@ pub enum WarningKind {
 pub struct Warning {
     /// Its kind.
     pub kind: WarningKind,
-    /// What happened and what was done, one sentence in lower case without a final period.
+    /// The problem and the remedy, one sentence in lower case without a final period.
     pub message: String,
     /// How often, at least 1.
     pub count: usize,

@@ -1,6 +1,6 @@
 //! Files that are written whole or not at all: filled aside, in the same folder, and renamed when nothing is missing.
 //!
-//! What a symbolic link points to is replaced, not the link. Devices and pipes cannot be replaced: they are written to.
+//! The target of a symbolic link is replaced, not the link. Devices and pipes cannot be replaced: they are written to.
 
 use std::{
     fs,
@@ -11,7 +11,7 @@ use std::{
 /// Begins the names of files that are not whole yet.
 const ASIDE: &str = ".vecrad-";
 
-/// Fill a file aside, then put it in its place. What was there stays until then, and where anything fails.
+/// Fill a file aside, then put it in its place. The old file stays until then, and where anything fails.
 ///
 /// # Errors
 /// Those of `fill` and of the system.

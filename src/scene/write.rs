@@ -2,7 +2,7 @@
 //!
 //! Coordinates have the fewest digits that lead back to the same position in the frame. Files are written aside and
 //! renamed, the OBJ last, so that no half of a scene is ever found under its name. What OBJ cannot say (that a closed
-//! shell is two-sided) is left out.
+//! shell is two-sided) is omitted.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -14,7 +14,8 @@ use glam::{DVec3, Vec3};
 use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbImage};
 
 use super::{
-    Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin, whole::write_whole,
+    Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin, srgb_byte,
+    whole::write_whole,
 };
 
 /// Write `scene` to `path`, its materials beside it under the same stem, and its textures beside both.
@@ -242,7 +243,7 @@ fn encoded_texture(texture: &Texture) -> io::Result<Vec<u8>> {
         let codes = texture
             .pixels
             .iter()
-            .flat_map(|p| p.to_array().map(srgb_code));
+            .flat_map(|p| p.to_array().map(srgb_byte));
         let picture = RgbImage::from_raw(width, height, codes.collect());
         (picture.map(DynamicImage::ImageRgb8), ImageFormat::Png)
     };
@@ -256,15 +257,4 @@ fn encoded_texture(texture: &Texture) -> io::Result<Vec<u8>> {
         .write_to(&mut bytes, format)
         .map_err(io::Error::other)?;
     Ok(bytes.into_inner())
-}
-
-/// The 8-bit sRGB code of a linear value (IEC 61966-2-1).
-fn srgb_code(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
-    (encoded * 255.0).round() as u8
 }

@@ -93,7 +93,7 @@ pub(super) fn divide_coarse(
     loop {
         let large: Vec<usize> = hierarchy
             .mesh
-            .held_leaves()
+            .active_leaves()
             .filter(|&leaf| is_large(hierarchy, leaf, limits))
             .collect();
         // Elsewhere than in the clear, links divide elements for the light that they carry.
@@ -193,7 +193,7 @@ impl DirectField {
     pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
         let leaf = &hierarchy.mesh.elements[element];
         if leaf.is_contact() {
-            let open = (0..3).filter(|&side| !leaf.is_covered(side));
+            let open = (0..3).filter(|&side| !leaf.is_inside_solid_at(side));
             let known = open.clone().map(|side| self.corner(leaf.vertices[side]));
             return known.sum::<Vec4>() / (open.count().max(1) as f32);
         }
@@ -217,9 +217,9 @@ impl DirectField {
                 self.lights.bounded(unoccluded * fraction)
             })
             .collect();
-        let tells = |element: &Element, side| !element.is_covered(side);
+        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
         carry_over(&hierarchy.mesh, tells, &mut self.shown);
-        let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_open();
+        let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
         let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
             let centre = self.centres.get(leaf).copied().flatten()?;
             Some((leaf, self.lights.bounded(centre.irradiance())))
@@ -376,7 +376,7 @@ impl DirectField {
             .copied()
             .filter(|&leaf| {
                 hierarchy.mesh.is_held(leaf)
-                    && hierarchy.mesh.elements[leaf].is_open()
+                    && hierarchy.mesh.elements[leaf].is_outside_solids()
                     && self.centres[leaf].is_none()
                     && (self.spread(hierarchy, leaf, mean) > limits.tolerance
                         || self.bend_unoccluded(hierarchy, leaf, limits, mean) > limits.tolerance
@@ -425,7 +425,7 @@ impl DirectField {
                     return false;
                 };
                 // What reaches into a solid was divided as far as it shall be.
-                if !element.is_open() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
+                if !element.is_outside_solids() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
                     return false;
                 }
                 // Shadows have borders however small elements are; light that nothing blocks does not.

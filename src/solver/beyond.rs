@@ -133,13 +133,13 @@ impl DirectField {
     fn dark_beside_light(&self, hierarchy: &Hierarchy) -> Vec<(u32, u32)> {
         let mesh = &hierarchy.mesh;
         let mut lightest: Vec<Option<(f32, u32)>> = vec![None; self.vertices.len()];
-        for leaf in mesh.held_leaves() {
+        for leaf in mesh.active_leaves() {
             let element = &mesh.elements[leaf];
             let corners = element.vertices.map(|vertex| vertex as usize);
             let lights = corners.map(|vertex| self.vertices[vertex].unwrap_or_default());
             let seen = lights.map(|light| luminance(light.irradiance()));
             let most = seen.into_iter().fold(0.0, f32::max);
-            if most <= 0.0 || !element.is_open() {
+            if most <= 0.0 || !element.is_outside_solids() {
                 continue;
             }
             let is_dark = |&side: &usize| lights[side].shot > 0 && seen[side] <= DARK_SHARE * most;

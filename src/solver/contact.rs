@@ -63,7 +63,7 @@ impl Solver {
                 element.is_contact() && element.area_vector.length() > least
             };
             let wanted: Vec<u32> = mesh
-                .held_leaves()
+                .active_leaves()
                 .filter(is_wanted)
                 .map(|leaf| leaf as u32)
                 .collect();
@@ -82,15 +82,15 @@ impl Solver {
         let fresh: Vec<usize> = self
             .hierarchy
             .mesh
-            .held_leaves()
-            .filter(|&leaf| elements[leaf].covered == Element::UNPROBED)
+            .active_leaves()
+            .filter(|&leaf| elements[leaf].inside_solid == Element::UNPROBED)
             .collect();
         let is_looked_at = |leaf: usize| {
             let element = &elements[leaf];
             let above = elements.get(element.parent as usize);
             let whole = elements[element.patch as usize].area_vector.length();
             element.area_vector.length() > LOOKED_AT * least
-                || above.is_some_and(|parent| match parent.covered {
+                || above.is_some_and(|parent| match parent.inside_solid {
                     Element::UNPROBED => whole > LOOKED_AT * least,
                     covered => covered != 0,
                 })
@@ -99,7 +99,7 @@ impl Solver {
             fresh.into_iter().partition(|&leaf| is_looked_at(leaf));
         self.probe_leaves(&wanted, cancel)?;
         for leaf in spared {
-            self.hierarchy.mesh.elements[leaf].covered = 0;
+            self.hierarchy.mesh.elements[leaf].inside_solid = 0;
         }
         Some(())
     }
@@ -119,7 +119,7 @@ impl Solver {
             .collect();
         cancel.proceed()?;
         for (&leaf, (covered, shot)) in leaves.iter().zip(probed) {
-            self.hierarchy.mesh.elements[leaf].covered = covered;
+            self.hierarchy.mesh.elements[leaf].inside_solid = covered;
             self.ray_count += shot;
         }
         Some(())
@@ -152,7 +152,7 @@ impl Solver {
     }
 }
 
-/// Which corners of an element, and whether its centroid, lie within a solid or beyond a wall, as [`Element::covered`] has
+/// Which corners of an element, and whether its centroid, lie within a solid or beyond a wall, as [`Element::inside_solid`] has
 /// it; and the rays shot. `scene` where it has solids.
 fn probe(
     scene: Option<&Scene>,
@@ -192,7 +192,7 @@ fn places(hierarchy: &Hierarchy, element: usize) -> [Vec3; 4] {
 
 /// Of an element that lies within a solid in part, the probed places that do not; nothing of others.
 pub(super) fn open_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
-    let covered = hierarchy.mesh.elements[element].covered;
+    let covered = hierarchy.mesh.elements[element].inside_solid;
     if !hierarchy.mesh.elements[element].is_contact() {
         return Vec::new();
     }
@@ -267,12 +267,12 @@ pub(super) fn carry_over(
     values: &mut [Vec4],
 ) {
     let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
-    let contacts: Vec<usize> = mesh.held_leaves().filter(is_contact).collect();
+    let contacts: Vec<usize> = mesh.active_leaves().filter(is_contact).collect();
     if contacts.is_empty() {
         return;
     }
     let mut told = vec![false; values.len()];
-    for leaf in mesh.held_leaves() {
+    for leaf in mesh.active_leaves() {
         let element = &mesh.elements[leaf];
         for (side, vertex) in element.vertices.into_iter().enumerate() {
             told[vertex as usize] |= tells(element, side);

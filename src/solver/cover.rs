@@ -295,7 +295,10 @@ pub(super) fn vertex_places(
         let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
         for (side, vertex) in element.vertices.into_iter().enumerate() {
             let vertex = vertex as usize;
-            let fitness = (!element.is_covered(side), normals[vertex].dot(normal));
+            let fitness = (
+                !element.is_inside_solid_at(side),
+                normals[vertex].dot(normal),
+            );
             let is_best = chosen[vertex].is_none_or(|(best, _)| fitness > best);
             if is_best && is_wanted[vertex] {
                 chosen[vertex] = Some((fitness, leaf as u32));

@@ -67,7 +67,7 @@ impl Lights {
             .iter()
             .enumerate()
             .map(|(index, patch)| {
-                let is_seen = hierarchy.held().contains(&index);
+                let is_seen = hierarchy.active_patches().contains(&index);
                 is_seen && patch.emission != Vec3::ZERO && mode != Direct::Linked
             })
             .collect();
@@ -134,7 +134,7 @@ impl Lights {
 
     /// Whether all emission that light is computed from is sampled.
     pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
-        let mut held = hierarchy.held();
+        let mut held = hierarchy.active_patches();
         held.all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
     }
 

@@ -165,7 +165,7 @@ impl Solver {
         cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.hierarchy.mesh;
-        let tells = |element: &Element, side| !element.is_covered(side);
+        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
         let most = SETTLED * self.settings.tolerance * self.mean_irradiance;
         let areas = mesh.areas_about_vertices();
         let mut acceleration = Anderson::new(DEPTH);
@@ -271,7 +271,7 @@ impl Solver {
         let Some(patch) = hierarchy.side_met(hit.triangle, direction) else {
             return Met::Back;
         };
-        if !hierarchy.held().contains(&patch) {
+        if !hierarchy.active_patches().contains(&patch) {
             return Met::Nothing;
         }
         let point = from.point + direction * hit.distance;
@@ -294,7 +294,7 @@ impl Solver {
             .into_par_iter()
             .map(|index| {
                 let element = &elements[index];
-                let sends = element.is_leaf() && !element.is_buried();
+                let sends = element.is_leaf() && !element.is_inside_solid();
                 if sends {
                     sender(index)
                 } else {
@@ -324,7 +324,7 @@ fn ask(looks: &mut [Look], senders: &[Sender], received: &[Vec4]) {
 fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
     let mesh = &hierarchy.mesh;
     let of = |leaf: usize| mesh.elements[leaf].edges();
-    mesh.held_leaves().flat_map(of).collect()
+    mesh.active_leaves().flat_map(of).collect()
 }
 
 /// Vertices that find something else than links tell, together with their neighbours, and these neighbours.

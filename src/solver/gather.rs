@@ -147,7 +147,7 @@ fn push_moments(
             incident[place].merge(&above);
         }
     }
-    let held = hierarchy.held();
+    let held = hierarchy.active_patches();
     let project = |patch: usize| {
         let holder = incident.get(holders.of_patch[patch] as usize);
         match holder {

@@ -91,7 +91,7 @@ impl Solver {
                 Ending::Settled => return Some(()),
                 Ending::Unsettled => {
                     report.notes.push(format!(
-                        "the iteration has not settled after {} sweeps: the residual is {:.1e}",
+                        "the iteration has not converged after {} sweeps: the residual is {:.1e}",
                         report.sweeps, report.residual
                     ));
                     return Some(());

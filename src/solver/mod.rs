@@ -53,7 +53,7 @@ pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, Reading, SheetSides, Tables},
-    scene::{Appearance, Awakened, Scene},
+    scene::{ActiveMaterials, Appearance, Scene},
     transport::{
         Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
     },
@@ -171,13 +171,13 @@ impl Solver {
     ) -> Option<Self> {
         cancel.proceed()?;
         let is_cancelled = || cancel.is_cancelled();
-        let awakened = wished.map_or_else(Awakened::default, |wished| {
-            scene.awakened(&scene.allowed(wished))
+        let active = wished.map_or_else(ActiveMaterials::default, |wished| {
+            scene.active_materials(&scene.allowed(wished))
         });
         let mut rays = rays;
         let sheets = SheetSides::of(&scene, &mut rays);
         cancel.proceed()?;
-        let (plan, tree) = Plan::make(&scene, sheets.as_ref(), &settings, awakened, &is_cancelled)?;
+        let (plan, tree) = Plan::make(&scene, sheets.as_ref(), &settings, active, &is_cancelled)?;
         // Both take about as long, and neither keeps all processors busy.
         let (hierarchy, rays) = rayon::join(
             || {
@@ -390,7 +390,7 @@ impl Solver {
 
     /// As [`Self::radiosity`] for this irradiance.
     fn radiosity_under(&self, element: usize, irradiance: Vec4) -> Vec4 {
-        if self.hierarchy.mesh.elements[element].is_buried() {
+        if self.hierarchy.mesh.elements[element].is_inside_solid() {
             return Vec4::ZERO;
         }
         let reflected = self.hierarchy.reflectance_of(element) * irradiance.truncate();

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use super::{Cancel, Method, Oracle, SolveSettings};
 use crate::{
     hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
-    scene::{Awakened, Scene, WarningKind},
+    scene::{ActiveMaterials, Scene, WarningKind},
 };
 
 /// Patches of a scene that is solved patch by patch, at most: their pairs are fewer than the links of usual scenes.
@@ -120,10 +120,10 @@ pub struct LeftOut {
 impl LeftOut {
     /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
     pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
-        let awakened = Awakened::default();
+        let active = ActiveMaterials::default();
         let sheets = SheetSides::of(scene, &mut None);
         let is_cancelled = || cancel.is_cancelled();
-        let (plan, _) = Plan::make(scene, sheets.as_ref(), settings, awakened, &is_cancelled)?;
+        let (plan, _) = Plan::make(scene, sheets.as_ref(), settings, active, &is_cancelled)?;
         Some(Arc::unwrap_or_clone(plan.left_out))
     }
 }
@@ -153,24 +153,24 @@ pub(super) struct Plan {
     /// Only elements exchange light.
     pub(super) is_by_patch: bool,
     /// Materials that it is made for as if they emitted or reflected.
-    awakened: Awakened,
+    active: ActiveMaterials,
     /// The list.
     pub(super) left_out: Arc<Vec<LeftOut>>,
 }
 
 impl Plan {
     /// Look at a scene, and plant the tree that is needed; `None` when cancelled. What is left out need not be added where
-    /// the awakened materials emit or reflect.
+    /// the active materials emit or reflect.
     pub(super) fn make(
         scene: &Scene,
         sheets: Option<&SheetSides>,
         settings: &SolveSettings,
-        awakened: Awakened,
+        active: ActiveMaterials,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<(Self, PatchTree)> {
         let may_omit = |omission| !settings.keep.has(omission);
         let mut plan = Self {
-            awakened,
+            active,
             ..Self::default()
         };
         let mut tree = PatchTree::build(scene, sheets, cancelled)?;
@@ -181,7 +181,7 @@ impl Plan {
             // Who asks for the paper's way wants to see what it does.
             let is_exact_wanted =
                 settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
-            let has_few = tree.held().len() <= FEW_PATCHES;
+            let has_few = tree.active_patches().len() <= FEW_PATCHES;
             plan.is_clear = true;
             plan.is_closed = tree.is_closed(scene);
             plan.follows_light = is_exact_wanted && may_omit(Omission::Elements);
@@ -199,7 +199,7 @@ impl Plan {
         tree: PatchTree,
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<PatchTree> {
-        let lit = tree.lit(scene, &self.awakened);
+        let lit = tree.lit(scene, &self.active);
         // Without any light there is nothing to spare.
         if lit.iter().all(|&is_lit| is_lit) || !lit.contains(&true) {
             return Some(tree);
@@ -231,22 +231,22 @@ impl Plan {
         tree.without(scene, sheets, &dark, cancelled)
     }
 
-    /// Whether what was left out of a hierarchy stays dark where these materials are awakened, too. If so, the plan holds
+    /// Whether what was left out of a hierarchy stays dark where these materials are active, too. If so, the plan holds
     /// for them from now on.
     pub(super) fn holds_for(
         &mut self,
         scene: &Scene,
         hierarchy: &Hierarchy,
-        awakened: &Awakened,
+        active: &ActiveMaterials,
     ) -> bool {
-        let is_whole = hierarchy.held().len() == hierarchy.patches.len();
-        if is_whole || self.awakened.covers(awakened) {
+        let is_whole = hierarchy.active_patches().len() == hierarchy.patches.len();
+        if is_whole || self.active.covers(active) {
             return true;
         }
-        let all = self.awakened.joined(awakened);
+        let all = self.active.joined(active);
         let side = |patch: &Patch| 2 * patch.triangle.index() + usize::from(patch.is_back);
         let mut is_held = vec![false; 2 * scene.triangles.len()];
-        for patch in &hierarchy.patches[hierarchy.held()] {
+        for patch in &hierarchy.patches[hierarchy.active_patches()] {
             is_held[side(patch)] = true;
         }
         let Some(tree) = PatchTree::build(scene, None, &|| false) else {
@@ -255,14 +255,14 @@ impl Plan {
         let mut lit = tree.lit(scene, &all).into_iter().zip(&tree.patches);
         let holds = lit.all(|(is_lit, patch)| !is_lit || is_held[side(patch)]);
         if holds {
-            self.awakened = all;
+            self.active = all;
         }
         holds
     }
 
     /// List what is left out where nothing blocks.
     fn note_clear(&mut self, scene: &Scene, tree: &PatchTree) {
-        let (triangles, held) = (scene.triangles.len(), tree.held().len());
+        let (triangles, held) = (scene.triangles.len(), tree.active_patches().len());
         let exception = if self.is_closed || self.is_by_patch {
             ""
         } else {
@@ -348,14 +348,14 @@ fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
         ),
         (
             "constant-textures",
-            scene.spared.constant_textures,
+            scene.omitted_textures.constant_textures,
             "textures of one colour",
             "where faces show them all their pixels are alike, so the materials have that colour instead",
             "nothing changes but rounding",
         ),
         (
             "unused-textures",
-            scene.spared.unused_textures,
+            scene.omitted_textures.unused_textures,
             "textures",
             "no face shows them",
             "nothing changes",

@@ -163,7 +163,7 @@ pub(super) fn closures(
     let (found, probed) = prober.probe_groups(&open);
     cancel.proceed()?;
     let elements = &hierarchy.mesh.elements[..count];
-    let untold = |element: &Element| match element.is_buried() {
+    let untold = |element: &Element| match element.is_inside_solid() {
         true => Closure::BURIED,
         false => Closure::CLOSED,
     };
@@ -333,7 +333,7 @@ fn cells(hierarchy: &Hierarchy, cluster: usize, count: usize) -> Vec<usize> {
         let is_cell = element.is_leaf() || element.children().start >= count;
         if !is_cell {
             pending.extend(element.children().rev());
-        } else if !element.is_buried() {
+        } else if !element.is_inside_solid() {
             cells.push(index);
         }
     }

@@ -351,7 +351,7 @@ impl VertexMeans {
         let mut weight = vec![0.0f32; count];
         for leaf in leaves {
             let element = &hierarchy.mesh.elements[leaf.element as usize];
-            let trust = if element.is_open() {
+            let trust = if element.is_outside_solids() {
                 1.0
             } else {
                 CONTACT_TRUST
@@ -364,7 +364,7 @@ impl VertexMeans {
             }
         }
         // Of patches that no light reaches it is known that they receive nothing.
-        for patch in hierarchy.held().end..hierarchy.patches.len() {
+        for patch in hierarchy.active_patches().end..hierarchy.patches.len() {
             for &vertex in &hierarchy.mesh.elements[patch].vertices {
                 weight[vertex as usize] += hierarchy.patches[patch].area;
             }
@@ -375,13 +375,13 @@ impl VertexMeans {
         }
         carry_over(
             &hierarchy.mesh,
-            |element, _| element.is_open(),
+            |element, _| element.is_outside_solids(),
             &mut irradiance,
         );
         let centres = leaves
             .iter()
             .map(|leaf| (leaf.element as usize, leaf.centre))
-            .filter(|&(element, _)| hierarchy.mesh.elements[element].is_open());
+            .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
         project(hierarchy, &mut irradiance, centres);
         for (value, factor) in irradiance.iter_mut().zip(factors) {
             *value *= *factor;

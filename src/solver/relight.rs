@@ -7,7 +7,7 @@
 //! [`Solver::finish_relighting`] gathers for each of them: that takes several times as long as all sweeps together.
 //! Links stay those that the light before asked for: a step that follows refines them for the new one.
 //! What the plan left out stays out, also where a surface that is painted or begins to shine lights it: then the light is
-//! wrong there, and [`Relit::is_outgrown`] says that a new solve is needed.
+//! wrong there, and [`Relit::needs_restart`] says that a new solve is needed.
 
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub struct Relit {
     pub is_rough: bool,
     /// Whether light reaches what was left out of the solve: it is missing, and only a solve that begins anew for these
     /// appearances will show it.
-    pub is_outgrown: bool,
+    pub needs_restart: bool,
 }
 
 /// Light that was solved when materials looked so.
@@ -113,8 +113,8 @@ impl Solver {
     pub fn relight(&mut self, wished: &[Appearance], cancel: &Cancel) -> Option<Relit> {
         cancel.proceed()?;
         let appearances = self.scene.allowed(wished);
-        let awakened = self.scene.awakened(&appearances);
-        let is_outgrown = !self.plan.holds_for(&self.scene, &self.hierarchy, &awakened);
+        let active = self.scene.active_materials(&appearances);
+        let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
         let factor = self.keep_solved(&appearances);
         let shot = self.mix_direct(&appearances, cancel)?;
         self.ray_count += shot;
@@ -131,7 +131,7 @@ impl Solver {
         Some(Relit {
             report,
             is_rough: !self.relighting.is_solved && !self.links.is_empty(),
-            is_outgrown,
+            needs_restart,
         })
     }
 
@@ -286,7 +286,7 @@ impl Solver {
 
     /// Emitted power by colour.
     fn emitted(&self) -> DVec3 {
-        let patches = &self.hierarchy.patches[self.hierarchy.held()];
+        let patches = &self.hierarchy.patches[self.hierarchy.active_patches()];
         patches
             .iter()
             .map(|patch| patch.emission.as_dvec3() * f64::from(patch.area))

@@ -70,8 +70,8 @@ impl Solver {
         let (mut least, mut most) = (f32::INFINITY, 0.0f32);
         let (mut sum, mut whole) = (0.0f64, 0.0f64);
         let elements = &self.hierarchy.mesh.elements;
-        let seen = |leaf: &usize| !elements[*leaf].is_buried();
-        for leaf in self.hierarchy.mesh.held_leaves().filter(seen) {
+        let seen = |leaf: &usize| !elements[*leaf].is_inside_solid();
+        for leaf in self.hierarchy.mesh.active_leaves().filter(seen) {
             let row = self.linked[leaf].w;
             least = least.min(row);
             most = most.max(row);

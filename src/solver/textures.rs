@@ -105,7 +105,7 @@ impl Solver {
         if self.scene.texcoords.is_empty() {
             return Vec::new();
         }
-        let leaves = hierarchy.mesh.held_leaves().filter(|&leaf| {
+        let leaves = hierarchy.mesh.active_leaves().filter(|&leaf| {
             let area = hierarchy.mesh.elements[leaf].area_vector.length();
             area * 0.25 >= min_area && self.scene.is_textured(hierarchy.patch_of(leaf).triangle)
         });
@@ -162,7 +162,7 @@ fn shown_by(hierarchy: &Hierarchy, element: usize) -> [Vec3; 2] {
 
 /// What all leaves reflect and emit.
 fn sent(hierarchy: &Hierarchy) -> [Sent; 2] {
-    let leaves = hierarchy.mesh.held_leaves();
+    let leaves = hierarchy.mesh.active_leaves();
     leaves.fold([Sent::default(); 2], |sent, leaf| {
         let area = hierarchy.mesh.elements[leaf].area_vector.length();
         let [reflected, emitted] = shown_by(hierarchy, leaf);

@@ -1,16 +1,15 @@
-//! What the user asks for: keys, menus, buttons and panels all end here.
+//! Actions of the user: keys, menus, buttons and panels all end here.
 
 use std::path::PathBuf;
 
-use super::{
-    camera::{AxisView, UpAxis},
-    loader::SceneSource,
-    materials::Materials,
-    view::ViewMode,
+use super::{camera::AxisView, loader::SceneSource, materials::Materials, view::ViewMode};
+use crate::{
+    scene::{Sides, UpAxis},
+    solver::SolveSettings,
+    worker::RunOptions,
 };
-use crate::{scene::Sides, solver::SolveSettings, worker::RunOptions};
 
-/// One wish, carried out by the window after the panels are drawn.
+/// One action, carried out by the window after the panels are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Ask for a file.
@@ -89,7 +88,7 @@ pub enum Action {
         path: PathBuf,
         /// Width and height.
         size: [u32; 2],
-        /// Whether the background is left out.
+        /// Whether the background is omitted.
         is_transparent: bool,
     },
     /// Ask where the lit mesh is to go.

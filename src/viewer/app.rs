@@ -20,12 +20,14 @@ use eframe::egui;
 use super::{
     action::Action,
     bindings::{self, Binding},
-    focus, panels,
+    faults::Faults,
+    focus,
+    options::Options,
+    panels,
     preferences::Preferences,
     saver::{Notice, Unfinished},
     session::Recent,
     stage::Stage,
-    start::{Faults, Options},
     state::State,
     theme,
     viewport::{Viewport, viewport_ui},
@@ -44,7 +46,7 @@ const RECENT_KEY: &str = "recent";
 
 /// The window's application.
 pub struct App {
-    /// What it knows. Public for tests.
+    /// Its state. Public for tests.
     pub state: State,
     worker: WorkerHandle,
     stage: Stage,
@@ -144,7 +146,7 @@ impl App {
 
 impl Drop for App {
     fn drop(&mut self) {
-        // What was asked for is written, even when the window closes at once.
+        // Files in progress are written, even when the window closes at once.
         self.unfinished.finish();
     }
 }
@@ -165,7 +167,7 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        // What keys ask for shows in this frame already. Keys belong to fields and open menus first.
+        // Keys take effect in this frame already. They belong to fields and open menus first.
         if !focus::is_typing(&ctx) && !egui::Popup::is_any_open(&ctx) {
             self.obey_keys(&ctx);
         }

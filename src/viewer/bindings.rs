@@ -4,9 +4,11 @@ use eframe::egui::{Event, InputState, Key, Modifiers};
 
 use super::{
     action::{Action, Scale},
-    camera::{AxisView, UpAxis},
+    camera::AxisView,
     view::ViewMode,
 };
+
+use crate::scene::UpAxis;
 
 /// Where a binding stands on the key sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,12 +72,12 @@ impl Binding {
     /// The key as people write it.
     pub fn keys(&self) -> String {
         let mut text = String::new();
-        for (held, name) in [
+        for (is_down, name) in [
             (self.modifiers.command, "Ctrl+"),
             (self.modifiers.alt, "Alt+"),
             (self.modifiers.shift, "Shift+"),
         ] {
-            if held {
+            if is_down {
                 text.push_str(name);
             }
         }

@@ -5,29 +5,6 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Mat4, Quat, Vec2, Vec3, camera::rh};
-use serde::{Deserialize, Serialize};
-
-/// Which axis of the scene points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum UpAxis {
-    /// The habit of OBJ files.
-    #[default]
-    #[serde(rename = "+Y")]
-    Y,
-    /// The habit of Blender and of CAD programs.
-    #[serde(rename = "+Z")]
-    Z,
-}
-
-impl UpAxis {
-    /// The axis as a unit vector.
-    pub const fn vector(self) -> Vec3 {
-        match self {
-            Self::Y => Vec3::Y,
-            Self::Z => Vec3::Z,
-        }
-    }
-}
 
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +34,7 @@ const MAX_PITCH: f32 = FRAC_PI_2 - 1e-3;
 /// A turntable camera. Positions in frame units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What it looks at and turns around.
+    /// The point that it looks at and turns around.
     pub pivot: Vec3,
     /// Radians around the up axis; 0 looks from the front.
     pub yaw: f32,
@@ -69,7 +46,7 @@ pub struct Camera {
     pub fov_y_radians: f32,
     /// Parallel instead of central projection.
     pub orthographic: bool,
-    /// What is up: a unit vector, which the camera turns around.
+    /// The up direction, a unit vector; the camera turns around it.
     pub up: Vec3,
 }
 
@@ -257,7 +234,7 @@ impl Camera {
     }
 }
 
-/// A camera that glides to where it is told to be.
+/// A camera that moves smoothly to its target.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CameraRig {
     /// Where it is going.

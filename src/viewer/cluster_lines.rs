@@ -20,7 +20,7 @@ pub const RAMP_START: f32 = 0.15;
 pub struct ColoredBoxes {
     /// The boxes.
     pub instances: Vec<BoxInstance>,
-    /// What the first and the last of the colours stand for: powers and areas in frame units, counts, or W/m².
+    /// Values of the first and the last colour: powers and areas in frame units, counts, or W/m².
     pub ends: [f32; 2],
 }
 
@@ -133,7 +133,7 @@ pub fn segment(start: Vec3, end: Vec3, color: Vec3, is_arrow: bool) -> SegmentIn
     ]
 }
 
-/// What a colour stands for; powers, areas and counts by their logarithm, since they span many magnitudes.
+/// The quantity of a colour; powers, areas and counts by their logarithm, since they span many magnitudes.
 fn quantity(cluster: &ClusterBox, color: ClusterColor) -> f32 {
     let log = |x: f32| x.clamp(1e-20, 1e20).log10();
     match color {
@@ -145,7 +145,7 @@ fn quantity(cluster: &ClusterBox, color: ClusterColor) -> f32 {
     }
 }
 
-/// What a position of [`quantity`] stands for.
+/// The value at a position of [`quantity`].
 fn value_of(position: f32, color: ClusterColor) -> f32 {
     match color {
         ClusterColor::Spread => position,

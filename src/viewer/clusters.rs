@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::view::{ClusterCut, ClusterOverlay};
 use crate::solver::ClusterBox;
 
-/// What is shown of a tree, kept because large trees take a while to go through.
+/// The shown clusters of a tree, stored because large trees take a while to go through.
 #[derive(Clone, Default)]
 pub struct ShownClusters {
     of: Option<(Arc<Vec<ClusterBox>>, ClusterOverlay)>,
@@ -20,11 +20,11 @@ pub struct ShownClusters {
 impl ShownClusters {
     /// Choose again if the tree or what is to be shown of it is another.
     pub fn update(&mut self, clusters: &Arc<Vec<ClusterBox>>, overlay: &ClusterOverlay) {
-        let is_current = |(held, counted): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
-            Arc::ptr_eq(held, clusters) && counted.has_same_boxes(overlay)
+        let is_current = |(current, counted): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
+            Arc::ptr_eq(current, clusters) && counted.has_same_boxes(overlay)
         };
         if !self.of.as_ref().is_some_and(is_current) {
-            let is_same_tree = |(held, _): &(Arc<_>, _)| Arc::ptr_eq(held, clusters);
+            let is_same_tree = |(current, _): &(Arc<_>, _)| Arc::ptr_eq(current, clusters);
             if !self.of.as_ref().is_some_and(is_same_tree) {
                 self.deepest = Some(deepest_level(clusters));
             }
@@ -129,7 +129,7 @@ pub fn containing(clusters: &[ClusterBox], shown: &[usize], point: Vec3) -> Opti
     shown
         .iter()
         .copied()
-        // What is shown may still be of the tree before.
+        // The shown clusters may still be of the tree before.
         .filter(|&index| index < clusters.len())
         .filter(|&index| {
             let cluster = &clusters[index];

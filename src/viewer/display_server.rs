@@ -85,8 +85,8 @@ mod tests {
         assert!(!needs_x11_under(&in_runtime("wayland-0")));
         let absolute = [x11, ("WAYLAND_DISPLAY", alive.to_str().unwrap())];
         assert!(!needs_x11_under(&absolute));
-        let (held, _other) = UnixStream::pair().unwrap();
-        let number = held.as_raw_fd().to_string();
+        let (socket, _other) = UnixStream::pair().unwrap();
+        let number = socket.as_raw_fd().to_string();
         assert!(!needs_x11_under(&[x11, ("WAYLAND_SOCKET", &number)]));
     }
 

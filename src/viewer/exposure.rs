@@ -10,7 +10,7 @@ const BRIGHT_END: f64 = 1.6;
 /// The part of the light's pixels that lie below its bright end.
 const BRIGHT_SHARE: f64 = 0.95;
 /// Pixels this many times darker than the bright end count half, and darker ones less: exposed by the bright end, they
-/// are within a few steps of 255 from black. A smaller ratio leaves dim rooms out of account; a larger one lets light
+/// are within a few steps of 255 from black. A smaller ratio ignores dim rooms; a larger one lets light
 /// that nobody can see, such as a leak of a thousandth, decide about the picture.
 const CONTRAST: f64 = 500.0;
 
@@ -56,7 +56,7 @@ impl Histogram {
         Self(counts)
     }
 
-    /// Luminance below which pixels have this share of the weight of all; a pixel weighs what its luminance says.
+    /// Luminance below which pixels have this share of the weight of all; a pixel is weighted by its luminance.
     fn quantile(&self, share: f64, weight: impl Fn(f64) -> f64) -> f64 {
         let luminance = |bin: usize| ((bin as f64 + 0.5) / BINS_PER_EV - SPAN_EV).exp2();
         let weights: Vec<f64> = self
@@ -78,7 +78,7 @@ impl Histogram {
 /// How the exposure of the window follows what was metered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Follower {
-    /// What was metered last; `None` before the first light of a scene.
+    /// The last metering; `None` before the first light of a scene.
     pub target: Option<f32>,
 }
 

@@ -1,4 +1,4 @@
-//! What a frame costs the processor, over the last frames.
+//! Processor time of the last frames.
 
 use std::collections::VecDeque;
 

@@ -2,16 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{
-    state::State,
-    view::{LinkEnd, LinkOverlay},
-};
-use crate::{
-    hierarchy::NodeId,
-    solver::{Inspection, Subject},
-};
+use super::view::{LinkEnd, LinkOverlay};
+use crate::solver::{Inspection, Subject};
 
-/// What was asked, and what is known.
+/// Subjects of the present run, and their inspections.
 #[derive(Default)]
 pub struct Inspections {
     /// Whether the nodes that are shown are those of the present run.
@@ -32,7 +26,7 @@ impl Inspections {
         self.is_open = true;
     }
 
-    /// What to ask now: once, until something else is wanted.
+    /// The subjects to ask about now: once, until others are wanted.
     pub fn question(&mut self, wanted: &[Subject]) -> Option<Vec<Subject>> {
         let is_same = self.asked.len() == wanted.len()
             && self.asked.iter().zip(wanted).all(|(a, b)| is_same(a, b));
@@ -40,8 +34,8 @@ impl Inspections {
             return None;
         }
         self.asked = wanted.to_vec();
-        for held in [&mut self.element, &mut self.cluster] {
-            held.take_if(|held| !wanted.iter().any(|subject| is_same_as(held, subject)));
+        for known in [&mut self.element, &mut self.cluster] {
+            known.take_if(|known| !wanted.iter().any(|subject| is_same_as(known, subject)));
         }
         Some(self.asked.clone())
     }
@@ -57,12 +51,12 @@ impl Inspections {
         }
     }
 
-    /// What is known of the picked element.
+    /// The inspection of the picked element.
     pub fn element(&self) -> Option<&Arc<Inspection>> {
         self.element.as_ref()
     }
 
-    /// What is known of an end of links.
+    /// The inspection of an end of links.
     pub fn of(&self, end: LinkEnd) -> Option<&Arc<Inspection>> {
         match end {
             LinkEnd::Element => self.element.as_ref(),
@@ -102,25 +96,12 @@ fn is_same(a: &Subject, b: &Subject) -> bool {
     }
 }
 
-/// What the window wants to know: the picked element, and the selected cluster.
-pub fn wanted(state: &State) -> Vec<Subject> {
-    let element = state.selection.as_ref().and_then(|selection| {
-        Some(Subject::Element {
-            node: NodeId(selection.probe.as_ref()?.element),
-            point: selection.pick.point,
-        })
-    });
-    let cluster = state
-        .cluster
-        .map(|index| Subject::Cluster(NodeId(index as u32)));
-    element.into_iter().chain(cluster).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::hierarchy::NodeId;
 
     fn element(node: u32, x: f32) -> Subject {
         Subject::Element {
@@ -143,38 +124,38 @@ mod tests {
 
     #[test]
     fn each_question_is_asked_once() {
-        let mut held = Inspections::default();
+        let mut known = Inspections::default();
         assert!(
-            held.question(&[element(7, 1.0)]).is_none(),
+            known.question(&[element(7, 1.0)]).is_none(),
             "no run is known"
         );
-        held.open();
-        assert!(held.question(&[element(7, 1.0)]).is_some());
-        assert!(held.question(&[element(7, 1.0)]).is_none());
+        known.open();
+        assert!(known.question(&[element(7, 1.0)]).is_some());
+        assert!(known.question(&[element(7, 1.0)]).is_none());
         assert!(
-            held.question(&[element(9, 1.0)]).is_none(),
+            known.question(&[element(9, 1.0)]).is_none(),
             "the same point, divided"
         );
-        assert!(held.is_waiting(LinkEnd::Element));
-        held.note(answer(element(7, 1.0), 1));
-        assert!(!held.is_waiting(LinkEnd::Element));
-        held.note(answer(element(7, 1.0), 2));
-        assert_eq!(held.element().map(|held| held.step), Some(2));
+        assert!(known.is_waiting(LinkEnd::Element));
+        known.note(answer(element(7, 1.0), 1));
+        assert!(!known.is_waiting(LinkEnd::Element));
+        known.note(answer(element(7, 1.0), 2));
+        assert_eq!(known.element().map(|known| known.step), Some(2));
     }
 
     #[test]
     fn answers_to_older_questions_do_not_show() {
-        let mut held = Inspections::default();
-        held.open();
-        held.question(&[element(7, 1.0), Subject::Cluster(NodeId(3))]);
-        held.note(answer(element(7, 1.0), 1));
-        held.note(answer(Subject::Cluster(NodeId(3)), 1));
-        held.question(&[element(8, 2.0), Subject::Cluster(NodeId(3))]);
-        assert!(held.element().is_none());
-        assert!(held.of(LinkEnd::Cluster).is_some(), "still wanted");
-        held.note(answer(element(7, 1.0), 2));
-        assert!(held.element().is_none());
-        held.close();
-        assert!(held.of(LinkEnd::Cluster).is_none());
+        let mut known = Inspections::default();
+        known.open();
+        known.question(&[element(7, 1.0), Subject::Cluster(NodeId(3))]);
+        known.note(answer(element(7, 1.0), 1));
+        known.note(answer(Subject::Cluster(NodeId(3)), 1));
+        known.question(&[element(8, 2.0), Subject::Cluster(NodeId(3))]);
+        assert!(known.element().is_none());
+        assert!(known.of(LinkEnd::Cluster).is_some(), "still wanted");
+        known.note(answer(element(7, 1.0), 2));
+        assert!(known.element().is_none());
+        known.close();
+        assert!(known.of(LinkEnd::Cluster).is_none());
     }
 }

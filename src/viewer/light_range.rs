@@ -1,19 +1,12 @@
 //! Where the light of a snapshot lies: the ends of automatic false colours.
 
-use glam::Vec3;
-
 use super::view::{ViewMode, ViewSettings};
-use crate::solver::Snapshot;
+use crate::{scene::luminance, solver::Snapshot};
 
 /// Vertices looked at. Fewer miss small bright spots; more take longer than a frame of a large scene may.
 const SAMPLES: usize = 20_000;
 /// Below this nothing counts as light, in W/(sr·m²).
 const DARKNESS: f32 = 1e-12;
-
-/// Luminance of linear RGB.
-pub fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}
 
 /// Ends of the false colours of a mode: the fixed ones, or those of the light. `errors` are those at the vertices.
 pub fn false_color_range(
@@ -55,7 +48,7 @@ pub fn false_color_range(
     }
 }
 
-/// What false colours show at a vertex.
+/// The value of false colours at a vertex.
 fn value(snapshot: &Snapshot, mode: ViewMode, vertex: usize) -> f32 {
     let light = &snapshot.light;
     match mode {

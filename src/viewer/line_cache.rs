@@ -7,7 +7,7 @@ use super::{
 };
 use crate::solver::{ClusterBox, Inspection};
 
-/// The lines of the last frame, and what they were made from. Arcs are held, so that an address is not used twice.
+/// The lines of the last frame, and what they were made from. Arcs are stored, so that no address is reused.
 #[derive(Default)]
 pub(super) struct LineCache {
     segments: Arc<Vec<SegmentInstance>>,

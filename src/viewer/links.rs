@@ -2,17 +2,19 @@
 
 use super::{
     cluster_lines::{outline, segment},
-    light_range::luminance,
     render::SegmentInstance,
     theme,
     view::{LinkColor, LinkOverlay},
 };
-use crate::solver::{InspectedLink, Inspection};
+use crate::{
+    scene::luminance,
+    solver::{InspectedLink, Inspection},
+};
 
 /// Magnitudes that the colours of strengths span at most. With fewer, weak links look alike; with more, strong ones do.
 const MOST_MAGNITUDES: f32 = 3.0;
 
-/// What the lines tell, for their legend.
+/// The quantity of the lines, for their legend.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkSummary {
     /// Links drawn.
@@ -25,7 +27,7 @@ pub struct LinkSummary {
     pub range: [f32; 2],
 }
 
-/// What the lines of an inspection tell.
+/// The quantity of the lines of an inspection.
 pub fn summary(inspection: &Inspection, overlay: &LinkOverlay) -> LinkSummary {
     let drawn = drawn(inspection, overlay);
     let brought: f32 = drawn.iter().map(strength).sum();

@@ -32,7 +32,7 @@ pub enum SceneSource {
 }
 
 impl SceneSource {
-    /// What to call it in lists and titles.
+    /// Its name in lists and titles.
     pub fn label(&self) -> String {
         match self {
             Self::File(path) => path
@@ -42,6 +42,11 @@ impl SceneSource {
                 .into_owned(),
             Self::Builtin(name) => name.clone(),
         }
+    }
+
+    /// Title of the window that shows it.
+    pub fn window_title(&self) -> String {
+        format!("{} – vecrad", self.label())
     }
 
     /// The file, where there is one.
@@ -69,24 +74,24 @@ pub struct LoadedScene {
     pub emitter_count: usize,
     /// Whether there are one-sided faces, whose backs can be shown or looked through.
     pub has_backs: bool,
-    /// Whether all surfaces are grey and all light white, so that one channel tells all.
+    /// Whether all surfaces are grey and all light white, so that one channel is enough.
     pub is_grey: bool,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
 }
 
-/// What is done to a scene on its way, in order.
+/// Stages of loading a scene, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// The file, its materials and textures.
     Reading,
-    /// What picking and the reference need.
+    /// The tree that picking and the reference need.
     BuildingRayTree,
     /// Where to look from.
     ChoosingView,
 }
 
-/// How far a scene is on its way, told by the thread that reads it. Clones tell the same.
+/// Progress of loading a scene, set by the thread that reads it. Clones share it.
 #[derive(Clone, Debug, Default)]
 struct Tracker {
     phase: Arc<AtomicU8>,
@@ -121,14 +126,14 @@ impl Tracker {
 pub struct LoadProgress {
     /// The part that is done, 0…1.
     pub share: f32,
-    /// What is being done.
+    /// The present stage.
     doing: &'static str,
     /// Since reading began.
     elapsed: Duration,
 }
 
 impl LoadProgress {
-    /// What is being done and how far it is, short.
+    /// The present stage and its progress, short.
     pub fn text(&self) -> String {
         let percent = (100.0 * self.share).floor();
         match self.elapsed.as_secs() {
@@ -180,7 +185,7 @@ impl Loader {
         self.tracker.progress(self.since.elapsed())
     }
 
-    /// What is being read.
+    /// The source that is being read.
     pub fn source(&self) -> &SceneSource {
         &self.source
     }

@@ -9,7 +9,7 @@ use crate::scene::{Appearance, Material, Scene, Surface, TriangleId};
 pub struct LightControl {
     /// Whether it emits.
     pub is_on: bool,
-    /// Times as bright as the file says.
+    /// Brightness relative to the file.
     pub intensity: f32,
     /// Linear colour; the largest channel of the file's is 1.
     pub color: Vec3,
@@ -96,17 +96,17 @@ impl Materials {
         }
     }
 
-    /// What the file says of a material.
+    /// A material as in the file.
     pub fn of_file(&self, index: usize) -> &MaterialControl {
         &self.of_file[index]
     }
 
-    /// Back to what the file says.
+    /// Reset to the values of the file.
     pub fn reset(&mut self) {
         self.now.clone_from(&self.of_file);
     }
 
-    /// Whether anything is not as the file says.
+    /// Whether anything differs from the file.
     pub fn are_changed(&self) -> bool {
         self.now != self.of_file
     }
@@ -116,7 +116,7 @@ impl Materials {
         (0..self.now.len()).filter(|&index| self.now[index].light.is_some())
     }
 
-    /// How they look, one for each. What was not changed is exactly as the scene has it.
+    /// Their appearances, one for each. An unchanged one is exactly that of the scene.
     pub fn appearances(&self, scene: &Scene) -> Vec<Appearance> {
         let controls = self.now.iter().zip(&self.of_file);
         let of = |((now, of_file), material)| {

@@ -1,4 +1,4 @@
-//! What the window tells the user: sentences, which of them were seen, and which go with the scene they are about.
+//! Messages to the user: sentences, which of them were seen, and which are dropped with the scene they are about.
 
 /// How much a message matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,7 +52,7 @@ impl Messages {
         self.scene += 1;
     }
 
-    /// The scene that was opened last is shown: drop what was said about those before.
+    /// The scene that was opened last is shown: drop the messages about earlier scenes.
     pub fn show_scene(&mut self) {
         let scene = self.scene;
         let stays = |message: &Message| message.scene.is_none_or(|number| number == scene);
@@ -78,7 +78,7 @@ impl Messages {
         self.all.push(message);
     }
 
-    /// Messages that nobody has seen in the messages panel, the oldest first.
+    /// Messages that were not seen in the messages panel, the oldest first.
     pub fn unseen(&self) -> &[Message] {
         &self.all[self.seen.min(self.all.len())..]
     }

@@ -1,21 +1,23 @@
 //! The window: watch the light arrive, look inside the method, take the picture.
 //!
-//! [`run`] opens it. [`app`] drains the loader and the worker, [`panels`] turn state into widgets and clicks into
+//! [`run()`] opens it. [`app`] drains the loader and the worker, [`panels`] turn state into widgets and clicks into
 //! [`action`]s, [`viewport`] shows what [`render`] draws. Nothing here calls the solver: the worker does.
 
 pub mod action;
 pub mod app;
 pub mod bindings;
 pub mod camera;
-pub mod change;
 pub mod cluster_lines;
 pub mod clusters;
 #[cfg(target_os = "linux")]
 mod display_server;
 pub mod exposure;
+pub mod faults;
+pub mod figures;
 pub mod focus;
 pub mod fonts;
 pub mod frame_time;
+pub mod headless;
 pub mod inspection;
 pub mod light_range;
 mod line_cache;
@@ -25,12 +27,15 @@ pub mod materials;
 pub mod messages;
 pub mod navigation;
 pub mod opening;
+pub mod options;
 pub mod overlay;
 pub mod panel_state;
 pub mod panels;
 pub mod pick;
+pub mod picture_file;
 pub mod preferences;
 pub mod render;
+pub mod run;
 pub mod saver;
 pub mod session;
 pub mod stage;
@@ -43,4 +48,5 @@ pub mod view;
 pub mod viewport;
 pub mod wording;
 
-pub use start::{CameraRequest, Options, ViewerError, run};
+pub use options::{CameraRequest, Options};
+pub use start::{ViewerError, run};

@@ -9,7 +9,7 @@ use super::{
     state::State,
 };
 
-/// What a click asks for.
+/// The result of a click.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Picked {
     /// This point was clicked.
@@ -72,12 +72,12 @@ fn fly(ui: &egui::Ui, state: &mut State) {
     if keys == Vec3::ZERO {
         return;
     }
-    let haste = match (modifiers.shift, modifiers.ctrl) {
+    let speed_factor = match (modifiers.shift, modifiers.ctrl) {
         (true, _) => 4.0,
         (_, true) => 0.25,
         _ => 1.0,
     };
-    let step = state.panels.fly_speed * haste * seconds;
+    let step = state.panels.fly_speed * speed_factor * seconds;
     state.rig.target.fly(keys * step);
     ui.ctx().request_repaint();
 }
@@ -125,7 +125,7 @@ fn point_under(rect: egui::Rect, state: &State, pointer: egui::Pos2) -> Vec3 {
     )
 }
 
-/// What a click or double click means.
+/// The action of a click or double click.
 fn clicked(response: &egui::Response, state: &mut State) -> Option<Picked> {
     if !response.clicked() && !response.double_clicked() {
         return None;

@@ -1,4 +1,4 @@
-//! Where to look from when nothing says so: the direction that sees farthest into the scene.
+//! The default viewpoint: the direction that sees farthest into the scene.
 //!
 //! A room with an open side is looked into through it, instead of at its back. Scenes that look alike from everywhere
 //! get the usual view from the front, right and above.

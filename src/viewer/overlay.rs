@@ -1,8 +1,8 @@
-//! Lines over the light: which cluster boxes, which links, and what their colours tell.
+//! Lines over the light: which cluster boxes and links are drawn, and the quantities of their colours.
 
 use serde::{Deserialize, Serialize};
 
-/// What a cluster box's colour tells.
+/// The quantity of the colour of a cluster box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClusterColor {
@@ -83,7 +83,7 @@ pub struct ClusterOverlay {
     pub level: u32,
     /// Largest extent of a box relative to that of the scene, 0…1; larger leaves are drawn, too.
     pub size: f32,
-    /// What their colour tells.
+    /// The quantity of their colour.
     pub color: ClusterColor,
 }
 
@@ -169,7 +169,7 @@ pub enum LinkEnd {
     Cluster,
 }
 
-/// What a link's colour tells.
+/// The quantity of the colour of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinkColor {
@@ -188,7 +188,7 @@ pub struct LinkOverlay {
     pub shown: bool,
     /// Whose.
     pub of: LinkEnd,
-    /// What their colour tells.
+    /// The quantity of their colour.
     pub color: LinkColor,
     /// How many at most, the strongest first.
     pub most: u32,

@@ -1,4 +1,4 @@
-//! What the panels hold open and half typed.
+//! State of the panels: open sections, unfinished text.
 
 use eframe::egui::Rangef;
 
@@ -7,11 +7,11 @@ use eframe::egui::Rangef;
 pub enum Side {
     /// The run and its settings, on the left.
     Light,
-    /// What is picked, clusters, links, figures and messages, on the right.
+    /// The picked point, clusters, links, figures and messages, on the right.
     Look,
 }
 
-/// What the panels hold open and half typed.
+/// State of the panels: open sections, unfinished text.
 #[derive(Clone, Debug)]
 pub struct PanelState {
     /// Whether anything but the scene is shown.

@@ -1,9 +1,13 @@
-//! What lies under the cursor: the point, its element, its light, and the object around it.
+//! Picking under the cursor: the point, its element, its light, and the object around it.
 
 use glam::{Vec2, Vec3};
 
-use super::{camera::Camera, light_range::luminance, loader::LoadedScene};
-use crate::{geometry::barycentric_in_plane, scene::TriangleId, solver::Snapshot};
+use super::{camera::Camera, loader::LoadedScene};
+use crate::{
+    geometry::barycentric_in_plane,
+    scene::{TriangleId, luminance},
+    solver::Snapshot,
+};
 
 /// A picked point. The light of it is looked up when it is shown, so that it stays current.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +104,7 @@ pub fn probe(snapshot: &Snapshot, pick: &Pick) -> Option<Probe> {
         let corners = mesh.indices[index].map(|corner| mesh.positions[corner as usize]);
         let weights = barycentric_in_plane(pick.point, corners);
         // The element that the point is deepest inside, so that rounding at an edge does no harm.
-        if best.is_none_or(|(_, held)| weights.min_element() > held.min_element()) {
+        if best.is_none_or(|(_, nearest)| weights.min_element() > nearest.min_element()) {
             best = Some((index, weights));
         }
     }

@@ -1,4 +1,4 @@
-//! What the user set that outlives the window, whatever the scene: what surfaces show, tone map, speed, open panels.
+//! Preferences of the user, for all scenes: view mode, tone map, speed, open panels.
 //!
 //! Theme, size of text, sizes of panels and open sections are kept by egui, the window's place by eframe. A sidecar
 //! beside a scene and flags of the command line go before what is kept here.
@@ -9,17 +9,19 @@ use serde::{Deserialize, Serialize};
 use super::{
     panel_state::PanelState,
     state::State,
-    view::{ToneMap, ViewMode, ViewSettings},
+    view::{ViewMode, ViewSettings},
 };
+
+use crate::export::ToneMap;
 
 /// Where they are kept.
 const KEY: &str = "preferences";
 
-/// Kept as TOML. What is missing has its default.
+/// Stored as TOML. Missing values have their defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Preferences {
-    /// What the surfaces show; never the measured error, whose reference does not outlive the window.
+    /// The view mode; never the measured error, whose reference does not outlive the window.
     pub mode: ViewMode,
     /// Tone map of the light modes.
     pub tone_map: ToneMap,

@@ -1,22 +1,21 @@
 //! Pictures, lit meshes and tables to files, on threads of their own.
 
 use std::{
-    io::Cursor,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError, mpsc::Sender},
     thread::{self, JoinHandle},
 };
 
-use image::{DynamicImage, ImageFormat, RgbaImage};
+use image::{DynamicImage, RgbaImage};
 
 use super::{
     loader::SceneSource,
     messages::Severity,
+    picture_file::{EncodeError, encode},
     render::{CutoutTarget, Gpu, ReadError, Target},
-    view::ToneMap,
 };
 use crate::{
-    export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    export::{MeshFormat, MeshOptions, ToneMap, UnknownMeshFormat, write_csv},
     metrics::SceneComparison,
     scene::{Frame, folder_of, write_whole},
     solver::Snapshot,
@@ -53,7 +52,7 @@ pub struct Drawn {
     pub canvas: Canvas,
     /// By what.
     pub gpu: Gpu,
-    /// What its radiance was multiplied by.
+    /// The factor on its radiance.
     pub exposure_factor: f32,
     /// How it becomes display colours.
     pub tone_map: ToneMap,
@@ -77,7 +76,7 @@ pub enum Shot {
 
 impl Shot {
     /// Wait for the picture: display colours, and linear radiance where there is any.
-    fn read(self) -> Result<(DynamicImage, Option<DynamicImage>), EncodeError> {
+    fn read(self) -> Result<(DynamicImage, Option<DynamicImage>), SaveError> {
         let opaque = |display: RgbaImage| DynamicImage::from(display).into_rgb8().into();
         let drawn = match self {
             Self::Seen(display) => return Ok((opaque(display), None)),
@@ -99,7 +98,7 @@ impl Shot {
     }
 }
 
-/// What becomes a file.
+/// The content of a file.
 pub enum Content {
     /// A picture; `.exr` takes the radiance.
     Picture(Shot),
@@ -115,17 +114,17 @@ pub struct LitMesh {
     pub snapshot: Arc<Snapshot>,
     /// Of the scene.
     pub frame: Frame,
-    /// What the file says beside.
+    /// Options of the file.
     pub options: MeshOptions,
 }
 
 impl LitMesh {
-    fn save(&self, path: &Path) -> Result<(), EncodeError> {
+    fn save(&self, path: &Path) -> Result<(), SaveError> {
         let format = MeshFormat::of(path)?;
         write_whole(path, |out| {
             format.write(out, &self.snapshot, &self.frame, &self.options)
         })
-        .map_err(EncodeError::Write)
+        .map_err(SaveError::Write)
     }
 }
 
@@ -133,7 +132,7 @@ impl LitMesh {
 pub struct Saving {
     /// Where to; the ending names the format.
     pub path: PathBuf,
-    /// What.
+    /// The content.
     pub content: Content,
 }
 
@@ -162,7 +161,7 @@ impl Saving {
             Content::Picture(shot) => shot.read().and_then(|shot| save(shot, &self.path)),
             Content::Mesh(mesh) => mesh.save(&self.path),
             Content::Table(table) => write_whole(&self.path, |out| write_csv(table.rows(), out))
-                .map_err(EncodeError::Write),
+                .map_err(SaveError::Write),
         };
         match written {
             Ok(()) => {
@@ -180,49 +179,26 @@ impl Saving {
 fn save(
     (display, radiance): (DynamicImage, Option<DynamicImage>),
     path: &Path,
-) -> Result<(), EncodeError> {
+) -> Result<(), SaveError> {
     let bytes = encode(display, radiance, path)?;
-    write_whole(path, |out| out.write_all(&bytes)).map_err(EncodeError::Write)
+    write_whole(path, |out| out.write_all(&bytes)).map_err(SaveError::Write)
 }
 
 /// Why something does not become a file.
 #[derive(Debug, thiserror::Error)]
-pub enum EncodeError {
+pub enum SaveError {
     /// It did not come back from the adapter.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// Radiance is asked for, and there is none.
-    #[error("this graphics adapter draws no linear pictures; save a PNG instead")]
-    NoRadiance,
-    /// The format is unknown or does not take it.
+    /// The picture does not become such a file.
     #[error(transparent)]
-    Format(#[from] image::ImageError),
+    Encode(#[from] EncodeError),
     /// The format is none of meshes.
     #[error(transparent)]
     MeshFormat(#[from] UnknownMeshFormat),
     /// The system refuses.
     #[error(transparent)]
     Write(std::io::Error),
-}
-
-/// The bytes of a picture file of this name; `.exr` takes the radiance, anything else the display colours.
-///
-/// # Errors
-/// See [`EncodeError`].
-pub fn encode(
-    display: DynamicImage,
-    radiance: Option<DynamicImage>,
-    path: &Path,
-) -> Result<Vec<u8>, EncodeError> {
-    let format = ImageFormat::from_path(path)?;
-    let picture = match (format, radiance) {
-        (ImageFormat::OpenExr, Some(radiance)) => radiance,
-        (ImageFormat::OpenExr, None) => return Err(EncodeError::NoRadiance),
-        _ => display,
-    };
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, format)?;
-    Ok(bytes.into_inner())
 }
 
 /// A name for a picture that is free, beside the scene where that is a file, else in the pictures folder: `scene_1.png`

@@ -1,4 +1,4 @@
-//! What outlives a window: recent scenes, and a sidecar beside a scene with its camera, view and settings.
+//! State that outlives a window: recent scenes, and a sidecar beside a scene with its camera, view and settings.
 
 use std::{
     fs,
@@ -31,7 +31,7 @@ impl Recent {
     pub fn push(&mut self, path: &Path) {
         // Whole paths: the next window may start in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        self.files.retain(|held| *held != path);
+        self.files.retain(|known| *known != path);
         self.files.insert(0, path);
         self.files.truncate(MOST_RECENT);
     }
@@ -63,7 +63,7 @@ struct Sidecar {
     settings: SolveSettings,
 }
 
-/// What a sidecar holds, in the scene's frame.
+/// The content of a sidecar, in the scene's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {
     /// The camera, where it is valid.

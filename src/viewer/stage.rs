@@ -1,7 +1,7 @@
-//! What takes too long for a frame of a large scene, done on a thread of its own: handing mesh, light and boxes to the
+//! A thread for work that takes too long for a frame of a large scene: handing mesh, light and boxes to the
 //! adapter, choosing and colouring the boxes, looking up the light at the picked point, letting go of what was replaced.
 //!
-//! The window says what it wants to show and goes on with what is there. Only the newest wish is fulfilled.
+//! The window requests a picture and continues with the one that is ready. Only the newest request is fulfilled.
 
 use std::{
     any::Any,
@@ -26,7 +26,7 @@ use crate::{
     worker::Wake,
 };
 
-/// What the window wants to show. Arcs are held, so that an address is not used twice.
+/// The picture that the window wants. Arcs are stored, so that no address is reused.
 #[derive(Clone)]
 pub struct Wanted {
     /// The scene.
@@ -35,7 +35,7 @@ pub struct Wanted {
     pub snapshot: Arc<Snapshot>,
     /// Measured errors at its vertices, where they are shown.
     pub errors: Option<Arc<Vec<f32>>>,
-    /// What the surfaces show.
+    /// The view mode.
     pub mode: ViewMode,
     /// Ends of the false colours of that mode.
     pub range: [f32; 2],
@@ -60,11 +60,11 @@ impl PartialEq for Wanted {
     }
 }
 
-/// What is ready to be shown.
+/// A picture that is ready to be shown.
 pub struct Staged {
-    /// What was wanted.
+    /// The request.
     pub wanted: Wanted,
-    /// What the adapter holds of it; nothing without an adapter.
+    /// Its uploads; `None` without an adapter.
     pub uploads: Option<Uploads>,
     /// Why there is no mesh among it.
     pub error: Option<RenderError>,
@@ -72,7 +72,7 @@ pub struct Staged {
     pub is_lit: bool,
     /// The clusters that boxes are drawn of.
     pub clusters: ShownClusters,
-    /// What the ends of their colours stand for, as [`cluster_lines::ColoredBoxes`] has them.
+    /// Values of the ends of their colours, as [`cluster_lines::ColoredBoxes`] has them.
     pub box_ends: [f32; 2],
     /// Light at the picked point.
     pub probe: Option<Probe>,
@@ -80,7 +80,7 @@ pub struct Staged {
     pub object_light: ObjectLight,
 }
 
-/// What the thread is told.
+/// A command to the thread.
 enum Order {
     Show(Box<Wanted>),
     Drop(Box<dyn Any + Send>),
@@ -138,14 +138,14 @@ impl Stage {
         self.drop_later(asked);
     }
 
-    /// What has become ready, if it is still wanted or on the way to it.
+    /// The newest picture that is ready, if it is of the present run.
     pub fn poll(&mut self) -> Option<Staged> {
         let newest = self.staged.try_iter().last()?;
         let is_of_run = |asked: &Wanted| Arc::ptr_eq(&asked.scene, &newest.wanted.scene);
         self.asked.as_ref().is_some_and(is_of_run).then_some(newest)
     }
 
-    /// Let go of something large where no frame waits for it.
+    /// Drop something large on the thread, where no frame waits for it.
     pub fn drop_later(&self, large: impl Send + 'static) {
         self.order(Order::Drop(Box::new(large)));
     }
@@ -156,7 +156,7 @@ impl Stage {
     }
 }
 
-/// The newest wish; those before it and what is to be dropped go. `None` when the window is gone.
+/// The newest request; older ones are discarded, and large values are dropped. `None` when the window is gone.
 fn newest(inbox: &Receiver<Order>) -> Option<Box<Wanted>> {
     let mut newest = None;
     loop {
@@ -194,8 +194,8 @@ impl StageHand {
         let tree = &wanted.snapshot.clusters;
         self.clusters.update(tree, &wanted.clusters);
         let overlay = wanted.clusters;
-        let is_current = |(held, drawn): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
-            Arc::ptr_eq(held, tree) && *drawn == overlay
+        let is_current = |(current, drawn): &(Arc<Vec<ClusterBox>>, ClusterOverlay)| {
+            Arc::ptr_eq(current, tree) && *drawn == overlay
         };
         if !self.boxes.of.as_ref().is_some_and(is_current) {
             let boxes = cluster_lines::boxes(tree, &self.clusters.shown, &overlay);

@@ -1,10 +1,9 @@
-//! What the window knows: the scene, the run, the view, the selection, the messages.
+//! State of the window: the scene, the run, the view, the selection, the messages.
 
 use std::sync::Arc;
 
 use super::{
     camera::CameraRig,
-    change::Change,
     clusters::ShownClusters,
     exposure::Follower,
     frame_time::FrameTimes,
@@ -14,126 +13,18 @@ use super::{
     messages::Messages,
     panel_state::PanelState,
     pick::{ObjectLight, Pick, Probe},
+    run::Run,
     session::Recent,
     stage::Staged,
     truth::Truth,
     view::{ViewMode, ViewSettings},
 };
 use crate::{
+    hierarchy::NodeId,
     scene::{Scene, SceneOptions},
-    solver::{Snapshot, SolveSettings, StepReport},
-    worker::{Event, RunOptions, StopReason},
+    solver::{SolveSettings, StepReport, Subject},
+    worker::RunOptions,
 };
-
-/// Where a run stands.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum RunStatus {
-    /// Nothing runs.
-    #[default]
-    Idle,
-    /// The hierarchy is being built.
-    Preparing,
-    /// Light is being computed.
-    Running,
-    /// It was asked to rest.
-    Pausing,
-    /// It rests until continued.
-    Paused,
-    /// It was asked to end.
-    Stopping,
-    /// It ended.
-    Finished(StopReason),
-    /// The solver failed with this message.
-    Failed(String),
-}
-
-impl RunStatus {
-    /// Whether the solver is at work.
-    pub fn is_busy(&self) -> bool {
-        matches!(self, Self::Preparing | Self::Running)
-    }
-
-    /// Whether there is something to go on with.
-    pub fn can_continue(&self) -> bool {
-        match self {
-            Self::Pausing | Self::Paused | Self::Stopping => true,
-            Self::Finished(reason) => reason.can_continue(),
-            _ => false,
-        }
-    }
-
-    /// For people.
-    pub fn label(&self) -> String {
-        match self {
-            Self::Idle => "No scene".to_owned(),
-            Self::Preparing => "Preparing".to_owned(),
-            Self::Running => "Computing light".to_owned(),
-            Self::Pausing => "Pausing".to_owned(),
-            Self::Paused => "Paused".to_owned(),
-            Self::Stopping => "Stopping".to_owned(),
-            Self::Finished(reason) => match reason {
-                StopReason::Converged => "Done".to_owned(),
-                StopReason::StepLimit => "Done: step limit reached".to_owned(),
-                StopReason::TimeLimit => "Stopped by the time limit".to_owned(),
-                StopReason::MemoryLimit => "Stopped by the memory limit".to_owned(),
-                StopReason::Requested => "Stopped".to_owned(),
-            },
-            Self::Failed(_) => "Failed".to_owned(),
-        }
-    }
-}
-
-/// The run as it is shown.
-#[derive(Default)]
-pub struct Run {
-    /// Where it stands.
-    pub status: RunStatus,
-    /// One report a step.
-    pub reports: Vec<StepReport>,
-    /// The newest snapshot.
-    pub snapshot: Option<Arc<Snapshot>>,
-    /// Seconds that preparing took.
-    pub prepare_secs: Option<f64>,
-    /// Seconds that changing the light took last.
-    pub relit_secs: Option<f64>,
-    /// The last change of settings since the light began.
-    pub last_change: Option<Change>,
-}
-
-impl Run {
-    /// Take note of an event.
-    pub fn note(&mut self, event: Event) {
-        match event {
-            Event::Started => {
-                self.status = RunStatus::Preparing;
-                self.reports.clear();
-                self.prepare_secs = None;
-                self.relit_secs = None;
-            }
-            Event::Prepared { seconds } => {
-                self.prepare_secs = Some(seconds);
-                if self.status == RunStatus::Preparing {
-                    self.status = RunStatus::Running;
-                }
-            }
-            Event::Stepped(report) => self.reports.push(report),
-            Event::Relit {
-                report, seconds, ..
-            } => {
-                self.relit_secs = seconds.or(self.relit_secs);
-                if let Some(last) = self.reports.last_mut() {
-                    *last = report;
-                }
-            }
-            // Inspections are kept apart: they are of what is selected, not of the run.
-            Event::Inspected(_) | Event::Interrupted { .. } => {}
-            Event::Paused => self.status = RunStatus::Paused,
-            Event::Continued => self.status = RunStatus::Running,
-            Event::Finished(reason) => self.status = RunStatus::Finished(reason),
-            Event::Failed(message) => self.status = RunStatus::Failed(message),
-        }
-    }
-}
 
 /// The picked point and what was looked up for it.
 pub struct Selection {
@@ -168,9 +59,9 @@ pub struct State {
     pub materials: Materials,
     /// How the light is shown.
     pub view: ViewSettings,
-    /// What the surfaces showed before the key for normals was pressed.
+    /// The view mode before the key for normals was pressed.
     pub mode_before_normals: ViewMode,
-    /// What the automatic exposure makes for.
+    /// The automatic exposure.
     pub exposure: Follower,
     /// From where.
     pub rig: CameraRig,
@@ -178,21 +69,21 @@ pub struct State {
     pub selection: Option<Selection>,
     /// The selected cluster.
     pub cluster: Option<usize>,
-    /// What is shown of the cluster tree.
+    /// The shown clusters.
     pub shown_clusters: ShownClusters,
-    /// What is ready to be drawn.
+    /// The picture that is ready to be drawn.
     pub staged: Option<Arc<Staged>>,
-    /// What the solver knows of what is selected.
+    /// Inspections of the selection.
     pub inspections: Inspections,
-    /// What frames cost.
+    /// Times of frames.
     pub frame_times: FrameTimes,
     /// Ends of the false colours in use.
     pub false_color_range: [f32; 2],
-    /// What was said.
+    /// Messages to the user.
     pub messages: Messages,
     /// Scenes opened before.
     pub recent: Recent,
-    /// What the panels hold.
+    /// State of the panels.
     pub panels: PanelState,
     /// The graphics adapter, for the statistics.
     pub adapter_name: String,
@@ -231,6 +122,20 @@ impl State {
         }
     }
 
+    /// The subjects of inspection: the picked element, and the selected cluster.
+    pub fn subjects(&self) -> Vec<Subject> {
+        let element = self.selection.as_ref().and_then(|selection| {
+            Some(Subject::Element {
+                node: NodeId(selection.probe.as_ref()?.element),
+                point: selection.pick.point,
+            })
+        });
+        let cluster = self
+            .cluster
+            .map(|index| Subject::Cluster(NodeId(index as u32)));
+        element.into_iter().chain(cluster).collect()
+    }
+
     /// The scene as it is lit: with lights and materials as they are now.
     pub fn lit_scene(&self) -> Option<Arc<Scene>> {
         let scene = &self.loaded.as_ref()?.scene;
@@ -241,13 +146,13 @@ impl State {
         })
     }
 
-    /// What light is multiplied by where it is shown as a number: see [`Scene::radiance_unit`].
+    /// Factor on light where it is shown as a number: see [`Scene::radiance_unit`].
     pub fn radiance_unit(&self) -> f32 {
         let loaded = self.loaded.as_ref();
         loaded.map_or(1.0, |loaded| loaded.scene.radiance_unit)
     }
 
-    /// Whether nothing in the scene has a colour, so that one channel tells all.
+    /// Whether nothing in the scene has a colour, so that one channel is enough.
     pub fn is_grey(&self) -> bool {
         let is_grey = self.loaded.as_ref().is_some_and(|loaded| loaded.is_grey);
         is_grey && (!self.materials.are_changed() || self.materials.are_grey())
@@ -267,31 +172,5 @@ impl State {
     /// The last report.
     pub fn report(&self) -> Option<&StepReport> {
         self.run.reports.last()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_run_goes_through_its_states() {
-        let mut run = Run::default();
-        run.note(Event::Started);
-        assert!(run.status.is_busy());
-        run.note(Event::Prepared { seconds: 0.5 });
-        assert_eq!(run.status, RunStatus::Running);
-        run.note(Event::Stepped(StepReport::default()));
-        run.note(Event::Paused);
-        assert!(run.status.can_continue());
-        run.note(Event::Continued);
-        run.note(Event::Finished(StopReason::Converged));
-        assert!(!run.status.can_continue());
-        assert_eq!(run.reports.len(), 1);
-        run.note(Event::Started);
-        assert!(
-            run.reports.is_empty(),
-            "a new run begins with an empty plot"
-        );
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Loaders, drivers and their layers write to standard error what concerns them alone, such as "error: XDG_RUNTIME_DIR is
 //! invalid" from a layer that asks for a Wayland display which a picture does not need. Beside the sentences of this program
-//! they read like its own. What fails for good comes back as an error value and is told in its own words.
+//! they read like its own. A failure is returned as an error value, with a text of its own.
 
 #[cfg(unix)]
 pub use redirected::StderrCapture;

@@ -5,6 +5,8 @@ use std::sync::LazyLock;
 use eframe::egui::{self, Color32};
 use glam::Vec3;
 
+use crate::scene::{linear_from_srgb, srgb_byte};
+
 /// Display-linear lightness behind the scene in saved pictures and in the dark theme.
 pub const PICTURE_BACKGROUND: f32 = 0.018;
 /// Display-linear lightness of the backs of one-sided faces.
@@ -39,7 +41,9 @@ const RAMP: [[u8; 3]; 9] = [
 /// The ramp, display-linear.
 pub(super) fn ramp_stops() -> &'static [Vec3; 9] {
     static STOPS: LazyLock<[Vec3; 9]> = LazyLock::new(|| {
-        RAMP.map(|color| Vec3::from_array(color.map(|byte| linear(f32::from(byte) / 255.0))))
+        RAMP.map(|color| {
+            Vec3::from_array(color.map(|byte| linear_from_srgb(f32::from(byte) / 255.0)))
+        })
     });
     &STOPS
 }
@@ -54,24 +58,8 @@ pub(super) fn ramp(t: f32) -> Vec3 {
 
 /// The ramp at 0…1 for the window.
 pub fn ramp_color(t: f32) -> Color32 {
-    let [r, g, b] = ramp(t).to_array().map(|x| (encoded(x) * 255.0 + 0.5) as u8);
+    let [r, g, b] = ramp(t).to_array().map(srgb_byte);
     Color32::from_rgb(r, g, b)
-}
-
-fn linear(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-fn encoded(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
 }
 
 /// Colour of good news.
@@ -142,7 +130,9 @@ mod tests {
     /// How much brighter one colour is than the other, 1…21 (WCAG 2).
     fn contrast(a: Color32, b: Color32) -> f32 {
         let luminance = |color: Color32| {
-            let [r, g, b, _] = color.to_array().map(|byte| linear(f32::from(byte) / 255.0));
+            let [r, g, b, _] = color
+                .to_array()
+                .map(|byte| linear_from_srgb(f32::from(byte) / 255.0));
             0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05
         };
         let (a, b) = (luminance(a), luminance(b));

@@ -5,7 +5,7 @@
 
 use std::{collections::BTreeMap, io, sync::Arc};
 
-use super::{state::Run, view::ViewMode};
+use super::{figures::figure, run::Run, view::ViewMode};
 use crate::{
     geometry::RayTree,
     metrics::{ErrorMeasures, ReferenceFacts, SceneComparison, Trajectory},
@@ -39,7 +39,7 @@ pub type MeasuredRow<'a> = (u32, &'a StepReport, &'a ErrorMeasures);
 #[derive(Default)]
 pub struct Truth {
     handle: Option<TruthHandle>,
-    /// What is known so far.
+    /// Progress so far.
     pub progress: Arc<TruthProgress>,
     /// Runs in order; the last is the present one.
     pub runs: Vec<RunRecord>,
@@ -223,7 +223,7 @@ impl Truth {
     }
 }
 
-/// What tells a run from others.
+/// The name of a run, unique among the runs.
 fn name(ordinal: u32, settings: &SolveSettings) -> String {
     let method = match settings.method {
         Method::Bounded => "bounded",
@@ -232,7 +232,7 @@ fn name(ordinal: u32, settings: &SolveSettings) -> String {
         Method::Exact => "exact",
         Method::Isotropic => "isotropic",
     };
-    let epsilon = super::panels::figure(f64::from(settings.epsilon));
+    let epsilon = figure(f64::from(settings.epsilon));
     let oracle = match settings.oracle {
         Oracle::Interval => String::new(),
         Oracle::Samples => format!(", p {}", settings.samples),

@@ -1,13 +1,15 @@
-//! What the viewport shows of the light, and how: mode, exposure, tone map, false-colour range, overlays.
+//! Settings of the view: mode, exposure, tone map, false-colour range, overlays.
 //! Nothing here changes what is computed.
 
 use serde::{Deserialize, Serialize};
+
+use crate::export::ToneMap;
 
 pub use super::overlay::{
     ClusterColor, ClusterCut, ClusterOverlay, ClusterRequest, LinkColor, LinkEnd, LinkOverlay,
 };
 
-/// What the surfaces show.
+/// The view mode of surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ViewMode {
@@ -134,7 +136,7 @@ impl ViewMode {
         }
     }
 
-    /// What the legend names where the mode is a false-colour one.
+    /// The name in the legend, where the mode is a false-colour one.
     pub fn false_color_quantity(self) -> &'static str {
         match self {
             Self::FalseIrradiance => "Irradiance",
@@ -152,26 +154,20 @@ impl ViewMode {
             .position(|mode| *mode == self)
             .map_or(0, |index| index as u8)
     }
-}
 
-/// How exposed radiance becomes a display colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ToneMap {
-    /// Highlights are compressed above 0.76, the rest keeps its colour (Khronos PBR Neutral).
-    #[default]
-    Neutral,
-    /// Clipped at 1.
-    None,
+    /// Whether edges of elements are drawn, over the light or in its place; `edges` are those over the light.
+    pub fn shows_edges(self, edges: bool) -> bool {
+        edges || self == Self::Elements
+    }
 }
 
 /// Everything about the picture but the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ViewSettings {
-    /// What the surfaces show.
+    /// The view mode of surfaces.
     pub mode: ViewMode,
-    /// What all emission, and with it all light, is multiplied by. Light is linear in emission, so this is exact and
+    /// Factor on all emission, and with it on all light. Light is linear in emission, so this is exact and
     /// nothing is computed anew.
     pub emission_scale: f32,
     /// Exposure in EV: radiance is multiplied by 2^EV. Kept within [`ViewSettings::EXPOSURE_RANGE`].
@@ -199,7 +195,7 @@ pub struct ViewSettings {
 }
 
 impl ViewSettings {
-    /// Exposures beyond this leave the range of the picture's half floats.
+    /// Exposures outside this leave the range of the picture's half floats.
     pub const EXPOSURE_RANGE: std::ops::RangeInclusive<f32> = -20.0..=20.0;
 
     /// The first value out of its range, as one sentence.
@@ -218,7 +214,7 @@ impl ViewSettings {
                 "a number of at least 0",
             );
         }
-        // Those beyond the range that can be shown are brought into it where they are used.
+        // Those outside the range that can be shown are brought into it where they are used.
         if !self.exposure.is_finite() {
             return sentence("exposure", self.exposure, "a number");
         }
@@ -240,7 +236,7 @@ impl ViewSettings {
         Ok(())
     }
 
-    /// What a mode's quantity is multiplied by, before exposure.
+    /// Factor on the quantity of a mode, before exposure.
     pub fn light_factor(&self) -> f32 {
         match self.mode {
             ViewMode::FalseIrradiance | ViewMode::FalseRadiance | ViewMode::Uncertainty => {
@@ -251,7 +247,7 @@ impl ViewSettings {
         }
     }
 
-    /// What radiance is multiplied by to be exposed.
+    /// Factor of the exposure on radiance.
     pub fn exposure_factor(&self) -> f32 {
         self.exposure
             .clamp(*Self::EXPOSURE_RANGE.start(), *Self::EXPOSURE_RANGE.end())
@@ -262,9 +258,9 @@ impl ViewSettings {
 /// How the light is to be shown, as far as it was asked for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewRequest {
-    /// What the surfaces show.
+    /// The view mode of surfaces.
     pub mode: Option<ViewMode>,
-    /// What all emission is multiplied by.
+    /// Factor on all emission.
     pub emission_scale: Option<f32>,
     /// Exposure in EV, instead of the automatic one.
     pub exposure: Option<f32>,

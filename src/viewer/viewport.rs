@@ -32,7 +32,7 @@ pub struct Viewport {
     render_state: RenderState,
     renderer: Renderer,
     target: Option<(Target, TextureId)>,
-    /// What the target shows.
+    /// The picture in the target.
     drawn: Option<PictureKey>,
     lines: LineCache,
     metered: Option<MeterKey>,
@@ -41,7 +41,7 @@ pub struct Viewport {
 
 /// Everything that the automatic exposure depends on.
 struct MeterKey {
-    /// Not held: its light may be large.
+    /// Weak: its light may be large.
     light: Weak<VertexLight>,
     mode: ViewMode,
     texture_detail: bool,
@@ -70,7 +70,7 @@ impl MeterKey {
     }
 }
 
-/// Everything that a picture depends on. Arcs are held, so that an address is not used twice.
+/// Everything that a picture depends on. Arcs are stored, so that no address is reused.
 #[derive(Clone)]
 struct PictureKey {
     staged: Arc<Staged>,
@@ -111,7 +111,7 @@ impl Viewport {
         }
     }
 
-    /// What uploads to the adapter need.
+    /// The adapter and the uploads to it.
     pub fn adapter(&self) -> (Gpu, Uploads) {
         (self.renderer.gpu().clone(), self.renderer.uploads())
     }
@@ -166,8 +166,8 @@ impl Viewport {
             key.view.mode.is_light() && key.staged.is_lit && !state.materials.are_changed();
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
-            let held = self.metered.as_ref();
-            if held.is_none_or(|held| wanted.differs_from(held)) {
+            let last = self.metered.as_ref();
+            if last.is_none_or(|last| wanted.differs_from(last)) {
                 self.metering = self.draw(key, 1.0, |renderer, picture, uploads| {
                     renderer.meter(key.size, picture, uploads)
                 });
@@ -209,7 +209,7 @@ impl Viewport {
         is_transparent: bool,
     ) -> Result<Drawn, String> {
         let background = Vec3::splat(theme::PICTURE_BACKGROUND);
-        // What is picked is marked for the one who picks, not for those who look at the picture: without boxes or links
+        // The picked point is marked in the window only, not in saved pictures: without boxes or links
         // they would not know what the mark is.
         let marks_selection = state.view.clusters.shown || state.view.links.shown;
         let mut key = self
@@ -335,7 +335,7 @@ fn background(ui: &egui::Ui) -> Vec3 {
     }
 }
 
-/// What the pane is known by, such as when it has the keyboard focus.
+/// Identifier of the pane, for instance as the owner of the keyboard focus.
 pub fn scene_id() -> egui::Id {
     egui::Id::unique("scene")
 }

@@ -1,9 +1,9 @@
 //! The worker thread: a loop that waits for commands, for the solve to come back from the pool, or for the time limit.
 //!
-//! The solve is either at home (in [`Run::stepper`]) or away in the pool, never both, so that nothing is shared and
-//! nothing is locked. A command that comes while it is away cancels the step and is carried out on its return; a
-//! question waits for the return. A solve that nobody wants any more is waited for a moment only: then it is left
-//! behind with its threads, and a new run gets new ones.
+//! The solve is either in [`Run::stepper`] or in the pool, never both, so that nothing is shared and nothing is locked. A
+//! command that arrives while it is in the pool cancels the step and is carried out when the pool returns it; an
+//! inspection waits for the return. A solve of an older run is waited for a moment only: then it is abandoned with its
+//! threads, and a new run gets new ones.
 
 use std::{
     sync::{
@@ -20,28 +20,29 @@ use super::{
     message::{Command, Message, Start},
     outbox::Outbox,
     priority::give_way,
+    request::{Outcome, Returned, Task},
     run::{Aim, Run},
-    visit::{Errand, Outcome, Returned},
 };
 use crate::{
     scene::Appearance,
     solver::{Cancel, SolveSettings},
 };
 
-/// How long a cancelled solve that nobody wants any more is waited for. Shorter, and two solves share the cores for no
+/// How long a cancelled solve of an older run is waited for. Shorter, and two solves share the cores for no
 /// reason; longer, and the next scene begins noticeably late.
 const GRACE: Duration = Duration::from_millis(60);
 
-/// Solves left behind at once. More, and memory and cores are spent on what nobody sees: the next run then waits.
-const MOST_LEFT: usize = 2;
+/// Most solves that are abandoned and have not ended. More, and memory and cores are spent on results that are not shown:
+/// at this number, the next run waits.
+const MAX_ABANDONED: usize = 2;
 
-/// Solver threads, kept while their number stays.
+/// Solver threads; they are reused as long as their number stays the same.
 struct Pool {
     threads: usize,
     pool: ThreadPool,
 }
 
-/// The solver threads: those that share the cores, and those that give way. Idle ones cost nothing.
+/// The solver threads: those of normal priority and those of low priority. Idle ones cost nothing.
 #[derive(Default)]
 struct Pools {
     sharing: Option<Pool>,
@@ -49,18 +50,18 @@ struct Pools {
 }
 
 impl Pools {
-    /// The pool of that many threads, made anew only when the number changes.
+    /// The pool of that many threads; it is rebuilt only when the number changes.
     fn pool_of(
         &mut self,
         threads: usize,
         gives_way: bool,
     ) -> Result<&ThreadPool, ThreadPoolBuildError> {
-        let held = if gives_way {
+        let slot = if gives_way {
             &mut self.giving_way
         } else {
             &mut self.sharing
         };
-        let fitting = held.take().filter(|held| held.threads == threads);
+        let fitting = slot.take().filter(|slot| slot.threads == threads);
         let pool = match fitting {
             Some(pool) => pool,
             None => Pool {
@@ -76,29 +77,29 @@ impl Pools {
                     .build()?,
             },
         };
-        Ok(&held.insert(pool).pool)
+        Ok(&slot.insert(pool).pool)
     }
 
     /// Any of them.
     fn any(&self) -> Option<&ThreadPool> {
-        let held = self.giving_way.as_ref().or(self.sharing.as_ref());
-        held.map(|held| &held.pool)
+        let slot = self.giving_way.as_ref().or(self.sharing.as_ref());
+        slot.map(|slot| &slot.pool)
     }
 }
 
 /// A solve in the pool.
-struct Away {
+struct InPool {
     /// The run that it belongs to.
     generation: Generation,
     cancel: Cancel,
     /// Whether it is being prepared.
     prepares: bool,
-    /// Whether what it does gives way to light that is changed.
+    /// Whether a change of appearances cancels its task.
     gives_way: bool,
     /// When its run was replaced by another.
-    unwanted_since: Option<Instant>,
-    /// Raised when nobody waits for it any more.
-    left: Cancel,
+    outdated_since: Option<Instant>,
+    /// Raised when it is abandoned.
+    abandoned: Cancel,
 }
 
 /// The state of the worker thread.
@@ -110,9 +111,9 @@ pub(super) struct Controller {
     pools: Pools,
     run: Option<Run>,
     /// The solve in the pool, even one of an older run.
-    away: Option<Away>,
-    /// How many solves were left behind and have not ended.
-    left_count: usize,
+    in_pool: Option<InPool>,
+    /// How many solves were abandoned and have not ended.
+    abandoned_count: usize,
 }
 
 impl Controller {
@@ -130,41 +131,41 @@ impl Controller {
             make,
             pools: Pools::default(),
             run: None,
-            away: None,
-            left_count: 0,
+            in_pool: None,
+            abandoned_count: 0,
         }
     }
 
-    /// Serve until told to shut down, then wait a moment for the solve to come home.
+    /// Serve until told to shut down, then wait a moment for the pool to return the solve.
     pub(super) fn run(mut self) {
         loop {
             self.dispatch();
             match self.wait() {
                 Some(Message::Command(Command::Shutdown)) => break,
-                Some(Message::Command(command)) => self.obey(command),
-                Some(Message::Returned(returned)) => self.welcome(returned),
-                None => self.note_time(),
+                Some(Message::Command(command)) => self.carry_out(command),
+                Some(Message::Returned(returned)) => self.accept(returned),
+                None => self.check_deadlines(),
             }
         }
         self.cancel_step();
         self.run = None;
         let end = Instant::now() + GRACE;
-        while let Some(away) = &self.away {
+        while let Some(in_pool) = &self.in_pool {
             let left = end.saturating_duration_since(Instant::now());
             match self.messages.recv_timeout(left) {
-                Ok(Message::Returned(returned)) if returned.generation == away.generation => {
-                    self.away = None;
+                Ok(Message::Returned(returned)) if returned.generation == in_pool.generation => {
+                    self.in_pool = None;
                 }
                 Ok(_) => {}
-                Err(_) => self.leave_behind(),
+                Err(_) => self.abandon(),
             }
         }
     }
 
-    /// The next message, or `None` when the time limit, or patience with a solve of an older run, ends first.
+    /// The next message, or `None` when the time limit, or the grace of a solve of an older run, ends first.
     fn wait(&self) -> Option<Message> {
         let limit = self.run.as_ref().and_then(Run::deadline);
-        let Some(deadline) = limit.into_iter().chain(self.patience_ends()).min() else {
+        let Some(deadline) = limit.into_iter().chain(self.grace_ends()).min() else {
             // This struct holds a sender, so the channel cannot close.
             return self.messages.recv().ok();
         };
@@ -172,12 +173,12 @@ impl Controller {
         self.messages.recv_timeout(left).ok()
     }
 
-    /// A deadline passed: see which.
-    fn note_time(&mut self) {
+    /// Act on the deadlines that have passed.
+    fn check_deadlines(&mut self) {
         let has_passed =
             |deadline: Option<Instant>| deadline.is_some_and(|at| at <= Instant::now());
-        if has_passed(self.patience_ends()) {
-            self.leave_behind();
+        if has_passed(self.grace_ends()) {
+            self.abandon();
         }
         if has_passed(self.run.as_ref().and_then(Run::deadline)) {
             self.aim_at(Aim::End(StopReason::TimeLimit));
@@ -185,27 +186,27 @@ impl Controller {
     }
 
     /// When a solve of an older run is no longer waited for.
-    fn patience_ends(&self) -> Option<Instant> {
-        let away = self.away.as_ref()?;
-        (self.left_count < MOST_LEFT).then_some(())?;
-        Some(away.unwanted_since? + GRACE)
+    fn grace_ends(&self) -> Option<Instant> {
+        let in_pool = self.in_pool.as_ref()?;
+        (self.abandoned_count < MAX_ABANDONED).then_some(())?;
+        Some(in_pool.outdated_since? + GRACE)
     }
 
-    /// Wait for the solve in the pool no longer; it has been cancelled, and ends there with its threads.
-    fn leave_behind(&mut self) {
-        if let Some(away) = self.away.take() {
-            away.left.cancel();
-            self.left_count += 1;
+    /// Stop waiting for the solve in the pool; it has been cancelled, and ends there with its threads.
+    fn abandon(&mut self) {
+        if let Some(in_pool) = self.in_pool.take() {
+            in_pool.abandoned.cancel();
+            self.abandoned_count += 1;
             self.pools = Pools::default();
         }
     }
 
-    /// Send the solve to the pool if it is at home and there is a question, or it is meant to run.
+    /// Send the next request to the pool, if that has no solve and there is a task.
     fn dispatch(&mut self) {
-        if self.away.is_some() {
+        if self.in_pool.is_some() {
             return;
         }
-        let Some(run) = self.run.as_mut().filter(|run| run.wants_visit()) else {
+        let Some(run) = self.run.as_mut().filter(|run| run.has_task()) else {
             return;
         };
         let gives_way = run.options.gives_way && run.stepper.is_some();
@@ -218,38 +219,35 @@ impl Controller {
                 return;
             }
         };
-        let (cancel, left) = (Cancel::default(), Cancel::default());
-        let visit = run.visit(&self.make, cancel.clone());
-        self.away = Some(Away {
+        let (cancel, abandoned) = (Cancel::default(), Cancel::default());
+        let request = run.next_request(&self.make, cancel.clone());
+        self.in_pool = Some(InPool {
             generation: run.generation,
             cancel,
-            prepares: matches!(visit.errand, Errand::Prepare(..)),
-            gives_way: matches!(
-                visit.errand,
-                Errand::Step(..) | Errand::FinishRelighting(..)
-            ),
-            unwanted_since: None,
-            left: left.clone(),
+            prepares: matches!(request.task, Task::Prepare(..)),
+            gives_way: matches!(request.task, Task::Step(..) | Task::FinishRelighting(..)),
+            outdated_since: None,
+            abandoned: abandoned.clone(),
         });
         let inbox = self.inbox.clone();
         pool.spawn(move || {
-            let mut returned = visit.pay();
-            if left.is_cancelled() {
-                returned.trip = Ok(None);
+            let mut returned = request.carry_out();
+            if abandoned.is_cancelled() {
+                returned.result = Ok(None);
             }
             // Nobody waits once the worker has ended.
             let _ = inbox.send(Message::Returned(returned));
         });
     }
 
-    /// Take the solve back from the pool and say what it brought.
-    fn welcome(&mut self, returned: Returned) {
-        let is_expected = |away: &Away| away.generation == returned.generation;
-        if !self.away.as_ref().is_some_and(is_expected) {
-            self.left_count = self.left_count.saturating_sub(1);
+    /// Take the solve back from the pool and announce the result.
+    fn accept(&mut self, returned: Returned) {
+        let is_expected = |in_pool: &InPool| in_pool.generation == returned.generation;
+        if !self.in_pool.as_ref().is_some_and(is_expected) {
+            self.abandoned_count = self.abandoned_count.saturating_sub(1);
             return;
         }
-        self.away = None;
+        self.in_pool = None;
         let Some(run) = self
             .run
             .as_mut()
@@ -259,8 +257,8 @@ impl Controller {
             return;
         };
         let generation = run.generation;
-        let trip = match returned.trip {
-            Ok(Some(trip)) => trip,
+        let completed = match returned.result {
+            Ok(Some(completed)) => completed,
             Ok(None) => {
                 // There is nothing to keep: going on prepares anew.
                 self.announce_aim();
@@ -272,16 +270,16 @@ impl Controller {
                 return;
             }
         };
-        run.stepper = Some(trip.stepper);
-        match trip.outcome {
+        run.stepper = Some(completed.stepper);
+        match completed.outcome {
             Outcome::Prepared(snapshot) => {
-                run.solving += trip.spent;
+                run.solving += completed.spent;
                 self.outbox.publish(generation, snapshot);
-                let seconds = trip.spent.as_secs_f64();
+                let seconds = completed.spent.as_secs_f64();
                 self.outbox.send(generation, Event::Prepared { seconds });
             }
             Outcome::Stepped(report, snapshot) => {
-                run.solving += trip.spent;
+                run.solving += completed.spent;
                 self.outbox.publish(generation, snapshot);
                 let event = match report {
                     Some(report) => {
@@ -300,20 +298,20 @@ impl Controller {
                 run.is_rough = relit.is_rough;
                 run.ask_again();
                 let report = run.dated(relit.report);
-                let seconds = Some(trip.spent.as_secs_f64());
-                let is_outgrown = relit.is_outgrown;
+                let seconds = Some(completed.spent.as_secs_f64());
+                let needs_restart = relit.needs_restart;
                 let event = Event::Relit {
                     report,
                     seconds,
-                    is_outgrown,
+                    needs_restart,
                 };
                 self.outbox.send(generation, event);
                 if matches!(run.aim, Aim::End(reason) if !reason.can_continue()) {
-                    // There is more to do for the new light, once it is wished for.
+                    // The new light can be refined once the run is continued.
                     run.turn_to(Aim::Rest);
                 }
             }
-            // Something else was more urgent: it is still to be done.
+            // It was cancelled for something more urgent: it is still to be done.
             Outcome::Relit(None, _) => run.appearances_changed = true,
             Outcome::RelitFinely(Some(report), snapshot) => {
                 self.outbox.publish(generation, snapshot);
@@ -322,7 +320,7 @@ impl Controller {
                 let event = Event::Relit {
                     report,
                     seconds: None,
-                    is_outgrown: false,
+                    needs_restart: false,
                 };
                 self.outbox.send(generation, event);
             }
@@ -337,7 +335,7 @@ impl Controller {
         self.announce_aim();
     }
 
-    fn obey(&mut self, command: Command) {
+    fn carry_out(&mut self, command: Command) {
         match command {
             Command::Start(start) => self.start(start),
             Command::Restart {
@@ -396,8 +394,8 @@ impl Controller {
     fn start(&mut self, start: Start) {
         let generation = start.generation;
         self.cancel_step();
-        if let Some(away) = &mut self.away {
-            away.unwanted_since.get_or_insert_with(Instant::now);
+        if let Some(in_pool) = &mut self.in_pool {
+            in_pool.outdated_since.get_or_insert_with(Instant::now);
         }
         if let Some(old) = self.run.replace(Run::new(start)) {
             self.drop_in_pool(old);
@@ -405,7 +403,7 @@ impl Controller {
         self.outbox.send(generation, Event::Started);
     }
 
-    /// Let go of something large where it keeps no command waiting.
+    /// Drop something large on a thread where no command waits for it.
     fn drop_in_pool(&self, large: impl Send + 'static) {
         match self.pools.any() {
             Some(pool) => pool.spawn(move || drop(large)),
@@ -424,14 +422,14 @@ impl Controller {
         }
     }
 
-    /// A step under way is interrupted: it lights materials that look otherwise. Light on its way is not, or nothing would
-    /// show while a slider is dragged; of what is wished meanwhile only the last is done.
+    /// Light the run with other appearances. A step under way is interrupted, since it lights the old ones. A relighting
+    /// under way is not, or nothing would show while a slider is dragged; of later appearances only the last are lit.
     fn relight(&mut self, generation: Generation, appearances: Arc<[Appearance]>) {
         let run = self.run.as_mut();
         if let Some(run) = run.filter(|run| run.generation == generation) {
             run.relight(appearances);
-            if let Some(away) = self.away.as_ref().filter(|away| away.gives_way) {
-                away.cancel.cancel();
+            if let Some(in_pool) = self.in_pool.as_ref().filter(|in_pool| in_pool.gives_way) {
+                in_pool.cancel.cancel();
             }
         }
     }
@@ -440,17 +438,20 @@ impl Controller {
         self.run.as_ref().map(|run| run.aim)
     }
 
-    /// Rest or end: interrupt the step under way, and announce it once the solve is home.
+    /// Rest or end: interrupt the step under way, and announce it once the pool has returned the solve.
     fn aim_at(&mut self, aim: Aim) {
         if let Some(run) = &mut self.run {
             run.turn_to(aim);
         }
         // A run that reaches a limit keeps what it has: without the first picture that would be nothing.
-        let prepares = self.away.as_ref().is_some_and(|away| away.prepares);
+        let prepares = self
+            .in_pool
+            .as_ref()
+            .is_some_and(|in_pool| in_pool.prepares);
         if !(prepares && aim == Aim::End(StopReason::TimeLimit)) {
             self.cancel_step();
         }
-        if self.away.is_none() {
+        if self.in_pool.is_none() {
             self.announce_aim();
         }
     }
@@ -475,8 +476,8 @@ impl Controller {
     }
 
     fn cancel_step(&self) {
-        if let Some(away) = &self.away {
-            away.cancel.cancel();
+        if let Some(in_pool) = &self.in_pool {
+            in_pool.cancel.cancel();
         }
     }
 }

@@ -2,16 +2,16 @@
 
 use crate::solver::{Oracle, SolveSettings};
 
-/// What a change of settings does to a run, from least to most.
+/// What a change of settings does to a run, from the least to the most effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Effect {
     /// The settings are the same.
     Nothing,
-    /// What is computed stays as good as asked for; a run goes on, a finished one stays finished.
+    /// The light stays as accurate as required; a run continues, a finished one stays finished.
     Continues,
-    /// What is computed stays, and a finished run takes up its work again.
+    /// The light stays, and a finished run resumes.
     Refines,
-    /// What is computed does not fit the settings: it begins anew.
+    /// The light does not fit the settings: the run starts over.
     Restarts,
 }
 

@@ -1,31 +1,15 @@
-//! What goes in and out of the worker: commands, events, options of a run.
+//! Messages of the worker: commands, events, options of a run.
 
 use std::{sync::Arc, time::Duration};
 
 use serde::Serialize;
 
-use super::{Effect, visit::Returned};
+use super::{Effect, Generation, request::Returned};
 use crate::{
     geometry::RayTree,
     scene::{Appearance, Scene},
     solver::{Inspection, SolveSettings, StepReport, Subject},
 };
-
-/// Which run something belongs to; each start, reset and restart is a new one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Generation(u64);
-
-impl Generation {
-    /// Counts from 1 with the first run.
-    pub fn number(self) -> u64 {
-        self.0
-    }
-
-    /// The run after this one.
-    pub(super) fn next(self) -> Self {
-        Self(self.0 + 1)
-    }
-}
 
 /// How to run, apart from what to compute: nothing here changes a finished result.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,7 +18,7 @@ pub struct RunOptions {
     pub threads: usize,
     /// Time from the start or the last continue after which the run stops.
     pub time_limit: Option<Duration>,
-    /// Bytes that the solver may hold.
+    /// Bytes that the solver may use.
     pub memory_limit: Option<u64>,
     /// Whether steps wait for other threads of the program where cores are few. The preparation does not: until it is
     /// done there is nothing to look at.
@@ -45,7 +29,7 @@ pub struct RunOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
-    /// The threshold asked for is reached and light has settled.
+    /// The threshold asked for is reached and light has converged.
     Converged,
     /// The steps asked for are used up before the threshold is reached.
     StepLimit,
@@ -53,23 +37,18 @@ pub enum StopReason {
     TimeLimit,
     /// The memory limit is reached.
     MemoryLimit,
-    /// Someone asked for it.
+    /// The owner stopped it.
     Requested,
 }
 
 impl StopReason {
-    /// Whether a limit cut the solve short.
-    pub fn is_limit(self) -> bool {
-        matches!(self, Self::StepLimit | Self::TimeLimit | Self::MemoryLimit)
-    }
-
     /// Whether there is more to do under the same settings.
     pub fn can_continue(self) -> bool {
         matches!(self, Self::TimeLimit | Self::MemoryLimit | Self::Requested)
     }
 }
 
-/// What the worker announces.
+/// An event that the worker announces.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// A run begins; its solver is being prepared.
@@ -88,16 +67,16 @@ pub enum Event {
         /// Time spent on preparing and stepping, in seconds, as in [`StepReport::solve_s`].
         solve_s: f64,
     },
-    /// Materials look otherwise; their light is in the slot. The figures are those of the last step, but for what has
-    /// changed.
+    /// The light of other appearances is in the slot. The figures are those of the last step, except those that the
+    /// change affects.
     Relit {
-        /// What is known of the light.
+        /// Figures of the light.
         report: StepReport,
-        /// Seconds that it took; nothing where what was shown in haste has been worked out.
+        /// Seconds that it took; nothing where a preview was refined.
         seconds: Option<f64>,
-        /// Whether light is missing that only a run that begins anew will show (see
-        /// [`Relit::is_outgrown`](crate::solver::Relit::is_outgrown)).
-        is_outgrown: bool,
+        /// Whether light is missing that only a restart will show (see
+        /// [`Relit::needs_restart`](crate::solver::Relit::needs_restart)).
+        needs_restart: bool,
     },
     /// An answer to [`super::WorkerHandle::inspect`].
     Inspected(Arc<Inspection>),
@@ -115,19 +94,19 @@ pub enum Event {
 pub(super) struct Start {
     /// The new run.
     pub generation: Generation,
-    /// What to light.
+    /// The scene.
     pub scene: Arc<Scene>,
     /// Its ray tree, where there is one already.
     pub rays: Option<Arc<RayTree>>,
-    /// What to compute.
+    /// The settings.
     pub settings: SolveSettings,
     /// How to run.
     pub options: RunOptions,
-    /// How materials look, where not as the scene says.
+    /// Appearances of the materials, where they differ from the scene.
     pub appearances: Option<Arc<[Appearance]>>,
 }
 
-/// What the owner asks of the worker.
+/// A command of the owner.
 pub(super) enum Command {
     /// Light a scene from the beginning.
     Start(Start),
@@ -135,7 +114,7 @@ pub(super) enum Command {
     Restart {
         /// The new run.
         generation: Generation,
-        /// What to compute.
+        /// The settings.
         settings: SolveSettings,
     },
     /// Interrupt and rest.
@@ -146,35 +125,35 @@ pub(super) enum Command {
     Stop,
     /// Other settings that the run can take over.
     Settings {
-        /// What to compute from the next step on.
+        /// The settings from the next step on.
         settings: SolveSettings,
-        /// What the change does.
+        /// The effect of the change.
         effect: Effect,
     },
     /// Other limits.
     Options(RunOptions),
-    /// Materials of a run look so from now on.
+    /// Use other appearances of the materials of a run from now on.
     Relight {
         /// The run.
         generation: Generation,
         /// One for each material.
         appearances: Arc<[Appearance]>,
     },
-    /// Look into nodes of a run.
+    /// Inspect nodes of a run.
     Inspect {
         /// The run that the nodes are of.
         generation: Generation,
-        /// Which ones, now and after each step, instead of those asked for before.
+        /// The nodes, now and after each step, instead of those of the last such command.
         subjects: Vec<Subject>,
     },
     /// End the thread.
     Shutdown,
 }
 
-/// What the worker thread waits for.
+/// A message that the worker thread waits for.
 pub(super) enum Message {
-    /// The owner asks.
+    /// A command.
     Command(Command),
-    /// The pool gives the solve back.
+    /// The pool returns the solve.
     Returned(Returned),
 }

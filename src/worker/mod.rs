@@ -3,21 +3,22 @@
 //! [`WorkerHandle`] owns a named thread that only waits, so that every command is answered at once. It hands the solve
 //! back and forth between itself and a pool of solver threads, one step at a time; dropping the handle cancels the step
 //! under way and joins. Every run has a [`Generation`]; the handle shows nothing of an older one.
-//! Nothing waits long for a solve that has been cancelled: what has not come home a moment later is left behind, with
-//! its threads, and ends there by itself.
+//! Nothing waits long for a solve that has been cancelled: one that the pool has not returned a moment later is abandoned
+//! with its threads, and ends there.
 //! The window and the headless commands drain the same handle; neither needs to know how a step is made.
 
 mod controller;
 mod effect;
+mod generation;
 mod message;
 mod outbox;
 mod priority;
+mod request;
 mod run;
 mod slot;
 mod stepper;
 mod trajectory;
 mod truth;
-mod visit;
 
 use std::{
     io,
@@ -30,7 +31,8 @@ use std::{
 };
 
 pub use effect::{Effect, effect_of_change};
-pub use message::{Event, Generation, RunOptions, StopReason};
+pub use generation::Generation;
+pub use message::{Event, RunOptions, StopReason};
 pub use slot::Slot;
 pub use stepper::{Job, MakeStepper, Stepper};
 pub use trajectory::trajectory;
@@ -51,7 +53,7 @@ pub type Wake = Arc<dyn Fn() + Send + Sync>;
 /// Called with every snapshot, before a newer one can replace it. Must not take long: the solve waits.
 pub type Watch = Arc<dyn Fn(Generation, &Arc<Snapshot>) + Send + Sync>;
 
-/// Where owner and worker keep the one who watches.
+/// The observer of snapshots, shared by owner and worker.
 type WatchCell = Arc<Mutex<Option<Watch>>>;
 
 /// The owner's end of the worker. Dropping it cancels the step under way and joins the thread, which waits for the step
@@ -144,10 +146,10 @@ impl WorkerHandle {
         self.generation
     }
 
-    /// Light the present run with materials that look so, one for each (see [`Scene::allowed`]), as fast as can be:
-    /// nothing is refined until the run goes on, and a run that came to its end rests from then on. What is wished while
-    /// light is on its way waits, and only the last wish is done. [`Event::Relit`] says when. Holds for the runs that
-    /// follow on the same scene, too.
+    /// Light the present run with other appearances, one for each material (see [`Scene::allowed`]), as fast as possible:
+    /// nothing is refined until the run continues, and a finished run is paused. Appearances that arrive during a
+    /// relighting wait for its end, and only the last of them are lit. [`Event::Relit`] announces the light. Later runs on
+    /// the same scene use the appearances, too.
     pub fn relight(&self, appearances: Arc<[Appearance]>) {
         self.send(Command::Relight {
             generation: self.generation,
@@ -160,13 +162,13 @@ impl WorkerHandle {
         self.send(Command::Pause);
     }
 
-    /// Go on after a pause, a stop, or a limit of time or memory, from where it stands; each grants the time limit anew.
-    /// Without effect on a solve that came to its end: that takes other settings.
+    /// Continue after a pause, a stop, or a limit of time or memory; the time limit starts over. A finished solve is not
+    /// affected: it needs other settings.
     pub fn resume(&self) {
         self.send(Command::Continue);
     }
 
-    /// End the run and keep what it has. [`Event::Finished`] says when.
+    /// End the run and keep its light. [`Event::Finished`] announces the end.
     pub fn stop(&self) {
         self.send(Command::Stop);
     }
@@ -181,7 +183,7 @@ impl WorkerHandle {
         self.generation
     }
 
-    /// Put other settings in force and say what that does to the run.
+    /// Apply other settings and return their effect on the run.
     pub fn change_settings(&mut self, settings: SolveSettings) -> Effect {
         let effect = effect_of_change(&self.settings, &settings);
         self.settings = settings.clone();
@@ -197,12 +199,12 @@ impl WorkerHandle {
         effect
     }
 
-    /// Put other limits or another number of threads in force, from the next step on.
+    /// Apply other limits or another number of threads, from the next step on.
     pub fn change_options(&self, options: RunOptions) {
         self.send(Command::Options(options));
     }
 
-    /// Ask what the solver knows of some nodes of the present run, instead of those asked for before.
+    /// Inspect some nodes of the present run, instead of those of the last call.
     /// [`Event::Inspected`] answers for each node that there is: at once while the run rests or has ended, otherwise
     /// before the next step begins, since interrupting a step would lose what it did; and again after each step.
     pub fn inspect(&self, subjects: Vec<Subject>) {

@@ -1,11 +1,11 @@
-//! The way out of the worker.
+//! The output of the worker: events and snapshots.
 
 use std::sync::{Arc, PoisonError, mpsc::Sender};
 
 use super::{Event, Generation, Slot, Wake, WatchCell};
 use crate::solver::Snapshot;
 
-/// Where events and snapshots leave.
+/// Delivers events and snapshots.
 pub(super) struct Outbox {
     events: Sender<(Generation, Event)>,
     slot: Arc<Slot<Snapshot>>,
@@ -14,7 +14,7 @@ pub(super) struct Outbox {
 }
 
 impl Outbox {
-    /// Events into a channel, snapshots into a slot and to who watches, and a call to `wake` for each event.
+    /// Events go into a channel, snapshots into a slot and to the observer; `wake` is called for each event.
     pub(super) fn new(
         events: Sender<(Generation, Event)>,
         slot: Arc<Slot<Snapshot>>,
@@ -29,7 +29,7 @@ impl Outbox {
         }
     }
 
-    /// Put a snapshot into the slot, and show it to who watches.
+    /// Put a snapshot into the slot and pass it to the observer.
     pub(super) fn publish(&self, generation: Generation, snapshot: Snapshot) {
         let snapshot = Arc::new(snapshot);
         let watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! Which threads go first where there are more of them than cores.
+//! Priority of threads where there are more of them than cores.
 
 /// Let the calling thread wait for others of the program, such as those that draw, where the system knows such a thing.
 #[cfg(all(target_os = "linux", feature = "viewer"))]

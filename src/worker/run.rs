@@ -1,4 +1,4 @@
-//! One run: where it stands, what it aims at, and when it ends.
+//! One run: its state, its aim, and when it ends.
 
 use std::{
     sync::Arc,
@@ -8,7 +8,7 @@ use std::{
 use super::{
     Generation, Job, MakeStepper, RunOptions, Stepper, StopReason,
     message::Start,
-    visit::{Errand, Visit},
+    request::{Request, Task},
 };
 use crate::{
     geometry::RayTree,
@@ -16,7 +16,7 @@ use crate::{
     solver::{Cancel, SolveSettings, StepReport, Subject},
 };
 
-/// What a run is meant to be doing.
+/// The state that a run is to reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Aim {
     /// Step after step.
@@ -25,7 +25,7 @@ pub(super) enum Aim {
     Rest,
     /// Nothing more.
     End(StopReason),
-    /// Nothing: the solve is lost.
+    /// None: the solve is lost.
     Failed,
 }
 
@@ -33,31 +33,31 @@ pub(super) enum Aim {
 pub(super) struct Run {
     /// Which run.
     pub generation: Generation,
-    /// What is lit.
+    /// The scene.
     pub scene: Arc<Scene>,
     /// Its ray tree, where there is one already.
     pub rays: Option<Arc<RayTree>>,
-    /// What is computed.
+    /// The settings.
     pub settings: SolveSettings,
-    /// Whether the solve has not heard of the settings yet.
+    /// Whether the solve does not have the settings yet.
     pub settings_changed: bool,
     /// How it is computed.
     pub options: RunOptions,
-    /// How materials look, where not as the scene says. Changed by [`Run::relight`].
+    /// Appearances of the materials, where they differ from the scene. Changed by [`Run::relight`].
     pub appearances: Option<Arc<[Appearance]>>,
-    /// Whether the solve has not heard of the appearances yet.
+    /// Whether the solve does not have the appearances yet.
     pub appearances_changed: bool,
-    /// Whether the light that is shown was changed in haste.
+    /// Whether the light that is shown is a preview, whose refinement is due.
     pub is_rough: bool,
-    /// The solve, while it is at home.
+    /// The solve, while it is not in the pool.
     pub stepper: Option<Box<dyn Stepper>>,
     /// Nodes that are inspected, now and after each step. Changed by [`Run::ask`].
     subjects: Vec<Subject>,
     /// Whether an answer is due.
     is_asked: bool,
-    /// What it is meant to be doing. Changed by [`Run::turn_to`].
+    /// The state that it is to reach. Changed by [`Run::turn_to`].
     pub aim: Aim,
-    /// Whether the aim was said to be reached.
+    /// Whether it was announced that the aim is reached.
     pub announced: bool,
     /// Start, or last continue.
     since: Instant,
@@ -94,14 +94,14 @@ impl Run {
         }
     }
 
-    /// Whether there is something to do with the solve at home.
-    pub(super) fn wants_visit(&self) -> bool {
+    /// Whether there is a task for the solve, which is not in the pool.
+    pub(super) fn has_task(&self) -> bool {
         self.aim == Aim::Run
             || ((self.is_asked || self.appearances_changed || self.is_rough)
                 && self.stepper.is_some())
     }
 
-    /// Materials look so from now on; what was wished before and not done yet is forgotten.
+    /// Use these appearances from now on; earlier appearances that are still waiting are dropped.
     pub(super) fn relight(&mut self, appearances: Arc<[Appearance]>) {
         self.appearances = Some(appearances);
         self.appearances_changed = true;
@@ -113,46 +113,46 @@ impl Run {
         self.ask_again();
     }
 
-    /// The solve has changed: what was said of its nodes is old.
+    /// The solve has changed: earlier inspections are out of date.
     pub(super) fn ask_again(&mut self) {
         self.is_asked = !self.subjects.is_empty();
     }
 
-    /// What is to be done next. Light that was changed comes first, then questions: they are short.
-    pub(super) fn visit(&mut self, make: &MakeStepper, cancel: Cancel) -> Visit {
+    /// The next request to the pool. Light that was changed comes first, then inspections: they are short.
+    pub(super) fn next_request(&mut self, make: &MakeStepper, cancel: Cancel) -> Request {
         let changed = self
             .appearances
             .clone()
             .filter(|_| std::mem::take(&mut self.appearances_changed));
-        let errand = match (self.stepper.take(), changed) {
-            (Some(stepper), Some(appearances)) => Errand::Relight(stepper, appearances, cancel),
-            (stepper, _) => self.other_errand(stepper, make, cancel),
+        let task = match (self.stepper.take(), changed) {
+            (Some(stepper), Some(appearances)) => Task::Relight(stepper, appearances, cancel),
+            (stepper, _) => self.other_task(stepper, make, cancel),
         };
-        Visit {
+        Request {
             generation: self.generation,
-            errand,
+            task,
         }
     }
 
-    fn other_errand(
+    fn other_task(
         &mut self,
         stepper: Option<Box<dyn Stepper>>,
         make: &MakeStepper,
         cancel: Cancel,
-    ) -> Errand {
+    ) -> Task {
         match stepper {
             Some(stepper) if self.is_asked => {
                 self.is_asked = false;
-                Errand::Inspect(stepper, self.subjects.clone())
+                Task::Inspect(stepper, self.subjects.clone())
             }
             Some(stepper) if std::mem::take(&mut self.is_rough) && self.aim != Aim::Run => {
-                Errand::FinishRelighting(stepper, cancel)
+                Task::FinishRelighting(stepper, cancel)
             }
             Some(mut stepper) => {
                 if std::mem::take(&mut self.settings_changed) {
                     stepper.change_settings(self.settings.clone());
                 }
-                Errand::Step(stepper, cancel)
+                Task::Step(stepper, cancel)
             }
             None => {
                 self.settings_changed = false;
@@ -163,12 +163,12 @@ impl Run {
                     memory_limit: self.options.memory_limit,
                     appearances: self.appearances.clone(),
                 };
-                Errand::Prepare(make.clone(), job, cancel)
+                Task::Prepare(make.clone(), job, cancel)
             }
         }
     }
 
-    /// Aim at something, which is to be announced once it is reached. The clock runs on from where it stood.
+    /// Set the aim, which is to be announced once it is reached. The clock continues.
     pub(super) fn turn_to(&mut self, aim: Aim) {
         self.before = self.running_time();
         self.since = Instant::now();
@@ -191,7 +191,7 @@ impl Run {
         self.since.checked_add(limit)
     }
 
-    /// Running time and time spent, in seconds, as the solve comes home from a step.
+    /// Running time and time spent, in seconds, as the pool returns the solve from a step.
     pub(super) fn times(&self) -> (f64, f64) {
         // A step that was interrupted ran on until now.
         let elapsed = self.before + self.since.elapsed();

@@ -1,4 +1,4 @@
-//! A place for one large value, where the newest replaces what nobody fetched.
+//! A slot for one large value; a newer value replaces one that was not fetched.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -22,7 +22,10 @@ impl<T> Slot<T> {
     /// Put a value in, unless it belongs to an older run than the one that is there.
     pub fn publish(&self, generation: Generation, value: Arc<T>) {
         let mut newest = self.lock();
-        if newest.as_ref().is_none_or(|(held, _)| *held <= generation) {
+        if newest
+            .as_ref()
+            .is_none_or(|(present, _)| *present <= generation)
+        {
             let replaced = newest.replace((generation, value));
             // The old value may be large: free it after the lock.
             drop(newest);
@@ -34,7 +37,7 @@ impl<T> Slot<T> {
     pub fn latest(&self, generation: Generation) -> Option<Arc<T>> {
         self.lock()
             .as_ref()
-            .filter(|(held, _)| *held == generation)
+            .filter(|(present, _)| *present == generation)
             .map(|(_, value)| value.clone())
     }
 

@@ -1,4 +1,4 @@
-//! What the worker can run: the solver, or a stand-in for it.
+//! The solver as the worker runs it, so that tests can substitute it.
 
 use std::sync::Arc;
 
@@ -16,30 +16,30 @@ pub trait Stepper: Send {
     /// The state as it stands.
     fn snapshot(&self) -> Snapshot;
 
-    /// What is known of a node, or `None` where there is no such node. Short: it delays the next step.
+    /// Inspect a node; `None` where there is no such node. Must be short: it delays the next step.
     fn inspect(&self, subject: &Subject) -> Option<Inspection>;
 
-    /// Go on under settings whose change does not restart (see [`super::effect_of_change`]).
+    /// Continue under settings whose change does not restart (see [`super::effect_of_change`]).
     fn change_settings(&mut self, settings: SolveSettings);
 
-    /// Light materials that look so, one for each, without refining; `None` when cancelled on the way.
+    /// Light the scene with these appearances, one for each material, without refining; `None` when cancelled.
     fn relight(&mut self, appearances: &[Appearance], cancel: &Cancel) -> Option<Relit>;
 
-    /// Work out what a rough relighting left out; `None` when cancelled on the way.
+    /// Refine the preview that a relighting made; `None` when cancelled on the way.
     fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport>;
 }
 
-/// What a stepper is made from.
+/// The input of a stepper.
 pub struct Job {
-    /// What to light.
+    /// The scene.
     pub scene: Arc<Scene>,
     /// Its ray tree, where there is one already.
     pub rays: Option<Arc<RayTree>>,
-    /// What to compute.
+    /// The settings.
     pub settings: SolveSettings,
     /// Bytes that it may hold.
     pub memory_limit: Option<u64>,
-    /// How materials look, where not as the scene says.
+    /// Appearances of the materials, where they differ from the scene.
     pub appearances: Option<Arc<[Appearance]>>,
 }
 

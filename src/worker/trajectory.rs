@@ -1,4 +1,4 @@
-//! Runs of the worker as error over time: what tables and plots are made of, in the window and without.
+//! Runs of the worker as error over time, for tables and plots.
 
 use crate::{
     metrics::{ErrorMeasures, Measurement, Runner, Trajectory},

@@ -1,4 +1,4 @@
-//! What a solve spends its time in, call by call: form factors, shadow rays, directional tables, the oracle.
+//! The time of single calls of a solve: form factors, shadow rays, directional tables, the oracle.
 //!
 //! Each measurement goes over many cases in turn, so that branches are as hard to foresee as they are in a solve.
 

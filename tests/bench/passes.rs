@@ -1,4 +1,4 @@
-//! What a solve does once over all of a scene: reading, building trees, sweeping over links.
+//! The time of passes over a whole scene: reading, building trees, sweeping over links.
 
 #![expect(
     clippy::unwrap_used,
@@ -85,7 +85,7 @@ fn sweeping(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The first material is painted darker and as it was in turn; each time the light settles anew. Every sweep visits
+/// The first material is painted darker and as it was in turn; each time the light converges anew. Every sweep reads
 /// every link once.
 fn sweeps(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, solver: &mut Solver) {
     let cancel = Cancel::default();
@@ -94,15 +94,15 @@ fn sweeps(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, solver: &mut Sol
     dark[0].reflectance *= 0.5;
     let sweeps: u32 = [&dark, &usual]
         .iter()
-        .map(|wished| solver.relight(wished, &cancel).unwrap().report.sweeps)
+        .map(|requested| solver.relight(requested, &cancel).unwrap().report.sweeps)
         .sum();
     group.throughput(Throughput::Elements(
         solver.links().len() as u64 * u64::from(sweeps),
     ));
     group.bench_function(format!("sweep over links/{name}"), |bencher| {
         bencher.iter(|| {
-            for wished in [&dark, &usual] {
-                black_box(solver.relight(wished, &cancel).unwrap());
+            for requested in [&dark, &usual] {
+                black_box(solver.relight(requested, &cancel).unwrap());
             }
         });
     });
@@ -114,8 +114,8 @@ fn sweeps(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, solver: &mut Sol
     let mut changes = [&dimmed, &usual].into_iter().cycle();
     group.bench_function(format!("dim all lights/{name}"), |bencher| {
         bencher.iter(|| {
-            let wished = changes.next().unwrap_or(&usual);
-            black_box(solver.relight(wished, &cancel).unwrap());
+            let requested = changes.next().unwrap_or(&usual);
+            black_box(solver.relight(requested, &cancel).unwrap());
         });
     });
 }

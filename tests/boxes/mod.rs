@@ -7,9 +7,11 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use vecrad::{
-    scene::{MaterialId, SceneBuilder, SceneOptions, Sides},
-    solver::{Cancel, Snapshot, SolveSettings, Solver},
+    scene::{MaterialId, SceneBuilder, Sides},
+    solver::{Snapshot, SolveSettings},
 };
+
+use crate::common::{finish, solve};
 
 /// Six sides of a box, seen from outside or from inside.
 pub(crate) fn cuboid(
@@ -67,14 +69,9 @@ pub(crate) fn rectangle(
 
 /// The light of a scene; places as in the file.
 pub(crate) fn solved(builder: SceneBuilder, sides: Sides, settings: SolveSettings) -> Snapshot {
-    let options = SceneOptions {
-        sides,
-        ..SceneOptions::default()
-    };
-    let scene = Arc::new(builder.finish(&options).unwrap());
+    let scene = finish(builder, sides);
     let frame = scene.frame;
-    let mut solver = Solver::new(scene, settings, None, &Cancel::default()).unwrap();
-    while !solver.step(&Cancel::default()).unwrap().is_final {}
+    let (solver, _) = solve(&scene, settings);
     let mut snapshot = solver.snapshot();
     let mesh = Arc::make_mut(&mut snapshot.mesh);
     for position in &mut mesh.positions {

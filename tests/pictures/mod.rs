@@ -1,6 +1,6 @@
-//! What is asked of pictures that are drawn without a window.
+//! Checks of pictures that are drawn without a window.
 
-use vecrad::viewer::render::headless::HeadlessError;
+use vecrad::viewer::headless::HeadlessError;
 
 /// Steps of 255 by which a rounded half float may be off after the sRGB curve.
 const TOLERANCE: i32 = 2;
@@ -13,7 +13,7 @@ pub(crate) fn assert_near(seen: [u8; 3], expected: [u8; 3], what: &str) {
     assert!(near, "{what}: {seen:?} instead of {expected:?}");
 }
 
-/// What was drawn, or `None` on a machine that cannot draw; CI must be able to.
+/// The picture, or `None` on a machine that cannot draw; CI must be able to.
 pub(crate) fn unless_no_adapter<T>(drawn: Result<T, HeadlessError>) -> Option<T> {
     match drawn {
         Ok(picture) => Some(picture),

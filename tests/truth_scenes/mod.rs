@@ -58,10 +58,7 @@ impl Plates {
 
     /// The scene, with all faces of these sides.
     pub(crate) fn finish(self, sides: Sides) -> Scene {
-        let options = SceneOptions {
-            sides,
-            ..SceneOptions::default()
-        };
+        let options = SceneOptions::with_sides(sides);
         self.builder
             .finish(&options)
             .expect("the plates are usable")

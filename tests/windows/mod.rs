@@ -1,17 +1,24 @@
 //! Windows without a graphics adapter, for tests of what they show and do.
 
+#![allow(dead_code, reason = "each test uses some of it")]
+
 use std::{
+    fs,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use egui_kittest::Harness;
+use tempfile::TempDir;
 use vecrad::{
     solver::SolveSettings,
     viewer::{
-        Options, action::Action, app::App, loader::SceneSource, start::Faults, state::RunStatus,
+        Options, action::Action, app::App, faults::Faults, loader::SceneSource, run::RunStatus,
     },
 };
+
+/// An OBJ file of one face.
+pub(crate) const ONE_TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 /// Longest wait for a small scene on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -45,6 +52,20 @@ pub(crate) fn plates_of_size(size: [f32; 2]) -> Harness<'static, App> {
         matches!(app.state.run.status, RunStatus::Finished(_))
     });
     harness
+}
+
+/// A window that shows a file of this name with one face, and the folder of the file.
+pub(crate) fn one_triangle(name: &str) -> (TempDir, Harness<'static, App>) {
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    let scene = folder.path().join(name);
+    fs::write(&scene, ONE_TRIANGLE).expect("it can be written");
+    let mut harness = window(Options {
+        source: Some(SceneSource::File(scene)),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    (folder, harness)
 }
 
 /// Frames until something holds.

@@ -57,7 +57,7 @@ pub(super) fn bake(
             bake,
             scene,
             mesh,
-            most_samples: session.arguments.plan.max_spp,
+            most_samples: session.arguments.runs.max_spp,
         };
         race(session, truth, baking, begin.elapsed())
     })
@@ -106,7 +106,7 @@ fn repeat(
         points: race.points,
     };
     let mut runs = Vec::new();
-    for _ in 0..session.arguments.plan.repeats {
+    for _ in 0..session.arguments.runs.repeats {
         if session.is_interrupted() {
             break;
         }

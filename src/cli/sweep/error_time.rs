@@ -1,4 +1,4 @@
-//! Error against run time, scene by scene, and the files that tell it.
+//! Error against run time, scene by scene, and the files of the results.
 
 use std::{
     io::{self, Write},
@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{
     baselines::{self, JACOBI_ELEMENTS},
-    plan::Baseline,
+    run_flags::Baseline,
     runs,
     session::{Session, Source, Truth},
 };
@@ -41,7 +41,7 @@ struct Report<'a> {
     scenes: &'a [SceneComparison],
 }
 
-/// Run the plan on each scene and write the files after each.
+/// Run every configuration and baseline on each scene and write the files after each.
 pub(super) fn compare(session: &mut Session<'_>, sources: &[Source]) -> Result<()> {
     let mut scenes = Vec::new();
     for source in sources {
@@ -63,7 +63,7 @@ fn compare_on(
     scene: &Arc<Scene>,
     truth: &Arc<Truth>,
 ) -> Result<SceneComparison> {
-    let plan = session.arguments.plan.clone();
+    let flags = session.arguments.runs.clone();
     let mut meshes = None;
     let mut comparison = SceneComparison {
         scene: scene.name.clone(),
@@ -71,7 +71,7 @@ fn compare_on(
         reference: truth.facts.clone(),
         runs: Vec::new(),
     };
-    for configuration in plan.configurations(&session.arguments.setting_flags) {
+    for configuration in flags.configurations(&session.arguments.setting_flags) {
         if session.is_interrupted() {
             return Ok(comparison);
         }
@@ -79,13 +79,13 @@ fn compare_on(
         meshes = meshes.or(run.meshes);
         comparison.runs.push(run.trajectory);
     }
-    if plan.baselines.contains(&Baseline::Bake) {
+    if flags.baselines.contains(&Baseline::Bake) {
         for mesh in distinct(meshes) {
             let run = baselines::bake(session, scene, truth, &mesh);
             comparison.runs.push(run);
         }
     }
-    if plan.baselines.contains(&Baseline::Jacobi) {
+    if flags.baselines.contains(&Baseline::Jacobi) {
         for element_count in JACOBI_ELEMENTS {
             let run = baselines::jacobi(session, scene, truth, element_count);
             comparison.runs.push(run);
@@ -146,7 +146,7 @@ fn write(session: &Session<'_>, scenes: &[SceneComparison]) -> Result<()> {
 
 fn report<'a>(session: &Session<'_>, scenes: &'a [SceneComparison]) -> Report<'a> {
     let arguments = session.arguments;
-    let configurations = arguments.plan.configurations(&arguments.setting_flags);
+    let configurations = arguments.runs.configurations(&arguments.setting_flags);
     let SceneOptions { sides, .. } = arguments.scene_flags.options();
     Report {
         version: env!("CARGO_PKG_VERSION"),
@@ -158,7 +158,7 @@ fn report<'a>(session: &Session<'_>, scenes: &'a [SceneComparison]) -> Report<'a
             .map(|first| first.settings)
             .unwrap_or_default(),
         sides: format!("{sides:?}").to_lowercase(),
-        repeats: arguments.plan.repeats,
+        repeats: arguments.runs.repeats,
         time_limit_s: session.time_limit().as_secs_f64(),
         is_interrupted: session.is_interrupted(),
         scenes,
@@ -181,7 +181,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
          Errors are relative RMS of radiance at random points against path tracing, without the worst 1 % of the points \
          and without the noise of the reference.\n\
          \"†\" marks runs that the time limit, or another one, cut short; stochastic Jacobi radiosity has no end but the limit.\n\
-         Times are seconds of computing, preparation included, reading the scene and measuring left out; \"≤\" where \
+         Times are seconds of computing, preparation included, reading the scene and measuring excluded; \"≤\" where \
          the first measurement was already better, \"–\" where a run never came so far.\n\
          Errors far below the noise of the reference cannot be told from none: they read \"below noise\", times to them \"?\".\n\
          Links, rays and memory are those at the best error. The ratio divides the time of the faster bake, whose mesh \
@@ -213,7 +213,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Error over time of every run, baselines dashed, and the noise that errors far below cannot be told from.
+/// Error over time of every run, baselines dashed, and the noise of the reference.
 fn plot(scene: &SceneComparison) -> CurvePlot {
     let mut curves: Vec<Curve> = scene.runs.iter().map(curve).collect();
     let times = || {

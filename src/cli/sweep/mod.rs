@@ -1,12 +1,12 @@
 //! `vecrad report`: run methods and baselines on scenes, measure their error against run time, write what came out.
 //!
 //! A suite says which scenes and what to run; a [`session::Session`] loads, traces references and runs, and
-//! knows when to stop. What is measured is described in the room `metrics`, plots are drawn in `export`.
+//! knows when to stop. Measures are described in the room `metrics`, plots are drawn in `export`.
 
 mod baselines;
 mod error_time;
 mod omissions;
-mod plan;
+mod run_flags;
 mod runs;
 mod scaling;
 mod session;
@@ -21,7 +21,7 @@ use clap::{Args, builder::PossibleValuesParser};
 use super::{
     Outcome, Reference, SceneFlags, SettingFlags, UsageError, flags::seconds, solve::Interruption,
 };
-use plan::PlanFlags;
+use run_flags::ReportRunFlags;
 use session::{Session, Source};
 
 /// Flags of `vecrad report`.
@@ -46,9 +46,9 @@ pub struct ReportArguments {
     /// No progress line
     #[arg(long, short, help_heading = "Output")]
     pub quiet: bool,
-    /// Plan
+    /// Runs
     #[command(flatten)]
-    pub plan: PlanFlags,
+    pub runs: ReportRunFlags,
     /// Scene
     #[command(flatten)]
     pub scene_flags: SceneFlags,

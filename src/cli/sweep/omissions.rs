@@ -11,17 +11,17 @@ use serde::Serialize;
 use super::session::Session;
 use crate::{
     cli::{output::write_whole, report::Machine},
-    export::write_csv,
-    metrics::omissions::{
+    experiments::omissions::{
         Comparison, Exhibit, Row, Trial, exhibits, omissions_markdown, overhead_markdown,
     },
+    export::write_csv,
     solver::SolveSettings,
 };
 
 /// Rounds of a scene at least, for the median of its times.
 const ROUNDS: u32 = 3;
 
-/// A scene whose runs took longer than this, in seconds, gets no round beyond those asked for: its times are long enough
+/// A scene whose runs took longer than this, in seconds, gets no more rounds than asked for: its times are long enough
 /// to be told from noise, and the whole suite shall take some minutes.
 const PATIENCE: f64 = 8.0;
 
@@ -40,8 +40,8 @@ struct Report<'a> {
 pub(super) fn compare(session: &mut Session<'_>) -> Result<()> {
     let settings = session.arguments.setting_flags.settings();
     let is_meant = |exhibit: &Exhibit, word: &str| exhibit.name.contains(word);
-    let plan = &session.arguments.plan;
-    let chosen = plan.chosen(exhibits().to_vec(), is_meant, "scene of the plan")?;
+    let flags = &session.arguments.runs;
+    let chosen = flags.chosen(exhibits().to_vec(), is_meant, "scene of the plan")?;
     let mut comparisons = Vec::new();
     for exhibit in &chosen {
         if session.is_interrupted() {
@@ -72,7 +72,7 @@ fn compare_on(
         session.note_cut();
         return Ok(None);
     };
-    let repeats = session.arguments.plan.repeats;
+    let repeats = session.arguments.runs.repeats;
     for round in 0..repeats.max(ROUNDS) {
         if round >= repeats && trial.seconds() > PATIENCE {
             break;
@@ -131,7 +131,7 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
          vecrad {}, {}, {} threads.\n\
          Settings: {}.\n\
          Each scene is solved as planned (`nothing` kept), with one omission kept, and with all kept.\n\
-         Keeping `rays` keeps `elements` and `clusters`, too, which rest on them; where one thing is left out, keeping it is keeping all.\n\
+         Keeping `rays` keeps `elements` and `clusters`, too, which rest on them; where one thing is omitted, keeping it is keeping all.\n\
          Times are wall-clock seconds of preparing and stepping, the median of the rounds; ratios are to the run as planned.\n\
          The difference is that of the irradiance at random points of the surfaces from the run that keeps all, relative root mean square; \
          \"of seeds\" is that between two runs that keep all and have different seeds. \

@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context as _, Result, bail};
 
 use super::{
-    plan::Configuration,
+    run_flags::Configuration,
     session::{Session, Truth},
 };
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
 /// How often an interruption is looked for.
 const POLL: Duration = Duration::from_millis(50);
 
-/// What a configuration brought.
+/// The result of a configuration.
 pub(super) struct SolverRun {
     /// Error over time.
     pub(super) trajectory: Trajectory,
@@ -31,7 +31,7 @@ pub(super) struct SolverRun {
     pub(super) meshes: Option<[Arc<DisplayMesh>; 2]>,
 }
 
-/// What is written down while a run goes on.
+/// Measurements taken during a run.
 #[derive(Default)]
 struct Record {
     errors: BTreeMap<u32, ErrorMeasures>,
@@ -46,7 +46,7 @@ pub(super) fn solve(
     configuration: &Configuration,
 ) -> Result<SolverRun> {
     let (mut runs, mut meshes) = (Vec::new(), None);
-    for _ in 0..session.arguments.plan.repeats {
+    for _ in 0..session.arguments.runs.repeats {
         if session.is_interrupted() {
             break;
         }

@@ -11,15 +11,16 @@ use super::{
 };
 use crate::{
     cli::{output::write_whole, report::Machine},
+    experiments::scaling::{COST_KINDS, SizeCost, exponent_of, scaling_markdown},
     export::{Curve, CurvePlot, write_csv},
-    metrics::{COST_KINDS, ReferenceFacts, SizeCost, Trajectory, exponent_of, scaling_markdown},
+    metrics::{ReferenceFacts, Trajectory},
     solver::SolveSettings,
 };
 
 /// Triangles of the rooms; the first is the smallest of Sun, Gong and Pan.
 const SIZES: [u32; 6] = [1_022, 4_096, 16_384, 65_536, 262_144, 1_000_000];
 
-/// One size, fully told.
+/// All results of one size.
 #[derive(Serialize)]
 struct Size {
     cost: SizeCost,
@@ -40,14 +41,14 @@ struct Report<'a> {
     sizes: &'a [Size],
 }
 
-/// Run the first configuration of the plan on every size and write the files after each.
+/// Run the first configuration on every size and write the files after each.
 pub(super) fn scale(session: &mut Session<'_>) -> Result<()> {
     let arguments = session.arguments;
-    let configurations = arguments.plan.configurations(&arguments.setting_flags);
+    let configurations = arguments.runs.configurations(&arguments.setting_flags);
     let Some(configuration) = configurations.into_iter().next() else {
         return Ok(());
     };
-    let given = arguments.plan.sizes.as_slice();
+    let given = arguments.runs.sizes.as_slice();
     let wanted = if given.is_empty() { &SIZES } else { given };
     let mut sizes = Vec::new();
     for &triangles in wanted {
@@ -78,7 +79,7 @@ fn write(session: &Session<'_>, settings: &SolveSettings, sizes: &[Size]) -> Res
         machine: Machine::present(),
         threads: session.thread_count(),
         settings: settings.clone(),
-        repeats: session.arguments.plan.repeats,
+        repeats: session.arguments.runs.repeats,
         is_interrupted: session.is_interrupted(),
         exponents: COST_KINDS
             .iter()
@@ -120,7 +121,7 @@ fn write_markdown(report: &Report<'_>, costs: &[SizeCost], out: &mut dyn Write) 
 }
 
 fn plot(costs: &[SizeCost]) -> CurvePlot {
-    let curve = |kind: &crate::metrics::CostKind| {
+    let curve = |kind: &crate::experiments::scaling::CostKind| {
         let power =
             exponent_of(costs, kind).map_or(String::new(), |power| format!(", n^{power:.2}"));
         let points = costs.iter().filter_map(|cost| {

@@ -1,4 +1,4 @@
-//! What all runs of a report share: scenes, references, threads, limits, progress, and whether to stop.
+//! State shared by all runs of a report: scenes, references, threads, limits, progress, and whether to stop.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
@@ -25,7 +25,7 @@ use crate::{
     worker::RunOptions,
 };
 
-/// Time of a run where none is given: enough for 2 % on most scenes, and not yet a coffee break for a whole plan.
+/// Time of a run where none is given: enough for 2 % on most scenes, and still minutes for a whole report.
 const USUAL_TIME_LIMIT: Duration = Duration::from_secs(60);
 
 /// How often an interruption is looked for.
@@ -43,7 +43,7 @@ pub(super) enum Source {
 
 /// A report in the making.
 pub(super) struct Session<'a> {
-    /// What was asked for.
+    /// Arguments of the command.
     pub(super) arguments: &'a ReportArguments,
     /// Set by Ctrl+C.
     pub(super) interrupted: Arc<AtomicBool>,
@@ -54,11 +54,11 @@ pub(super) struct Session<'a> {
     is_cut_short: bool,
 }
 
-/// What the light of a scene is compared with.
+/// The reference of a scene.
 pub(super) struct Truth {
     /// Random points with their light.
     pub(super) points: Vec<ReferencePoint>,
-    /// What to say of it.
+    /// Its description.
     pub(super) facts: ReferenceFacts,
 }
 

@@ -11,8 +11,8 @@ use serde::Serialize;
 use super::session::Session;
 use crate::{
     cli::{output::write_whole, report::Machine},
+    experiments::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
     export::write_csv,
-    metrics::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
 };
 
 /// Everything in `stability.json`.
@@ -30,8 +30,8 @@ struct Report<'a> {
 /// Try every case that is asked for, and write the files after each.
 pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
     let is_meant = |case: &Case, word: &str| case.name.contains(word) || case.group.name() == word;
-    let plan = &session.arguments.plan;
-    let cases = plan.chosen(stability_cases(), is_meant, "case of the stability")?;
+    let flags = &session.arguments.runs;
+    let cases = flags.chosen(stability_cases(), is_meant, "case of the stability")?;
     let mut outcomes: Vec<Outcome> = Vec::new();
     for (number, case) in cases.iter().enumerate() {
         if session.is_interrupted() {
@@ -44,7 +44,7 @@ pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
             case.name
         ));
         let outcome = try_case(session, case);
-        // What an interruption left unfinished is no failure.
+        // A case that an interruption ended has not failed.
         if session.is_interrupted() && !outcome.holds() {
             break;
         }

@@ -8,10 +8,10 @@ const BETWEEN_LABELS: f32 = 34.0;
 /// Room for a digit of a label and its share of the gap; long labels need more than [`BETWEEN_LABELS`].
 const DIGIT_ROOM: f32 = 7.2;
 
-/// Decades that an axis shows at most: a curve that falls further says nothing there.
+/// Decades that an axis shows at most: the rest of a curve that falls further carries no information.
 const MOST_DECADES: f64 = 8.0;
 
-/// Numbers that an axis can show: beyond, powers of ten leave the range of `f64`.
+/// Numbers that an axis can show: outside them, powers of ten leave the range of `f64`.
 pub(super) const SHOWABLE: std::ops::RangeInclusive<f64> = 1e-200..=1e200;
 
 /// A range of positive numbers on an interval of the drawing.

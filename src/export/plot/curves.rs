@@ -13,9 +13,9 @@ use super::{
 /// A curve and its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// What the legend calls it.
+    /// Its name in the legend.
     pub label: String,
-    /// Its points, joined in this order; those that are not positive cannot be shown and are left out.
+    /// Its points, joined in this order; those that are not positive cannot be shown and are omitted.
     pub points: Vec<[f64; 2]>,
     /// Dashed curves are what the others are compared with.
     pub is_dashed: bool,

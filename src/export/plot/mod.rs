@@ -49,7 +49,7 @@ enum Mark {
     },
 }
 
-/// What both formats draw, later marks over earlier ones, on white.
+/// The drawing of both formats, later marks over earlier ones, on white.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Drawing {
     size: Vec2,

@@ -120,7 +120,7 @@ fn flattened(outline: &[Stroke], place: impl Fn([f32; 2]) -> Vec2) -> Outlines {
     contours
 }
 
-/// Points along a curve, its start left out.
+/// Points along a curve, its start omitted.
 fn curve(at: impl Fn(f32) -> Vec2) -> Vec<Vec2> {
     (1..=PIECES)
         .map(|piece| at(f32::from(piece) / f32::from(PIECES)))
@@ -271,7 +271,7 @@ mod tests {
                 .to_vec()
         };
         assert!((filled(&[square(3.3, 20.3)]) - 289.0).abs() < 4.0);
-        // Overlaps count once; a hole that turns the other way is left out.
+        // Overlaps count once; a hole that turns the other way is omitted.
         let twice = filled(&[square(2.0, 12.0), square(2.0, 12.0)]);
         assert!((twice - 100.0).abs() < 1.0, "{twice}");
         let mut hole = square(10.0, 20.0);

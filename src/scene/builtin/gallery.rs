@@ -25,7 +25,7 @@ const COLUMNS_Z: [f64; 4] = [1.3, 5.45, 9.55, 13.65];
 const COLUMN_X: f64 = 2.3;
 const ARCHITRAVE_Y: f64 = 4.35;
 
-/// What things are made of.
+/// The materials.
 struct Paints {
     plaster: MaterialId,
     accent: MaterialId,

@@ -36,11 +36,11 @@ pub struct Viewpoint {
 /// A scene that needs no file.
 #[derive(Clone, Copy, Debug)]
 pub struct Builtin {
-    /// What to ask for it by.
+    /// Its name on the command line.
     pub name: &'static str,
-    /// What it shows, in a line.
+    /// Its description, in a line.
     pub summary: &'static str,
-    /// A view of it that looks good.
+    /// The viewpoint for its picture.
     pub viewpoint: Viewpoint,
     faces: fn() -> SceneBuilder,
 }

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::scene::Texture;
+use crate::scene::{Texture, linear_from_srgb};
 
 /// A texture from sRGB colours in 0…1 at points of the unit square, v upwards.
 fn painted(name: &str, [width, height]: [u32; 2], colour: impl Fn(Vec2) -> Vec3) -> Texture {
@@ -12,7 +12,7 @@ fn painted(name: &str, [width, height]: [u32; 2], colour: impl Fn(Vec2) -> Vec3)
         .map(|(column, row)| {
             let centre = Vec2::new(column as f32 + 0.5, row as f32 + 0.5) / size;
             let encoded = colour(Vec2::new(centre.x, 1.0 - centre.y));
-            encoded.map(|x| linear((x.clamp(0.0, 1.0) * 255.0).round() / 255.0))
+            encoded.map(|x| linear_from_srgb((x.clamp(0.0, 1.0) * 255.0).round() / 255.0))
         })
         .collect();
     Texture {
@@ -20,15 +20,6 @@ fn painted(name: &str, [width, height]: [u32; 2], colour: impl Fn(Vec2) -> Vec3)
         width,
         height,
         pixels,
-    }
-}
-
-/// Linear value of an sRGB-encoded one (IEC 61966-2-1).
-fn linear(encoded: f32) -> f32 {
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::scene::{MaterialId, SceneBuilder};
 
 pub(super) const VIEWPOINT: Viewpoint = view([3.75, 1.75, 0.3], [1.75, 1.05, 2.7]);
 
-/// How a room spends its triangles. What the bodies leave goes to the walls.
+/// How a room spends its triangles. The rest goes to the walls.
 struct Plan {
     triangle_count: usize,
     /// Rows of the figure: `20 · rows²` triangles.

@@ -1,20 +1,20 @@
-//! Wishes carried out.
+//! Actions carried out.
 
 use eframe::egui;
 
 use super::{
     super::{
         action::{Action, Scale},
-        bindings,
-        change::Change,
-        clusters, focus,
+        bindings, clusters, focus,
         materials::Materials,
         messages::Severity,
         navigation::Picked,
         panel_state::PanelState,
         pick,
+        run::Change,
+        run::RunStatus,
         session::Recent,
-        state::{RunStatus, Selection, State},
+        state::{Selection, State},
         view::ViewMode,
     },
     App,
@@ -131,7 +131,7 @@ impl App {
             Action::EmissionScale(scale) => state.view.emission_scale = scale.max(0.0),
             Action::AutoExposure => state.view.auto_exposure = true,
             Action::ToggleToneMap => {
-                use crate::viewer::view::ToneMap;
+                use crate::export::ToneMap;
                 state.view.tone_map = match state.view.tone_map {
                     ToneMap::Neutral => ToneMap::None,
                     ToneMap::None => ToneMap::Neutral,
@@ -186,7 +186,7 @@ impl App {
 
     fn pause_or_continue(&mut self) {
         if self.state.run.status.is_busy() {
-            // What is under way may take a moment to end.
+            // A task under way may take a moment to end.
             self.state.run.status = RunStatus::Pausing;
             self.worker.pause();
         } else if self.state.run.status.can_continue() {

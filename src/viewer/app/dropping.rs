@@ -41,7 +41,7 @@ fn scene_among(paths: &[PathBuf]) -> Option<Result<PathBuf, String>> {
     Some(if chosen.is_dir() {
         scene_in(chosen)
     } else {
-        // What is no scene is refused by its reader, which knows why.
+        // A file that is no scene is refused by its reader, which knows why.
         Ok(chosen.clone())
     })
 }
@@ -70,14 +70,14 @@ fn is_obj(path: &Path) -> bool {
 
 /// Say what dropping will do while files are held over the window.
 pub(super) fn hover_ui(ctx: &egui::Context) {
-    let held: Vec<Option<String>> = ctx.input(|input| {
+    let hovering: Vec<Option<String>> = ctx.input(|input| {
         let names = input.raw.hovered_files.iter().map(|file| {
             let name = file.path.as_ref()?.file_name()?;
             Some(name.to_string_lossy().into_owned())
         });
         names.collect()
     });
-    let text = match held.as_slice() {
+    let text = match hovering.as_slice() {
         [] => return,
         [Some(name)] => format!("Drop to open {name}"),
         [None] => "Drop to open".to_owned(),

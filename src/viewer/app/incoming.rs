@@ -1,10 +1,10 @@
-//! What arrives between frames: chosen files, notices, a scene that was read, events and light of the worker.
+//! Results that arrive between frames: chosen files, notices, a scene that was read, events and light of the worker.
 
 use std::{sync::Arc, time::Duration};
 
 use super::{
     super::{
-        inspection, light_range,
+        light_range,
         loader::{Loader, SceneSource},
         messages::Severity,
         stage::Wanted,
@@ -51,9 +51,9 @@ impl App {
         self.want();
     }
 
-    /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by its haste.
-    fn no_file(&mut self, is_hasty: bool) {
-        let (severity, text) = if is_hasty {
+    /// The dialog ended without a file. One that fails cannot be told from one that was cancelled, but by how soon it ends.
+    fn no_file(&mut self, is_immediate: bool) {
+        let (severity, text) = if is_immediate {
             self.state.panels.ask_for_path();
             let text = "this desktop has no file dialog; type the path instead";
             (Severity::Warning, text)
@@ -65,7 +65,7 @@ impl App {
 
     fn drain_worker(&mut self) {
         let run = self.worker.generation().number();
-        let mut is_outgrown = false;
+        let mut needs_restart = false;
         for event in self.worker.events() {
             let state = &mut self.state;
             match &event {
@@ -77,21 +77,24 @@ impl App {
                 }
                 // Later light of the same run may need less again.
                 Event::Relit {
-                    is_outgrown: is_now,
+                    needs_restart: is_now,
                     seconds: Some(_),
                     ..
-                } => is_outgrown = *is_now,
+                } => needs_restart = *is_now,
                 _ => {}
             }
             state.truth.note(&event, run, &state.settings);
             state.run.note(event);
         }
-        if is_outgrown {
+        if needs_restart {
             self.begin_again();
         }
-        let held = &self.state.run.snapshot;
-        let is_known =
-            |latest: &Arc<_>| held.as_ref().is_some_and(|held| Arc::ptr_eq(held, latest));
+        let shown = &self.state.run.snapshot;
+        let is_known = |latest: &Arc<_>| {
+            shown
+                .as_ref()
+                .is_some_and(|shown| Arc::ptr_eq(shown, latest))
+        };
         let newer = self.worker.latest().filter(|latest| !is_known(latest));
         let has_light = newer.is_some();
         if has_light {
@@ -109,7 +112,7 @@ impl App {
 
     /// Ask the solver about what is selected, if it was not asked yet.
     pub(super) fn ask(&mut self) {
-        let wanted = inspection::wanted(&self.state);
+        let wanted = self.state.subjects();
         if let Some(subjects) = self.state.inspections.question(&wanted) {
             self.worker.inspect(subjects);
         }

@@ -1,4 +1,4 @@
-//! What the window saves: pictures, the lit mesh, and the sidecar of a scene.
+//! Saving: pictures, the lit mesh, and the sidecar of a scene.
 
 use std::path::PathBuf;
 
@@ -11,11 +11,14 @@ use super::{
         messages::Severity,
         saver::{self, Content},
         session::{self, Session},
-        view::{ToneMap, ViewSettings},
+        view::ViewSettings,
     },
     App,
 };
-use crate::export::{self, ColorOptions, MeshOptions, UpAxis};
+use crate::{
+    export::{ColorOptions, MeshOptions},
+    scene::UpAxis,
+};
 
 impl App {
     /// Where a picture goes unless another place is named.
@@ -139,10 +142,7 @@ fn mesh_options(view: &ViewSettings, up: Vec3, radiance_unit: f32) -> MeshOption
     MeshOptions {
         color: ColorOptions {
             exposure_ev: view.exposure_factor().log2(),
-            tone_map: match view.tone_map {
-                ToneMap::Neutral => export::ToneMap::Neutral,
-                ToneMap::None => export::ToneMap::None,
-            },
+            tone_map: view.tone_map,
         },
         up: if up == Vec3::Z { UpAxis::Z } else { UpAxis::Y },
         emission_scale: view.emission_scale,

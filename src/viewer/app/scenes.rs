@@ -8,8 +8,8 @@ use super::{
         loader::{LoadedScene, Loader, SceneSource},
         materials::Materials,
         messages::Severity,
+        options::CameraRequest,
         session,
-        start::{self, CameraRequest},
         truth::Truth,
         view::ViewMode,
         wording,
@@ -52,7 +52,7 @@ impl App {
             self.open_view(&loaded);
         }
         self.keeps_view = true;
-        self.title = Some(start::title(&loaded.source));
+        self.title = Some(loaded.source.window_title());
         self.state.selection = None;
         self.state.cluster = None;
         self.state.inspections.close();

@@ -3,7 +3,6 @@
 use eframe::egui::{self, Slider};
 
 use super::{
-    count, figure,
     legend::{Scale, scale_ui},
     power::PowerScale,
     row,
@@ -14,13 +13,14 @@ use crate::{
         action::Action,
         cluster_lines::{MAX_BOXES, RAMP_START},
         clusters::path_to,
+        figures::{count, figure},
         state::State,
         theme,
         view::{ClusterColor, ClusterCut, ClusterOverlay},
     },
 };
 
-/// Show the controls; wishes go into `actions`.
+/// Show the controls; requested actions go into `actions`.
 pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let snapshot = state.run.snapshot.clone();
     let clusters: &[ClusterBox] = snapshot.as_ref().map_or(&[], |snapshot| &snapshot.clusters);
@@ -51,7 +51,7 @@ pub fn clusters_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
     }
 }
 
-/// Which boxes are drawn, and what their colours tell.
+/// Which boxes are drawn, and the quantity of their colours.
 fn boxes_ui(ui: &mut egui::Ui, state: &mut State, cluster_count: usize) {
     let overlay = &mut state.view.clusters;
     let deepest = state.shown_clusters.deepest.unwrap_or(overlay.level);
@@ -103,7 +103,7 @@ fn counts_ui(ui: &mut egui::Ui, state: &State, cluster_count: usize) {
     }
 }
 
-/// What the colours of the boxes stand for.
+/// Legend of the colours of the boxes.
 fn legend_ui(ui: &mut egui::Ui, state: &State) {
     let (Some(staged), Some(loaded)) = (&state.staged, &state.loaded) else {
         return;

@@ -31,10 +31,10 @@ pub fn color_button(ui: &mut egui::Ui, name: &str, color: &mut Vec3) -> egui::Re
 }
 
 fn picker_ui(ui: &mut egui::Ui, id: egui::Id, color: &mut Vec3) {
-    // Grey has no hue, and black has no saturation: those chosen last are held.
-    let held = ui.data(|kept| kept.get_temp::<HsvaGamma>(id));
-    let fits = |held: &HsvaGamma| linear(*held).abs_diff_eq(*color, 1e-4);
-    let mut hsv = held
+    // Grey has no hue, and black has no saturation: those chosen last are used.
+    let last = ui.data(|data| data.get_temp::<HsvaGamma>(id));
+    let fits = |last: &HsvaGamma| linear(*last).abs_diff_eq(*color, 1e-4);
+    let mut hsv = last
         .filter(fits)
         .unwrap_or_else(|| HsvaGamma::from(Hsva::from_rgb(color.to_array())));
     let before = hsv;
@@ -61,7 +61,7 @@ fn picker_ui(ui: &mut egui::Ui, id: egui::Id, color: &mut Vec3) {
             ui.add(value.fixed_decimals(3)).labelled_by(label.id);
         }
     });
-    ui.data_mut(|kept| kept.insert_temp(id, hsv));
+    ui.data_mut(|data| data.insert_temp(id, hsv));
 }
 
 /// A bar of colours with a mark at the value, 0…1.

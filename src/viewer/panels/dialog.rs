@@ -1,4 +1,4 @@
-//! What all dialogs that ask for a file have in common: the window around them, and the button that confirms.
+//! Parts of all dialogs that ask for a file: the window around them, and the button that confirms.
 
 use eframe::egui::{self, Button, Key};
 

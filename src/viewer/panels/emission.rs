@@ -2,10 +2,14 @@
 
 use eframe::egui;
 
-use super::{figure, number, row};
-use crate::viewer::{action::Action, state::State};
+use super::row;
+use crate::viewer::{
+    action::Action,
+    figures::{figure, number},
+    state::State,
+};
 
-/// Show the scale of all emission; a wish goes into `actions`.
+/// Show the scale of all emission; a requested action goes into `actions`.
 pub fn emission_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let mut scale = state.view.emission_scale;
     let has_changed = row::setting(

@@ -3,12 +3,13 @@
 use eframe::egui::{self, Color32, RichText};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use super::{bound, count, figure, plot, row, seconds};
+use super::{plot, row};
 use crate::{
     metrics::{ErrorMeasures, smallest_error},
     solver::StepReport,
     viewer::{
         action::Action,
+        figures::{bound, count, figure, seconds},
         state::State,
         theme,
         truth::{RunRecord, Truth},
@@ -19,7 +20,7 @@ use crate::{
 /// Smallest error on the logarithmic axis, in per cent, where not even noise of the reference hides it.
 const FLOOR_PERCENT: f64 = 0.01;
 
-/// Show the reference and what was measured by it; wishes go into `actions`.
+/// Show the reference and what was measured by it; requested actions go into `actions`.
 pub fn error_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let truth = &state.truth;
     reference_ui(ui, state, actions);

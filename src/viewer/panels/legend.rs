@@ -3,16 +3,15 @@
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, StrokeKind, pos2, vec2};
 
-use super::count;
-use crate::viewer::{state::State, theme, view::ViewMode};
+use crate::viewer::{figures::count, state::State, theme, view::ViewMode};
 
 /// Marks on a scale at most. More touch each other.
 const MOST_MARKS: usize = 7;
 
-/// What colours stand for.
+/// The quantity of colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// What the first and the last colour stand for.
+    /// Values of the first and the last colour.
     pub ends: [f64; 2],
     /// Whether values are spaced by their logarithm.
     pub is_logarithmic: bool,
@@ -185,7 +184,7 @@ pub fn scale_ui(ui: &mut egui::Ui, scale: &Scale, unit: &str, start: f32) {
             .painter()
             .layout_no_wrap(mark_text(value), font.clone(), color);
         let left = x - 0.5 * text.size().x;
-        // Values that would touch the one before are left out; their mark tells where they are.
+        // Values that would touch the one before are omitted; their mark tells where they are.
         if left > free_from {
             free_from = left + text.size().x + 4.0;
             ui.painter().galley(pos2(left, y + 4.0), text, color);

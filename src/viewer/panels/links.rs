@@ -3,11 +3,11 @@
 use eframe::egui::{self, Slider};
 
 use super::{
-    count,
     legend::{Scale, scale_ui},
     row,
 };
 use crate::viewer::{
+    figures::count,
     links,
     state::State,
     view::{LinkColor, LinkEnd, LinkOverlay},
@@ -59,7 +59,7 @@ pub fn links_ui(ui: &mut egui::Ui, state: &mut State) {
     summary_ui(ui, state);
 }
 
-/// What is drawn, or why nothing is.
+/// The drawn links, or why there are none.
 fn summary_ui(ui: &mut egui::Ui, state: &State) {
     let overlay = &state.view.links;
     let Some(inspection) = state.inspections.of(overlay.of) else {

@@ -5,17 +5,21 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{color::color_button, row, seconds, settings::slider};
+use super::{
+    color::color_button,
+    row::{self, slider},
+};
 use crate::viewer::{
     action::Action,
+    figures::seconds,
     materials::{LightControl, Materials},
     state::State,
 };
 
-/// Height of the list of lights, and of that of materials, beyond which it scrolls, in points.
+/// Height of the list of lights, and of that of materials, above which it scrolls, in points.
 const MOST_HEIGHT: f32 = 240.0;
 
-/// Show the lights and the materials; a wish goes into `actions`.
+/// Show the lights and the materials; a requested action goes into `actions`.
 pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let Some(loaded) = &state.loaded else {
         return;
@@ -81,7 +85,7 @@ fn intensity_ui(ui: &mut egui::Ui, light: &mut LightControl, default: &LightCont
     row::setting(
         ui,
         "Intensity",
-        "Times as bright as in the file. Values beyond the slider may be typed.",
+        "Times as bright as in the file. Values outside the slider may be typed.",
         &mut light.intensity,
         &default.intensity,
         |ui, value| ui.add(slider(value, 0.01..=100.0)),

@@ -3,16 +3,20 @@
 use eframe::egui;
 
 use super::scene;
-use crate::viewer::{
-    action::{Action, Scale},
-    bindings::{Binding, hint},
-    camera::{AxisView, UpAxis},
-    loader::SceneSource,
-    state::State,
-    view::{ToneMap, ViewMode},
+use crate::{
+    export::ToneMap,
+    scene::UpAxis,
+    viewer::{
+        action::{Action, Scale},
+        bindings::{Binding, hint},
+        camera::AxisView,
+        loader::SceneSource,
+        state::State,
+        view::ViewMode,
+    },
 };
 
-/// Show the bar; wishes go into `actions`.
+/// Show the bar; requested actions go into `actions`.
 pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
     egui::MenuBar::new().ui(ui, |ui| {
         ui.menu_button("File", |ui| file_menu(ui, state, table, actions));

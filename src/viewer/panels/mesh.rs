@@ -10,7 +10,7 @@ use crate::{
     viewer::{action::Action, state::State},
 };
 
-/// Show the dialog where it is open; wishes go into `actions`.
+/// Show the dialog where it is open; requested actions go into `actions`.
 pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let text = &mut state.panels.mesh_text;
     dialog(ctx, "Export lit mesh", &mut state.panels.mesh, |ui| {

@@ -2,11 +2,11 @@
 
 use eframe::egui::{self, DragValue};
 
-use super::{figure, row, settings::slider};
+use super::row::{self, slider};
 use crate::{
     geometry::RAY_OFFSET,
     solver::{Direct, Method, Oracle, Push, SolveSettings},
-    viewer::state::State,
+    viewer::{figures::figure, state::State},
 };
 
 /// Show them in a section that is folded at first.

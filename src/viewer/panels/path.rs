@@ -2,11 +2,15 @@
 
 use eframe::egui::{self, RichText};
 
-use super::{count, figure, power::PowerScale};
+use super::power::PowerScale;
 use crate::{
     scene::Frame,
     solver::PathNode,
-    viewer::{action::Action, theme},
+    viewer::{
+        action::Action,
+        figures::{count, figure},
+        theme,
+    },
 };
 
 /// Height of the list; longer ones scroll. Deep trees have forty entries.

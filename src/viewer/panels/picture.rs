@@ -7,7 +7,7 @@ use eframe::egui::{self, DragValue};
 use super::dialog::{confirm, dialog, file_field};
 use crate::viewer::{action::Action, state::State};
 
-/// Show the dialog where it is open; wishes go into `actions`.
+/// Show the dialog where it is open; requested actions go into `actions`.
 pub fn picture_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let mut open = state.panels.picture;
     dialog(ctx, "Save picture", &mut open, |ui| {
@@ -40,7 +40,7 @@ fn picture_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) -
     });
     ui.checkbox(&mut panels.picture_is_transparent, "Transparent background")
         .on_hover_text(
-            "Leave the background out: straight alpha in a PNG, colours multiplied by alpha in an EXR",
+            "Omit the background: straight alpha in a PNG, colours multiplied by alpha in an EXR",
         );
     let label = "File: .png as seen, .exr with linear radiance";
     file_field(ui, label, &mut panels.picture_text);

@@ -3,10 +3,10 @@
 use eframe::egui;
 use egui_plot::{AxisHints, GridInput, GridMark, Line, Plot, PlotPoints};
 
-use super::{count, legend::round_step};
+use super::legend::round_step;
 use crate::{
     solver::StepReport,
-    viewer::{state::State, theme},
+    viewer::{figures::count, state::State, theme},
 };
 
 /// Smallest value on the logarithmic axis.

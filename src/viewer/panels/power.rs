@@ -1,8 +1,7 @@
-//! Powers as the panels tell them: in watts where the scene's unit of length is known to be the metre, else relative to
+//! Powers in the panels: in watts where the scene's unit of length is known to be the metre, else relative to
 //! the power that leaves all surfaces of the scene.
 
-use super::figure;
-use crate::viewer::state::State;
+use crate::viewer::{figures::figure, state::State};
 
 /// From powers in frame units to text.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +36,7 @@ impl PowerScale {
         }
     }
 
-    /// What the figures are called.
+    /// Name of the figures.
     pub fn name(&self) -> &'static str {
         if self.is_in_watts {
             "Power"
@@ -46,7 +45,7 @@ impl PowerScale {
         }
     }
 
-    /// What the figures are, for a hint.
+    /// Explanation of the figures, for a hint.
     pub fn explanation(&self) -> &'static str {
         if self.is_in_watts {
             "Luminance of the power that leaves"

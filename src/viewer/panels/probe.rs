@@ -3,10 +3,18 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{bound, count, figure, path::path_ui, power::PowerScale, row};
-use crate::viewer::{action::Action, light_range::luminance, state::State, view::LinkEnd};
+use super::{path::path_ui, power::PowerScale, row};
+use crate::{
+    scene::luminance,
+    viewer::{
+        action::Action,
+        figures::{bound, count, figure},
+        state::State,
+        view::LinkEnd,
+    },
+};
 
-/// Show the picked point; wishes go into `actions`.
+/// Show the picked point; requested actions go into `actions`.
 pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let (Some(selection), Some(loaded)) = (&state.selection, &state.loaded) else {
         ui.weak("Click a surface to see its light.");
@@ -137,7 +145,7 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     });
 }
 
-/// What the solver says of the element.
+/// The inspection of the element.
 fn inspection_rows(ui: &mut egui::Ui, state: &State) {
     let Some(inspection) = state.inspections.element() else {
         if state.inspections.is_waiting(LinkEnd::Element) {
@@ -241,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bound_beyond_the_light_itself_is_no_figure() {
+    fn a_bound_above_the_light_itself_is_no_figure() {
         assert_eq!(error_bound(5.31, 0.25), "over 100 %");
         assert_eq!(error_bound(0.01, 0.25), "4.00 %");
         assert_eq!(error_bound(1.0, 0.0), "over 100 %");

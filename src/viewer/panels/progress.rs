@@ -2,19 +2,21 @@
 
 use eframe::egui::{self, Button};
 
-use super::{bound, bytes, count, figure, row, seconds};
+use super::row;
 use crate::{
     solver::StepReport,
     viewer::{
         action::Action,
-        change::Change,
-        state::{RunStatus, State},
+        figures::{bound, bytes, count, figure, seconds},
+        run::Change,
+        run::RunStatus,
+        state::State,
         theme,
         wording::without_flags,
     },
 };
 
-/// Show the run; wishes go into `actions`.
+/// Show the run; requested actions go into `actions`.
 pub fn progress_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
     let status = &state.run.status;
     let steps = state.settings.max_steps;
@@ -58,7 +60,7 @@ fn run_text(status: &RunStatus, step: u32, steps: u32) -> String {
     }
 }
 
-/// What the last change of settings did. Its room is always there, so that no slider moves away from the hand.
+/// The effect of the last change of settings. Its room is always there, so that no slider moves away from the hand.
 fn change_ui(ui: &mut egui::Ui, state: &State) {
     if state.loaded.is_none() {
         return;
@@ -185,7 +187,7 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
     }
 }
 
-/// Where a step stands. Light that is refined after its last step has steps beyond it, counted on.
+/// Where a step stands. Light that is refined after its last step has further steps, counted on.
 fn place(step: u32, steps: u32) -> String {
     if step > steps {
         format!("step {step}, refining further")
@@ -196,7 +198,7 @@ fn place(step: u32, steps: u32) -> String {
 
 /// Estimated part of the light that has been distributed over the links of a step. Each further sweep changes the light
 /// by at most the contraction times what the one before did, so that all of them together, the last one's residual
-/// among them, change residual / (1 − contraction). `None` where the light does not settle.
+/// among them, change residual / (1 − contraction). `None` where the light does not converge.
 fn transported(report: &StepReport) -> Option<f64> {
     let rest = f64::from(report.residual) / (1.0 - f64::from(report.contraction));
     (report.contraction < 1.0 && rest.is_finite()).then(|| (1.0 - rest).max(0.0))
@@ -225,7 +227,7 @@ mod tests {
         // moves 0.5¹¹ of all light, and all from there on 0.5¹⁰.
         let light = |sweeps: i32| 1.0 - 0.5_f64.powi(sweeps);
         let residual = light(11) - light(10);
-        let share = transported(&report(residual as f32, 0.5)).expect("it settles");
+        let share = transported(&report(residual as f32, 0.5)).expect("it converges");
         assert!((share - light(10)).abs() < 1e-9, "{share}");
         assert_eq!(transported(&report(0.0, 0.0)), Some(1.0));
         assert_eq!(transported(&report(0.6, 0.9)), Some(0.0));

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use eframe::egui::{self, RichText};
 
-use crate::viewer::theme;
+use crate::viewer::{figures, theme};
 
 /// Width of the labels of settings, in points. Narrower cuts them off, wider leaves no room for the values.
 const LABEL_WIDTH: f32 = 118.0;
@@ -125,7 +125,7 @@ pub fn figure(ui: &mut egui::Ui, name: &str, value: impl Into<String>, explanati
 
 /// The size of a box in the file's units, as a [`figure`].
 pub fn size(ui: &mut egui::Ui, size: glam::DVec3) {
-    let [x, y, z] = size.to_array().map(super::figure);
+    let [x, y, z] = size.to_array().map(figures::figure);
     figure(
         ui,
         "Size",
@@ -150,4 +150,18 @@ pub fn section(ui: &mut egui::Ui, title: &str, open: bool, add: impl FnOnce(&mut
         .default_open(open)
         .show_unindented(ui, add);
     ui.add_space(2.0);
+}
+
+/// A logarithmic slider whose typed value may leave its range, but not go to 0 or below.
+pub fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> egui::Slider<'_> {
+    egui::Slider::new(value, range)
+        .logarithmic(true)
+        .clamping(egui::SliderClamping::Never)
+        .custom_formatter(|value, _| figures::figure(value))
+        .custom_parser(|text| {
+            let value = figures::number(text)? as f32;
+            (f32::MIN_POSITIVE..=f32::MAX)
+                .contains(&value)
+                .then_some(f64::from(value))
+        })
 }

@@ -1,19 +1,18 @@
-//! Scenes to open: what an empty window says, the list of built-in scenes, the field for a path.
+//! Scenes to open: the text of an empty window, the list of built-in scenes, the field for a path.
 
 use std::path::PathBuf;
 
 use eframe::egui::{self, RichText, text::CCursorRange};
 
-use super::counts_in;
 use crate::{
     scene::builtin::builtins,
     viewer::{
-        action::Action, loader::SceneSource, messages::Severity, state::State, theme,
-        view::ViewMode,
+        action::Action, figures::counts_in, loader::SceneSource, messages::Severity, state::State,
+        theme, view::ViewMode,
     },
 };
 
-/// What the viewport says while there is no scene.
+/// The text in the viewport while there is no scene.
 pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions: &mut Vec<Action>) {
     let width = 460.0_f32.min(rect.width() - 24.0);
     let area = egui::Rect::from_center_size(rect.center(), egui::vec2(width, 330.0));
@@ -55,7 +54,7 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
     });
 }
 
-/// What the viewport says while there is nothing to show yet.
+/// The text in the viewport while there is nothing to show yet.
 pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
     let text = match (&state.loading, &state.loaded) {
         (Some(loading), None) => loading.progress().sentence(&loading.source().label()),
@@ -98,7 +97,7 @@ fn path_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
         let response = shown.response.response.labelled_by(label.id);
         if std::mem::take(&mut state.panels.path_is_asked) {
             response.request_focus();
-            // What is typed replaces what was there.
+            // The typed text replaces the old one.
             let all = CCursorRange::select_all_str(&state.panels.path_text);
             shown.state.cursor.set_char_range(Some(all));
             shown.state.store(ui.ctx(), response.id);

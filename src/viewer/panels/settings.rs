@@ -4,14 +4,17 @@ use std::time::Duration;
 
 use eframe::egui::{self, DragValue, Slider, emath::Numeric};
 
-use super::{method::method_ui, row};
+use super::{
+    method::method_ui,
+    row::{self, slider},
+};
 use crate::{
     scene::Sides,
     solver::SolveSettings,
-    viewer::{action::Action, state::State},
+    viewer::{action::Action, figures::number, state::State},
 };
 
-/// Show the settings; wishes go into `actions`.
+/// Show the settings; requested actions go into `actions`.
 pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let mut settings = state.settings.clone();
     presets_ui(ui, &mut settings);
@@ -35,7 +38,7 @@ fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
         (
             "Final",
             SolveSettings::finest(),
-            "For the bake that is kept: about 2 % error, many times the time",
+            "For the final bake: about 2 % error, many times the time",
         ),
     ];
     ui.horizontal(|ui| {
@@ -79,7 +82,7 @@ fn quality_ui(ui: &mut egui::Ui, state: &State, settings: &mut SolveSettings) {
         ui,
         "Link threshold ε",
         "Largest error of one link, relative to the mean light. Lower is better and slower: links grow about as 1/ε. \
-         Values beyond the slider may be typed.",
+         Values outside the slider may be typed.",
         &mut settings.epsilon,
         &default.epsilon,
         |ui, value| ui.add(slider(value, 0.001..=0.3)),
@@ -226,21 +229,7 @@ fn parsed_limit(text: &str, unit: &str, zero: &str) -> Option<f64> {
     if text.eq_ignore_ascii_case(zero) {
         return Some(0.0);
     }
-    super::number(text.trim_end_matches(unit))
-}
-
-/// A logarithmic slider whose typed value may leave its range, but not go to 0 or below.
-pub(super) fn slider(value: &mut f32, range: std::ops::RangeInclusive<f32>) -> Slider<'_> {
-    Slider::new(value, range)
-        .logarithmic(true)
-        .clamping(egui::SliderClamping::Never)
-        .custom_formatter(|value, _| super::figure(value))
-        .custom_parser(|text| {
-            let value = super::number(text)? as f32;
-            (f32::MIN_POSITIVE..=f32::MAX)
-                .contains(&value)
-                .then_some(f64::from(value))
-        })
+    number(text.trim_end_matches(unit))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::viewer::{action::Action, focus, panel_state::Side, state::State};
 
-/// Show the open panels that there is room for; wishes go into `actions`.
+/// Show the open panels that there is room for; requested actions go into `actions`.
 pub fn side_panels(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let window_width = ui.ctx().content_rect().width();
     let shown = state.panels.shown_sides(window_width);
@@ -70,7 +70,7 @@ fn light_sections(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
     }
 }
 
-/// What is looked into.
+/// Inspection of the method.
 fn look_sections(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     row::section(ui, "Probe", true, |ui| {
         probe::probe_ui(ui, state, actions);

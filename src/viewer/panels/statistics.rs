@@ -2,8 +2,11 @@
 
 use eframe::egui;
 
-use super::{count, figure, left_out, row, seconds};
-use crate::viewer::state::State;
+use super::{omissions, row};
+use crate::viewer::{
+    figures::{count, figure, seconds},
+    state::State,
+};
 
 /// Show the counts.
 pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
@@ -101,11 +104,11 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
                 ui,
                 "Contraction",
                 figure(f64::from(report.contraction)),
-                "Ratio of successive changes; below 1 the iteration settles",
+                "Ratio of successive changes; below 1 the iteration converges",
             );
         }
     });
-    left_out::left_out_ui(ui, state);
+    omissions::omissions_ui(ui, state);
     frame_ui(ui, state);
     if !state.adapter_name.is_empty() {
         ui.add_space(2.0);
@@ -116,7 +119,7 @@ pub fn statistics_ui(ui: &mut egui::Ui, state: &State) {
     }
 }
 
-/// What a frame of the window costs.
+/// Time of a frame of the window.
 fn frame_ui(ui: &mut egui::Ui, state: &State) {
     let Some([middle, most]) = state.frame_times.middle_and_most() else {
         return;

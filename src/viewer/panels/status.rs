@@ -2,12 +2,13 @@
 
 use eframe::egui::{self, Color32, RichText};
 
-use super::{count, figure, seconds};
 use crate::viewer::{
-    change::Change,
+    figures::{count, figure, seconds},
     messages::{Message, Severity},
     panel_state::Side,
-    state::{RunStatus, State},
+    run::Change,
+    run::RunStatus,
+    state::State,
     theme,
 };
 
@@ -114,7 +115,7 @@ pub(super) fn severity_color(severity: Severity, visuals: &egui::Visuals) -> Col
     }
 }
 
-/// What to do with mouse and keys, as far as there is room for it.
+/// Hints on mouse and keys, as far as there is room for them.
 fn hint_ui(ui: &mut egui::Ui) {
     const HINTS: [&str; 2] = [
         "Drag orbits, wheel zooms, click picks; B boxes, Ctrl+F12 picture, F1 all keys",

@@ -7,7 +7,7 @@ use eframe::egui;
 use super::dialog::{confirm, dialog, file_field};
 use crate::viewer::{action::Action, panel_state::PanelState};
 
-/// Show the dialog where it is open; wishes go into `actions`.
+/// Show the dialog where it is open; requested actions go into `actions`.
 pub fn table_window(ctx: &egui::Context, panels: &mut PanelState, actions: &mut Vec<Action>) {
     let text = &mut panels.table_text;
     dialog(ctx, "Save errors as CSV", &mut panels.table, |ui| {

@@ -2,11 +2,15 @@
 
 use eframe::egui::{self, DragValue, Slider};
 
-use crate::viewer::{
-    action::Action,
-    panel_state::{PanelState, Side},
-    state::State,
-    view::{ToneMap, ViewMode, ViewSettings},
+use crate::{
+    export::ToneMap,
+    viewer::{
+        action::Action,
+        figures::figure,
+        panel_state::{PanelState, Side},
+        state::State,
+        view::{ViewMode, ViewSettings},
+    },
 };
 
 /// Width of the exposure's value, for two digits before the point and a sign.
@@ -143,7 +147,7 @@ fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
         .on_hover_text("Keep the range while the light changes; otherwise it follows the light");
     view.fixed_range = match (is_fixed, view.fixed_range) {
         (true, None) => Some(in_use),
-        (true, held) => held,
+        (true, chosen) => chosen,
         (false, _) => None,
     };
     if let Some([low, high]) = &mut view.fixed_range {
@@ -152,7 +156,7 @@ fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
             DragValue::new(value)
                 .range(0.0..=f32::MAX)
                 .speed(speed)
-                .custom_formatter(|value, _| super::figure(value))
+                .custom_formatter(|value, _| figure(value))
         };
         let label = ui.label("from");
         ui.add(drag(low)).labelled_by(label.id);

@@ -11,11 +11,9 @@ use image::{DynamicImage, Rgba, Rgba32FImage, RgbaImage};
 
 use super::{Gpu, ReadError, Target};
 use crate::{
-    export::{neutral, srgb_from_linear},
-    viewer::{
-        saver::{self, EncodeError},
-        view::ToneMap,
-    },
+    export::ToneMap,
+    scene::srgb_from_linear,
+    viewer::picture_file::{self, EncodeError},
 };
 
 /// The two pictures of what is cut out.
@@ -80,7 +78,7 @@ impl Cutout {
     /// See [`EncodeError`].
     pub fn encode(self, path: &Path) -> Result<Vec<u8>, EncodeError> {
         let (display, radiance) = self.into_images();
-        saver::encode(display, Some(radiance), path)
+        picture_file::encode(display, Some(radiance), path)
     }
 
     /// Both as they are encoded.
@@ -115,10 +113,7 @@ impl CutoutPixel {
             return Rgba([0; 4]);
         }
         let color = self.color / self.coverage;
-        let mapped = match tone_map {
-            ToneMap::Neutral => neutral(color),
-            ToneMap::None => color,
-        };
+        let mapped = tone_map.apply(color);
         let shown = color.lerp(mapped, self.light / self.coverage);
         let byte = |x: f32| (x * 255.0).round() as u8;
         let [r, g, b] = shown

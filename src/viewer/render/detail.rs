@@ -7,7 +7,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::Gpu;
 use crate::{
-    scene::{Appearance, Scene, Texture, TextureId},
+    scene::{Appearance, Scene, Texture, TextureId, srgb_byte},
     solver::DisplayMesh,
 };
 
@@ -54,7 +54,7 @@ pub(super) struct DetailSet {
     is_tame: bool,
     /// Its textures, those that were needed.
     views: Vec<Option<Uploaded>>,
-    /// What each material multiplies its textures by; empty where that is as the scene says.
+    /// Factors of each material on its textures; empty where they are those of the scene.
     appearances: Vec<Appearance>,
     /// Number of the group of each material.
     group_of: Vec<usize>,
@@ -66,7 +66,7 @@ pub(super) struct DetailSet {
 #[derive(Clone)]
 struct Uploaded {
     view: wgpu::TextureView,
-    /// What it must be multiplied by: its brightest channel, where that is above 1.
+    /// Its factor: its brightest channel, where that is above 1.
     scale: f32,
 }
 
@@ -143,8 +143,8 @@ impl DetailSet {
 
     /// Upload the textures of another scene, and take other appearances of materials over.
     pub(super) fn prepare(&mut self, gpu: &Gpu, scene: &Arc<Scene>, appearances: &[Appearance]) {
-        let is_held = |held: &Arc<Scene>| Arc::ptr_eq(held, scene);
-        if !self.scene.as_ref().is_some_and(is_held) {
+        let is_current = |current: &Arc<Scene>| Arc::ptr_eq(current, scene);
+        if !self.scene.as_ref().is_some_and(is_current) {
             self.scene = Some(scene.clone());
             self.is_tame = is_tame(scene);
             self.views = vec![None; scene.textures.len()];
@@ -357,14 +357,4 @@ fn halved((width, height, pixels): &(u32, u32, Vec<Vec3>)) -> (u32, u32, Vec<Vec
         }
     }
     (half_width, half_height, half)
-}
-
-fn srgb_byte(linear: f32) -> u8 {
-    let x = linear.clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    };
-    (encoded * 255.0 + 0.5) as u8
 }

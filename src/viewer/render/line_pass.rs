@@ -109,7 +109,7 @@ impl<T: bytemuck::NoUninit> Instances<T> {
             return;
         }
         self.uploaded = instances.clone();
-        // More than the adapter takes at once are left out, the last first.
+        // More than the adapter takes at once are omitted, the last first.
         let fitting = (gpu.max_buffer_size as usize / size_of::<T>()).min(instances.len());
         let shown = &instances[..fitting];
         self.count = shown.len() as u32;
@@ -160,7 +160,7 @@ fn pipeline(
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(!is_ribbon),
-                // What is selected shows through everything.
+                // The selection shows through everything.
                 depth_compare: Some(if is_ribbon {
                     wgpu::CompareFunction::Always
                 } else {

@@ -65,7 +65,7 @@ impl MeshPass {
         };
         let back = (view.backs || shows_orientation).then_some(&self.back);
         draw_sides(pass, uploads, front_of, back);
-        if shows_edges(view.mode, view.edges)
+        if view.mode.shows_edges(view.edges)
             && let Some((edges, count)) = uploads.mesh().and_then(|mesh| mesh.edges.as_ref())
         {
             pass.set_pipeline(&self.edge);
@@ -130,12 +130,7 @@ fn draw_sides<'p>(
     }
 }
 
-/// Whether edges are drawn over the light, or in its place.
-pub(super) fn shows_edges(mode: ViewMode, edges: bool) -> bool {
-    edges || mode == ViewMode::Elements
-}
-
-/// What a pipeline draws.
+/// The primitives of a pipeline.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Fronts, as the mode shows them.

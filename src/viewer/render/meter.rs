@@ -13,7 +13,7 @@ pub(super) const METER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uin
 /// back, and change the exposure by less than it is rounded to.
 const LONGER_SIDE: u32 = 256;
 
-/// What is drawn into.
+/// Textures of the meter.
 pub(super) struct MeterTarget {
     pub(super) luminance: wgpu::Texture,
     luminance_view: wgpu::TextureView,

@@ -6,7 +6,6 @@
 
 mod cutout;
 mod detail;
-pub mod headless;
 mod line_pass;
 mod mesh_pass;
 mod meter;
@@ -54,7 +53,7 @@ pub enum RenderError {
     MeshTooLarge {
         /// Size of the largest buffer.
         needed_mib: u64,
-        /// What the adapter takes.
+        /// The limit of the adapter.
         limit_mib: u64,
     },
     /// The picture has more pixels on a side than the adapter takes.
@@ -66,7 +65,7 @@ pub enum RenderError {
         width: u32,
         /// Height asked for.
         height: u32,
-        /// What the adapter takes on a side.
+        /// The limit of the adapter, for a side.
         limit: u32,
     },
 }
@@ -88,12 +87,12 @@ pub struct Gpu {
     pub linear_format: wgpu::TextureFormat,
     /// Largest buffer to make, in bytes; at most what the adapter takes.
     pub max_buffer_size: u64,
-    /// What a device of our own complained of first; the window listens to its device by itself.
+    /// The first error of a device without a window; the window listens to its device by itself.
     pub complaint: Arc<OnceLock<String>>,
 }
 
 impl Gpu {
-    /// What an adapter's device can do.
+    /// Capabilities of an adapter's device.
     pub fn new(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let about = adapter.get_info();
         let features = adapter.get_texture_format_features(LINEAR_FORMAT);
@@ -126,7 +125,7 @@ impl Gpu {
         }
     }
 
-    /// What to ask a device for: the defaults that every adapter has, and buffers as large as this one takes.
+    /// The limits of a device: the defaults that every adapter has, and buffers as large as this one takes.
     pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let offered = adapter.limits();
         let base = if adapter.get_info().backend == wgpu::Backend::Gl {
@@ -205,7 +204,7 @@ pub struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// What is uploaded for it.
+    /// The source of its uploads.
     fn source(&self) -> Source<'a> {
         Source {
             scene: self.scene,
@@ -249,7 +248,7 @@ impl Renderer {
         &self.gpu
     }
 
-    /// What this renderer has uploaded, to begin with on another thread.
+    /// The uploads of this renderer, as a start for another thread.
     pub fn uploads(&self) -> Uploads {
         self.uploads.clone()
     }
@@ -298,7 +297,7 @@ impl Renderer {
         picture: &Picture<'_>,
         draw: impl FnOnce(&mut Self, &Uploads) -> T,
     ) -> Result<T, RenderError> {
-        // Taken out, so that nothing is held twice while the next is made.
+        // Taken out, so that no buffer exists twice while the next is made.
         let empty = Uploads::new(self.uploads.details().clone());
         let mut uploads = std::mem::replace(&mut self.uploads, empty);
         let result = uploads.renew(&self.gpu, &picture.source());

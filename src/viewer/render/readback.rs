@@ -160,7 +160,7 @@ impl Readback {
     }
 }
 
-/// What the device complained of first, or this error.
+/// The first error of the device, or this error.
 fn failure(gpu: &Gpu, error: &dyn std::fmt::Display) -> ReadError {
     let said = gpu.complaint.get().cloned();
     ReadError(said.unwrap_or_else(|| error.to_string()))

@@ -1,4 +1,4 @@
-//! What pictures are drawn into: a linear picture with depth, and the display picture that is made of it.
+//! Targets of pictures: a linear picture with depth, and the display picture that is made of it.
 
 use glam::Vec4;
 

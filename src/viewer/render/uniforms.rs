@@ -1,9 +1,9 @@
-//! What every pass knows of the picture, in one uniform buffer. Twin of `View` in view.wgsl.
+//! Parameters of the picture for every pass, in one uniform buffer. Twin of `View` in view.wgsl.
 
 use std::num::NonZeroU64;
 
 use super::{super::theme, Picture};
-use crate::viewer::view::{ToneMap, ViewMode};
+use crate::{export::ToneMap, viewer::view::ViewMode};
 
 /// Floats of `View`: a matrix, five vectors, nine ramp colours.
 const FLOAT_COUNT: usize = 16 + 5 * 4 + 9 * 4;

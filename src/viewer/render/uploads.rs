@@ -1,4 +1,4 @@
-//! What the adapter holds of a scene: mesh, light, textures, cluster boxes. Made again only where the `Arc` that a part
+//! Uploads of a scene to the adapter: mesh, light, textures, cluster boxes. Made again only where the `Arc` that a part
 //! comes from is another, on whatever thread; copies share the buffers, so that one can be drawn from while the next is
 //! being made.
 
@@ -8,7 +8,6 @@ use super::{
     BoxInstance, Gpu, RenderError,
     detail::{DetailSet, DrawRange},
     line_pass::Instances,
-    mesh_pass::shows_edges,
 };
 use crate::{
     scene::Scene,
@@ -16,7 +15,7 @@ use crate::{
     viewer::view::ViewMode,
 };
 
-/// What is to be uploaded.
+/// The source of uploads.
 pub struct Source<'a> {
     /// Materials and textures.
     pub scene: &'a Arc<Scene>,
@@ -34,7 +33,7 @@ pub struct Source<'a> {
     pub boxes: &'a Arc<Vec<BoxInstance>>,
 }
 
-/// What the adapter holds. Cheap to clone.
+/// Uploads to the adapter. Cheap to clone.
 #[derive(Clone)]
 pub struct Uploads {
     details: DetailSet,
@@ -62,7 +61,7 @@ impl Uploads {
         self.boxes.prepare(gpu, "boxes", source.boxes);
         self.details
             .prepare(gpu, source.scene, &source.mesh.appearances);
-        let is_current = |held: &MeshBuffers| Arc::ptr_eq(&held.source, source.mesh);
+        let is_current = |current: &MeshBuffers| Arc::ptr_eq(&current.source, source.mesh);
         if !self.mesh.as_ref().is_some_and(is_current) {
             // Nobody holds on to the old mesh here: two large ones may not fit.
             (self.mesh, self.light) = (None, None);
@@ -73,13 +72,13 @@ impl Uploads {
             self.mesh = Some(MeshBuffers::new(gpu, source, &self.details));
         }
         let wanted = LightSource::of(source);
-        let is_held = |(held, _): &(LightSource, wgpu::Buffer)| held.is_same(&wanted);
-        if !self.light.as_ref().is_some_and(is_held) {
+        let is_current = |(current, _): &(LightSource, wgpu::Buffer)| current.is_same(&wanted);
+        if !self.light.as_ref().is_some_and(is_current) {
             let buffer = wanted.upload(gpu, source.mesh.positions.len());
             self.light = Some((wanted, buffer));
         }
         if let Some(mesh) = &mut self.mesh
-            && shows_edges(source.mode, source.edges)
+            && source.mode.shows_edges(source.edges)
         {
             mesh.prepare_edges(gpu);
         }
@@ -125,7 +124,7 @@ impl Channel {
     }
 }
 
-/// What the buffer of light was filled from.
+/// The source of the buffer of light.
 #[derive(Clone)]
 enum LightSource {
     Light(Arc<VertexLight>, Channel),

@@ -1,8 +1,8 @@
 //! The reference thread: traces random surface points pass by pass, and measures every snapshot that is handed in.
 //!
-//! [`TruthHandle`] owns the thread; dropping it cancels the pass under way and joins. What was looked up of a snapshot
-//! is kept and compared anew after each pass, so that the first error shows after a second and all of them, those of
-//! earlier runs too, get better as samples grow. Snapshots themselves are not kept.
+//! [`TruthHandle`] owns the thread; dropping it cancels the pass under way and joins. The radiance of a snapshot at the
+//! points is stored and compared again after each pass, so that the first error shows after a second and all errors,
+//! those of earlier runs too, become more accurate as samples grow. Snapshots themselves are not stored.
 
 mod tracing;
 
@@ -17,7 +17,7 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::{Generation, Wake, Watch, visit::describe};
+use super::{Generation, Wake, Watch, request::describe};
 use crate::{
     geometry::RayTree,
     metrics::ErrorMeasures,
@@ -45,12 +45,12 @@ pub struct VertexErrors {
     pub percent: Arc<Vec<f32>>,
 }
 
-/// What is known so far.
+/// Progress so far.
 #[derive(Clone, Debug, Default)]
 pub struct TruthProgress {
     /// Surface points.
     pub points: usize,
-    /// What means over them are means of.
+    /// The surfaces that the points stand for.
     pub surfaces: SampledSurfaces,
     /// Samples at each of them.
     pub samples: u32,
@@ -62,13 +62,13 @@ pub struct TruthProgress {
     pub vertices: Option<VertexErrors>,
     /// Samples at each vertex, and the share of the next pass that is done.
     pub vertex_samples: (u32, f32),
-    /// Why there will be no more.
+    /// Why tracing failed, where it did.
     pub failed: Option<String>,
 }
 
-/// What the owner wants.
+/// Requests of the owner.
 #[derive(Default)]
-struct Wishes {
+struct Requests {
     waiting: VecDeque<(u64, Arc<Snapshot>)>,
     forgotten: Vec<u64>,
     goal: u32,
@@ -77,9 +77,9 @@ struct Wishes {
     compared: Option<Arc<Snapshot>>,
 }
 
-/// The place where owner and thread meet.
+/// State shared by owner and thread.
 struct Desk {
-    wishes: Mutex<Wishes>,
+    requests: Mutex<Requests>,
     changed: Condvar,
     cancelled: AtomicBool,
     /// Whether the solver is at work: tracing then takes one thread only.
@@ -88,22 +88,22 @@ struct Desk {
 }
 
 impl Desk {
-    fn wishes(&self) -> MutexGuard<'_, Wishes> {
-        // Each wish is put down whole, so a poisoned lock guards nothing broken.
-        self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
+    fn requests(&self) -> MutexGuard<'_, Requests> {
+        // Each request is stored whole, so a poisoned lock guards nothing broken.
+        self.requests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self, change: impl FnOnce(&mut Wishes)) {
-        change(&mut self.wishes());
+    fn change(&self, change: impl FnOnce(&mut Requests)) {
+        change(&mut self.requests());
         self.changed.notify_all();
     }
 
     fn measure(&self, run: u64, snapshot: Arc<Snapshot>) {
-        self.change(|wishes| {
-            if wishes.waiting.len() >= MOST_WAITING {
-                wishes.waiting.pop_front();
+        self.change(|requests| {
+            if requests.waiting.len() >= MOST_WAITING {
+                requests.waiting.pop_front();
             }
-            wishes.waiting.push_back((run, snapshot));
+            requests.waiting.push_back((run, snapshot));
         });
     }
 
@@ -125,9 +125,9 @@ impl TruthHandle {
     /// When the system refuses a thread.
     pub fn spawn(scene: Arc<Scene>, rays: Arc<RayTree>, seed: u64, wake: Wake) -> io::Result<Self> {
         let desk = Arc::new(Desk {
-            wishes: Mutex::new(Wishes {
+            requests: Mutex::new(Requests {
                 goal: SAMPLE_GOAL,
-                ..Wishes::default()
+                ..Requests::default()
             }),
             changed: Condvar::new(),
             cancelled: AtomicBool::new(false),
@@ -169,30 +169,30 @@ impl TruthHandle {
 
     /// Compare the vertices of a snapshot, too, until told otherwise.
     pub fn compare_vertices(&self, snapshot: Option<Arc<Snapshot>>) {
-        self.desk.change(|wishes| wishes.compared = snapshot);
+        self.desk.change(|requests| requests.compared = snapshot);
     }
 
     /// Forget the errors of a run.
     pub fn forget(&self, run: u64) {
-        self.desk.change(|wishes| {
-            wishes.waiting.retain(|(waiting, _)| *waiting != run);
-            wishes.forgotten.push(run);
+        self.desk.change(|requests| {
+            requests.waiting.retain(|(waiting, _)| *waiting != run);
+            requests.forgotten.push(run);
         });
     }
 
     /// Rest, or go on from where it stands. A resting reference still measures.
     pub fn rest(&self, rests: bool) {
-        self.desk.change(|wishes| wishes.rests = rests);
+        self.desk.change(|requests| requests.rests = rests);
     }
 
     /// Whether it was told to rest.
     pub fn rests(&self) -> bool {
-        self.desk.wishes().rests
+        self.desk.requests().rests
     }
 
     /// Trace as many samples again.
     pub fn trace_more(&self) {
-        self.desk.change(|wishes| wishes.goal *= 2);
+        self.desk.change(|requests| requests.goal *= 2);
     }
 
     /// Leave all processors but one to the solver, or take them.
@@ -200,7 +200,7 @@ impl TruthHandle {
         self.desk.yields.store(yields, Ordering::Relaxed);
     }
 
-    /// What is known so far. The same `Arc` as before where there is nothing newer.
+    /// The progress so far. The same `Arc` as before where there is nothing newer.
     pub fn progress(&self) -> Arc<TruthProgress> {
         self.desk
             .newest

@@ -24,7 +24,7 @@ const SAMPLES_PER_PASS: u32 = 16;
 /// Samples at each point before any at vertices: figures come first.
 const FIRST_SAMPLES: u32 = 64;
 
-/// What to do next.
+/// The next task.
 enum Task {
     Measure(u64, Arc<Snapshot>),
     Forget(Vec<u64>),
@@ -111,32 +111,32 @@ impl Tracing {
         }
     }
 
-    /// What is most urgent; waits while there is nothing.
+    /// The most urgent task; waits while there is none.
     fn next_task(&mut self) -> Task {
         let desk = self.desk.clone();
-        let mut wishes = desk.wishes();
+        let mut requests = desk.requests();
         loop {
             if desk.is_cancelled() {
                 return Task::End;
             }
-            self.progress.goal = wishes.goal;
-            if !wishes.forgotten.is_empty() {
-                return Task::Forget(std::mem::take(&mut wishes.forgotten));
+            self.progress.goal = requests.goal;
+            if !requests.forgotten.is_empty() {
+                return Task::Forget(std::mem::take(&mut requests.forgotten));
             }
-            if let Some((run, snapshot)) = wishes.waiting.pop_front() {
+            if let Some((run, snapshot)) = requests.waiting.pop_front() {
                 return Task::Measure(run, snapshot);
             }
-            if !is_same(&wishes.compared, &self.compared) {
-                return Task::CompareVertices(wishes.compared.clone());
+            if !is_same(&requests.compared, &self.compared) {
+                return Task::CompareVertices(requests.compared.clone());
             }
-            if !wishes.rests
-                && let Some(task) = self.tracing_task(wishes.goal)
+            if !requests.rests
+                && let Some(task) = self.tracing_task(requests.goal)
             {
                 return task;
             }
-            wishes = desk
+            requests = desk
                 .changed
-                .wait(wishes)
+                .wait(requests)
                 .unwrap_or_else(PoisonError::into_inner);
         }
     }
@@ -189,10 +189,10 @@ impl Tracing {
         match &snapshot {
             None => self.progress.vertices = None,
             Some(snapshot) => {
-                let held = self.vertices.take();
-                self.vertices = Some(match held {
-                    Some(held) if Arc::ptr_eq(held.mesh(), &snapshot.mesh) => held,
-                    Some(held) => held.on_mesh(&snapshot.mesh),
+                let present = self.vertices.take();
+                self.vertices = Some(match present {
+                    Some(present) if Arc::ptr_eq(present.mesh(), &snapshot.mesh) => present,
+                    Some(present) => present.on_mesh(&snapshot.mesh),
                     // A seed of its own: the same paths as at the points would not be independent of them.
                     None => VertexReference::new(&snapshot.mesh, !self.seed),
                 });
@@ -272,16 +272,16 @@ fn is_same(a: &Option<Arc<Snapshot>>, b: &Option<Arc<Snapshot>>) -> bool {
 
 /// The pool of one thread, or that of one for each core; none where the system refuses threads.
 fn pool(pools: &mut [Option<ThreadPool>; 2], is_narrow: bool) -> Option<&ThreadPool> {
-    let held = &mut pools[usize::from(!is_narrow)];
-    if held.is_none() {
-        *held = ThreadPoolBuilder::new()
+    let pool = &mut pools[usize::from(!is_narrow)];
+    if pool.is_none() {
+        *pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(is_narrow))
             .thread_name(|index| format!("reference {index}"))
             .start_handler(|_| give_way())
             .build()
             .ok();
     }
-    held.as_ref()
+    pool.as_ref()
 }
 
 /// Work in a pool, or in rayon's own where there is none.

@@ -1,4 +1,4 @@
-//! What several of these scenes are put together from.
+//! Parts that several of these scenes share.
 
 use glam::{DVec3, Vec3};
 

@@ -1,0 +1,89 @@
+//! Values of flags: the names and explanations that the enums of other rooms have on the command line.
+
+use clap::{ValueEnum, builder::PossibleValue};
+
+use crate::{
+    export::ToneMap,
+    scene::{Sides, UpAxis},
+    solver::{Direct, Method, Omission, Oracle},
+};
+
+/// Let the variants of an enum be values of flags.
+macro_rules! values {
+    ($type:ty { $($variant:ident = $name:literal $(or $alias:literal)?, $help:literal;)+ }) => {
+        impl ValueEnum for $type {
+            fn value_variants<'a>() -> &'a [Self] {
+                &[$(Self::$variant),+]
+            }
+
+            fn to_possible_value(&self) -> Option<PossibleValue> {
+                Some(match self {
+                    $(Self::$variant => PossibleValue::new($name)$(.alias($alias))?.help($help),)+
+                })
+            }
+        }
+    };
+}
+
+values!(Sides {
+    Auto = "auto", "Closed shells one-sided, sheets two-sided";
+    One = "one", "Counter-clockwise is the front";
+    Two = "two", "Both sides";
+});
+
+values!(UpAxis {
+    Y = "+Y", "+Y";
+    Z = "+Z", "+Z";
+});
+
+values!(ToneMap {
+    None = "none", "Cut off at white";
+    Neutral = "neutral", "Khronos PBR Neutral";
+});
+
+values!(Method {
+    Bounded = "bounded", "Spherical harmonics within bounds";
+    SixFace = "six-face", "Six vectors along the box normals: the paper";
+    Single = "single", "One vector";
+    Exact = "exact", "Sum over all patches";
+    Isotropic = "isotropic", "The same in every direction";
+});
+
+values!(Oracle {
+    Interval = "interval", "Bounds over both boxes";
+    Samples = "samples", "Largest minus smallest over sample pairs: the paper";
+});
+
+values!(Direct {
+    Sampled = "sampled" or "auto", "Shadow rays from every vertex";
+    Linked = "linked", "Over links: the paper";
+});
+
+values!(Omission {
+    Unlit = "unlit", "Surfaces that no light can reach";
+    Rays = "rays", "Rays where nothing can block them";
+    Elements = "elements", "Elements where light varies little and nothing casts a shadow";
+    Clusters = "clusters", "Links of clusters where nothing casts a shadow and there are few patches";
+});
+
+/// The name of a value on the command line.
+pub(super) fn name_of(value: &impl ValueEnum) -> String {
+    let value = value.to_possible_value();
+    value.map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_named_as_in_reports() {
+        for omission in Omission::ALL {
+            assert_eq!(name_of(&omission), omission.name());
+        }
+        for up in [UpAxis::Y, UpAxis::Z] {
+            assert_eq!(name_of(&up), up.name());
+        }
+        assert_eq!(Direct::from_str("auto", false), Ok(Direct::Sampled));
+    }
+}
