@@ -55,6 +55,8 @@ struct Script {
     relit: Mutex<Vec<f32>>,
     /// How often a rough light was worked out.
     finished: AtomicU32,
+    /// How often the light of a step was finished.
+    finished_steps: AtomicU32,
     /// Emission that steppers were made for.
     made_for: Mutex<Vec<Option<f32>>>,
 }
@@ -83,6 +85,14 @@ impl Stepper for FakeSolver {
             memory_bytes: self.script.memory_bytes,
             epsilon: self.settings.epsilon,
             is_final: self.step >= self.script.steps.max(self.settings.max_steps),
+            ..StepReport::default()
+        })
+    }
+
+    fn finish(&mut self, _: &Cancel) -> Option<StepReport> {
+        self.script.finished_steps.fetch_add(1, Ordering::SeqCst);
+        Some(StepReport {
+            step: self.step,
             ..StepReport::default()
         })
     }
@@ -592,6 +602,50 @@ fn the_time_limit_interrupts_a_step_and_continue_grants_it_anew() {
         worker.resume();
     }
     assert_eq!(script.made.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn light_is_finished_before_a_time_limit_that_no_further_step_meets() {
+    let script = Arc::new(Script {
+        step_time: Duration::from_millis(20),
+        steps: u32::MAX,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    let options = RunOptions {
+        time_limit: Some(Duration::from_secs(1)),
+        ..one_thread()
+    };
+    worker.start(triangle(), short(), options);
+    let events = wait_for(&worker, is_finished);
+    assert_eq!(events.last(), Some(&Event::Finished(StopReason::TimeLimit)));
+    let steps: Vec<u32> = events
+        .iter()
+        .filter_map(|event| match event {
+            Event::Stepped(report) => Some(report.step),
+            _ => None,
+        })
+        .collect();
+    let again = steps.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    // Once for each of the last steps, and never for one that another follows in time.
+    let finished = script.finished_steps.load(Ordering::SeqCst) as usize;
+    assert!(
+        (1..=steps.len() / 2).contains(&finished),
+        "{finished} of {steps:?}"
+    );
+    assert_eq!(again, finished, "{steps:?}");
+}
+
+#[test]
+fn without_a_time_limit_only_steps_are_made() {
+    let script = Arc::new(Script {
+        steps: 3,
+        ..Script::default()
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, is_finished);
+    assert_eq!(script.finished_steps.load(Ordering::SeqCst), 0);
 }
 
 #[test]

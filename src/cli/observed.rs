@@ -34,6 +34,10 @@ impl Stepper for ObservedSolver {
         self.solver.step(cancel)
     }
 
+    fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        self.solver.finish(cancel)
+    }
+
     fn snapshot(&self) -> Snapshot {
         let snapshot = self.solver.snapshot();
         (self.observe)(self.solver.scene(), &snapshot);

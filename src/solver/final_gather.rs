@@ -113,8 +113,8 @@ impl Look {
 }
 
 impl Solver {
-    /// Find out by what linked light at vertices is to be multiplied.
-    pub(super) fn final_gather(&mut self, cancel: &Cancel) -> Option<()> {
+    /// Find out by what linked light at vertices is to be multiplied, as well as a step of this fineness needs it.
+    pub(super) fn final_gather(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
         if self.rays.is_clear() {
             return Some(());
         }
@@ -128,7 +128,7 @@ impl Solver {
             .collect();
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         let mut looks = self.looks(&linked);
-        let limits = self.direct_limits(1.0);
+        let limits = self.direct_limits(fineness);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
         let senders = self.senders();
@@ -148,8 +148,9 @@ impl Solver {
             ask(&mut looks, &senders, &received);
         }
         let light = [&linked, &direct].map(Vec::as_slice);
-        self.gathered =
-            self.settled_factors(&mut looks, &senders, &edges, light, received, cancel)?;
+        self.gathered = self.settled_factors(
+            &mut looks, &senders, &edges, light, received, fineness, cancel,
+        )?;
         Some(())
     }
 
@@ -162,11 +163,12 @@ impl Solver {
         edges: &[[usize; 2]],
         [linked, direct]: [&[Vec4]; 2],
         mut received: Vec<Vec4>,
+        fineness: f32,
         cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.hierarchy.mesh;
         let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        let most = SETTLED * self.settings.tolerance * self.mean_irradiance;
+        let most = SETTLED * fineness * self.settings.tolerance * self.mean_irradiance;
         let areas = mesh.areas_about_vertices();
         let mut acceleration = Anderson::new(DEPTH);
         let mut round = 0;

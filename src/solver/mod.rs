@@ -298,7 +298,7 @@ impl Solver {
         cancel.proceed()?;
         self.gathered.clear();
         if self.is_full || report.step >= self.settings.step_count() {
-            self.final_gather(cancel)?;
+            self.final_gather(1.0, cancel)?;
         }
         self.fill(&mut report);
         self.step = report.step;
@@ -309,6 +309,24 @@ impl Solver {
         report.is_final = report.is_full || self.step >= self.settings.step_count();
         self.relighting.end_step(&report);
         Some(report)
+    }
+
+    /// Find the light at the vertices by the final gather, as the last step does, on the links that there are: where no further
+    /// step can end in time. The report is that of the last step once more. `None` when cancelled on the way; the light is then
+    /// that of the last step.
+    pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        let before = std::mem::take(&mut self.gathered);
+        let fineness = self.fineness_of(self.step);
+        let found = self.final_gather(fineness, cancel).and_then(|()| {
+            let mut report = self.relighting.last_report();
+            self.fill(&mut report);
+            self.show(cancel)?;
+            Some(report)
+        });
+        if found.is_none() {
+            self.gathered = before;
+        }
+        found
     }
 
     /// By what the threshold of a step is above the last one's.

@@ -92,6 +92,14 @@ impl Relighting {
         self.last = report.clone();
     }
 
+    /// The figures of the last step, without notes.
+    pub(super) fn last_report(&self) -> StepReport {
+        StepReport {
+            notes: Vec::new(),
+            ..self.last.clone()
+        }
+    }
+
     /// Bytes held.
     pub(super) fn memory_bytes(&self) -> usize {
         let solved = self.solved.as_ref().map_or(0, |solved| {
@@ -149,10 +157,9 @@ impl Solver {
     fn unrefined_report(&self) -> StepReport {
         StepReport {
             sweeps: 0,
-            notes: Vec::new(),
             is_final: false,
             is_full: false,
-            ..self.relighting.last.clone()
+            ..self.relighting.last_report()
         }
     }
 

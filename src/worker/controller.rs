@@ -225,7 +225,10 @@ impl Controller {
             generation: run.generation,
             cancel,
             prepares: matches!(request.task, Task::Prepare(..)),
-            gives_way: matches!(request.task, Task::Step(..) | Task::FinishRelighting(..)),
+            gives_way: matches!(
+                request.task,
+                Task::Step(..) | Task::Finish(..) | Task::FinishRelighting(..)
+            ),
             outdated_since: None,
             abandoned: abandoned.clone(),
         });
@@ -271,6 +274,9 @@ impl Controller {
             }
         };
         run.stepper = Some(completed.stepper);
+        if matches!(completed.outcome, Outcome::Stepped(Some(_), _)) {
+            run.last_step = Some(completed.spent);
+        }
         match completed.outcome {
             Outcome::Prepared(snapshot) => {
                 run.solving += completed.spent;
@@ -278,7 +284,7 @@ impl Controller {
                 let seconds = completed.spent.as_secs_f64();
                 self.outbox.send(generation, Event::Prepared { seconds });
             }
-            Outcome::Stepped(report, snapshot) => {
+            Outcome::Stepped(report, snapshot) | Outcome::Finished(report, snapshot) => {
                 run.solving += completed.spent;
                 self.outbox.publish(generation, snapshot);
                 let event = match report {

@@ -27,6 +27,8 @@ pub(super) enum Task {
     Prepare(MakeStepper, Job, Cancel),
     /// Make one step, unless cancelled.
     Step(Box<dyn Stepper>, Cancel),
+    /// Find the light of the last step as well as its links allow, unless cancelled.
+    Finish(Box<dyn Stepper>, Cancel),
     /// Light the scene with other appearances of its materials, unless cancelled.
     Relight(Box<dyn Stepper>, Arc<[Appearance]>, Cancel),
     /// Compute the light that a relighting omitted, unless cancelled.
@@ -59,6 +61,8 @@ pub(super) enum Outcome {
     Prepared(Snapshot),
     /// A step is done, or was cancelled.
     Stepped(Option<StepReport>, Snapshot),
+    /// The light of the last step is as good as its links allow, or the task was cancelled.
+    Finished(Option<StepReport>, Snapshot),
     /// The light of other appearances is there, or the task was cancelled.
     Relit(Option<Relit>, Snapshot),
     /// The light that a relighting omitted is there, or the task was cancelled.
@@ -97,6 +101,15 @@ impl Task {
                 let spent = begin.elapsed();
                 Completed {
                     outcome: Outcome::Stepped(report, stepper.snapshot()),
+                    stepper,
+                    spent,
+                }
+            }
+            Self::Finish(mut stepper, cancel) => {
+                let report = stepper.finish(&cancel);
+                let spent = begin.elapsed();
+                Completed {
+                    outcome: Outcome::Finished(report, stepper.snapshot()),
                     stepper,
                     spent,
                 }

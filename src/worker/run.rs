@@ -16,6 +16,10 @@ use crate::{
     solver::{Cancel, SolveSettings, StepReport, Subject},
 };
 
+/// A step takes up to about this many times as long as the one before. Smaller, and the time limit ends a step whose time is
+/// then lost; larger, and light is finished that the next step replaces in time.
+const STEP_GROWTH: u32 = 3;
+
 /// The state that a run is to reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Aim {
@@ -67,6 +71,8 @@ pub(super) struct Run {
     pub solving: Duration,
     /// Running time and time spent, in seconds, at the end of the last step.
     last_times: (f64, f64),
+    /// Time that the last step took, until its light is finished or another step begins.
+    pub last_step: Option<Duration>,
 }
 
 impl Run {
@@ -91,6 +97,7 @@ impl Run {
             before: Duration::ZERO,
             solving: Duration::ZERO,
             last_times: (0.0, 0.0),
+            last_step: None,
         }
     }
 
@@ -148,7 +155,12 @@ impl Run {
             Some(stepper) if std::mem::take(&mut self.is_rough) && self.aim != Aim::Run => {
                 Task::FinishRelighting(stepper, cancel)
             }
+            Some(stepper) if self.is_last_in_time() => {
+                self.last_step = None;
+                Task::Finish(stepper, cancel)
+            }
             Some(mut stepper) => {
+                self.last_step = None;
                 if std::mem::take(&mut self.settings_changed) {
                     stepper.change_settings(self.settings.clone());
                 }
@@ -196,6 +208,15 @@ impl Run {
         // A step that was interrupted ran on until now.
         let elapsed = self.before + self.since.elapsed();
         (elapsed.as_secs_f64(), self.solving.as_secs_f64())
+    }
+
+    /// Whether the time limit would end the step after the last one, whose light has not been finished.
+    fn is_last_in_time(&self) -> bool {
+        let needed = self.last_step.map(|step| step * STEP_GROWTH);
+        let left = self
+            .deadline()
+            .map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        needed.zip(left).is_some_and(|(needed, left)| needed > left)
     }
 
     /// Give a report the times of the last step: changing the light is no part of the way there.

@@ -13,6 +13,10 @@ pub trait Stepper: Send {
     /// One step, or `None` when cancelled on the way.
     fn step(&mut self, cancel: &Cancel) -> Option<StepReport>;
 
+    /// Make the light of the last step as good as its links allow, where no further step can end in time. The report is that of
+    /// the step once more; `None` when cancelled on the way.
+    fn finish(&mut self, cancel: &Cancel) -> Option<StepReport>;
+
     /// The state as it stands.
     fn snapshot(&self) -> Snapshot;
 
@@ -63,6 +67,10 @@ pub type MakeStepper = Arc<dyn Fn(Job, &Cancel) -> Option<Box<dyn Stepper>> + Se
 impl Stepper for Solver {
     fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
         Self::step(self, cancel)
+    }
+
+    fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        Self::finish(self, cancel)
     }
 
     fn snapshot(&self) -> Snapshot {
