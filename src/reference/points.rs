@@ -349,7 +349,7 @@ struct ObjectRegion {
 }
 
 impl ObjectRegion {
-    /// The region, where most of the area that counts lies beyond.
+    /// The region, where most of the area that counts lies outside it.
     fn find(
         scene: &Scene,
         counted: &[Side],

@@ -38,7 +38,7 @@ pub struct Selection {
     pub object: Option<usize>,
 }
 
-/// All of it.
+/// The whole state of the window.
 #[derive(Default)]
 pub struct State {
     /// The scene that is shown.
