@@ -7,10 +7,15 @@
 //! a symmetric matrix to given sums (Sinkhorn and Knopp, "Concerning nonnegative matrices and doubly stochastic
 //! matrices", 1967), relaxed so that it settles in few sweeps.
 //!
+//! What emits over links sends as it is: links from it are finer than those over which it receives, so its row says little
+//! about its column (three lamps in a hall, all light linked: 0.95 of their power arrives, 0.91 with factors).
+//!
 //! Energy over that of path tracing at `normal`, before and after: `cornell` 0.9974, 0.9997; `room-1022` 0.9971, 1.0008;
 //! `room-8621` 0.9989, 1.0010; `room-42879` 0.9982, 1.0000; `tiled-room` 0.9944, 1.0002.
 
 use std::f32::consts::PI;
+
+use glam::Vec3;
 
 use super::{
     Cancel, Solver,
@@ -40,11 +45,18 @@ impl Solver {
                 next.clamp(1.0 / MOST_FACTOR, MOST_FACTOR)
             };
             let factors = self.closure_factors(&sums);
+            let emits = |leaf: usize| {
+                !self.is_sampled(leaf) && self.hierarchy.emission_of(leaf) != Vec3::ZERO
+            };
             self.sending = self
                 .sending
                 .iter()
                 .zip(factors)
-                .map(|(sending, factor)| factor.map_or(*sending, |factor| next(sending, factor)))
+                .enumerate()
+                .map(|(leaf, (sending, factor))| match factor {
+                    Some(factor) if !emits(leaf) => next(sending, factor),
+                    _ => *sending,
+                })
                 .collect();
             self.pull();
             cancel.proceed()?;
