@@ -388,7 +388,16 @@ impl DirectField {
             .iter()
             .map(|&leaf| centre_of(hierarchy, leaf))
             .collect();
-        let mut lights = vec![DirectLight::default(); receivers.len()];
+        let expected = |&leaf: &usize| {
+            let exact = |vertex: u32| {
+                self.vertices[vertex as usize]
+                    .unwrap_or_default()
+                    .unoccluded()
+            };
+            let corners = hierarchy.mesh.elements[leaf].vertices.map(exact);
+            DirectLight::expected(corners.into_iter().sum::<Vec4>() / 3.0)
+        };
+        let mut lights: Vec<DirectLight> = unknown.iter().map(expected).collect();
         let samples = limits.shadow_samples;
         self.lights.shoot(
             rays,

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::{
     Cancel,
@@ -74,7 +74,13 @@ impl DirectField {
         let receivers = self.receivers(hierarchy, elements.clone(), is_due);
         let before = self.shot(&receivers);
         for &(vertex, _) in &receivers {
-            self.vertices[vertex as usize].get_or_insert_default();
+            let vertex = vertex as usize;
+            if self.vertices[vertex].is_none() {
+                let exact = |end: u32| self.vertices[end as usize].unwrap_or_default().unoccluded();
+                let ends = hierarchy.mesh.vertices[vertex].ends;
+                let expected = ends.map_or(Vec4::ZERO, |[a, b]| (exact(a) + exact(b)) * 0.5);
+                self.vertices[vertex] = Some(DirectLight::expected(expected));
+            }
         }
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, |_| probing, seed, cancel);

@@ -187,8 +187,9 @@ impl Lights {
         if samples.is_empty() {
             return;
         }
-        let known = (light.tried > 0).then(|| luminance(light.exact));
-        light.exact = self.unoccluded(receiver, known, cut);
+        let expected = luminance(light.exact);
+        let scale = (expected > 0.0 || light.tried > 0).then_some(expected);
+        light.exact = self.unoccluded(receiver, scale, cut);
         light.tried = samples.end.max(light.tried);
         if rays.is_clear() {
             light.arrive_whole();
@@ -388,7 +389,7 @@ impl std::ops::AddAssign for Tally {
 /// What the shadow rays of a point found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DirectLight {
-    /// Irradiance without occlusion.
+    /// Irradiance without occlusion; before the first ray what is expected, 0 for nothing.
     exact: Vec4,
     /// Weights of all rays by colour.
     sent: Vec4,
@@ -403,6 +404,15 @@ pub(super) struct DirectLight {
 }
 
 impl DirectLight {
+    /// Before the first ray, where about this irradiance is expected without occlusion: the light of many emitters is then
+    /// evaluated no finer than that calls for, without asking first how much there is.
+    pub(super) fn expected(exact: Vec4) -> Self {
+        Self {
+            exact,
+            ..Self::default()
+        }
+    }
+
     fn count(&mut self, bundle: &Bundle) {
         self.shot += bundle.shot;
         self.visible += bundle.visible;
