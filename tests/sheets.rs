@@ -8,8 +8,10 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use glam::{DVec3, Vec3};
 use vecrad::{
-    geometry::centroid,
+    geometry::{RayTree, centroid},
     hierarchy::{Hierarchy, Patch},
+    metrics::MeshLookup,
+    reference::{PathSettings, PathTracer, ReferencePoint},
     scene::{Material, MaterialId, Scene, SceneBuilder, Sides, TriangleId},
     solver::{Snapshot, SolveSettings},
 };
@@ -99,11 +101,7 @@ fn hall(turned: usize, sides: Sides) -> Arc<Scene> {
 }
 
 fn solve(scene: &Arc<Scene>) -> Snapshot {
-    let settings = SolveSettings {
-        max_steps: 3,
-        ..SolveSettings::draft()
-    };
-    common::solve(scene, settings).0.snapshot()
+    common::solve(scene, SolveSettings::normal()).0.snapshot()
 }
 
 /// Mean irradiance over what is seen in the hall of a material, and over what is within columns.
@@ -137,25 +135,48 @@ fn means(scene: &Scene, snapshot: &Snapshot, material: &str) -> [f64; 2] {
     sums.map(|(sum, area)| if area > 0.0 { sum / area } else { 0.0 })
 }
 
+/// Irradiance at random points of a material over that of path tracing there, both summed.
+fn share_of_truth(scene: &Arc<Scene>, snapshot: &Snapshot, material: &str) -> f64 {
+    let settings = PathSettings {
+        point_count: 1500,
+        samples_per_pass: 128,
+        ..PathSettings::default()
+    };
+    let mut tracer = PathTracer::new(scene.clone(), Arc::new(RayTree::new(scene)), settings);
+    assert!(tracer.pass(&|| false));
+    let points: Vec<ReferencePoint> = tracer
+        .result()
+        .points
+        .into_iter()
+        .filter(|point| scene.material(point.triangle).name == material)
+        .collect();
+    let shown = MeshLookup::new(scene, &snapshot.mesh).radiance(&snapshot.light, &points);
+    let found: f64 = shown.iter().map(|light| f64::from(light.unwrap().x)).sum();
+    let truth: f64 = points
+        .iter()
+        .map(|point| f64::from(point.radiance().x))
+        .sum();
+    found / truth
+}
+
 #[test]
 fn columns_without_a_core_take_no_light_out_of_a_hall() {
-    let single = hall(usize::MAX, Sides::One);
-    let expected = solve(&single);
     for (turned, sides) in [
+        (usize::MAX, Sides::One),
         (usize::MAX, Sides::Auto),
         (usize::MAX, Sides::Two),
         (3, Sides::Two),
     ] {
         let scene = hall(turned, sides);
         let found = solve(&scene);
-        for material in ["wall", "column"] {
-            let [seen, _] = means(&single, &expected, material);
-            let [same, behind] = means(&scene, &found, material);
-            // A draft: the walls are 2.4 % darker where both sides are linked.
-            let ratio = same / seen;
+        for (material, most) in [("wall", 0.0135), ("column", 0.033)] {
+            let [seen, behind] = means(&scene, &found, material);
+            let share = share_of_truth(&scene, &found, material);
+            // Measured: walls 0.991 to 1.002, columns 0.978 to 1.001; where links are balanced for receivers alone, walls of
+            // two sides have 0.984 to 0.987.
             assert!(
-                (ratio - 1.0).abs() < 0.035 && behind < 0.03 * seen,
-                "{material} {sides:?} {turned}: {ratio} of {seen}, {behind} behind"
+                (share - 1.0).abs() < most && behind < 0.03 * seen,
+                "{material} {sides:?} {turned}: {share} of the truth, {behind} behind"
             );
         }
     }

@@ -31,6 +31,11 @@ const SURPLUS: f32 = 0.1;
 /// colour, more of what lies far off.
 const NEIGHBOURS: u32 = 16;
 
+/// Sums of form factors that are too large by so little that they must be multiplied by more than this are treated as
+/// those that are too small: both are noise. Smaller, and what counts too much is taken for dark; larger, and light is
+/// lost on average (halls of sheets 3.5 % too dark at `draft` with 1, 2.4 % with 0.8).
+const SLIGHT: f32 = 0.8;
+
 /// How much of a cell's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Closure {
@@ -106,14 +111,14 @@ impl Closure {
 /// darker.
 fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
     let color = light.truncate();
-    if factor <= 1.0 || light.w <= 0.0 {
+    if factor <= SLIGHT || light.w <= 0.0 {
         return (color * factor).extend(light.w);
     }
     let seen = color / light.w;
     let is_darker = luminance(nearby.extend(0.0)) < luminance(seen.extend(0.0));
     let missing = if is_darker { nearby } else { seen };
     let whole = color + missing * ((factor - 1.0) * light.w);
-    whole.extend(light.w)
+    whole.max(Vec3::ZERO).extend(light.w)
 }
 
 /// Closures of the cells of a mesh: of its leaves as they were before light was known.
