@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
-    beyond::Beyond,
-    contact::carry_over,
-    direct::{DirectLight, Lights, Receiver},
+    direct::{DirectLight, Lights},
+    offset_places::OffsetPlaces,
+    places::{Receiver, carry_over, centre_of, share_root},
     reconstruct::{LeafLight, project},
     smooth,
 };
@@ -73,8 +73,8 @@ pub(super) struct DirectField {
     pub(super) covered: usize,
     /// Shadow rays that these corners have where it takes all.
     pub(super) samples: u32,
-    /// Vertices beyond walls.
-    pub(super) beyond: Beyond,
+    /// Vertices behind walls.
+    pub(super) offsets: OffsetPlaces,
     /// Irradiance to show by vertex; shorter than the vertices where some are new.
     shown: Vec<Vec4>,
     /// Whether the number of elements kept the last adaptation from being finer.
@@ -148,31 +148,6 @@ pub(super) fn bent_under(
     bent.map(|light| light.element).collect()
 }
 
-/// Root of an element's share of the area: what an error on it counts.
-pub(super) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
-    let area = hierarchy.mesh.elements[element].area_vector.length();
-    hierarchy.share_of_area(element, area).sqrt()
-}
-
-/// The same for each vertex: a third of the leaves about it is its own.
-pub(super) fn vertex_share_roots(hierarchy: &Hierarchy) -> Vec<f32> {
-    let mesh = &hierarchy.mesh;
-    let shares = mesh.sums_about_vertices(|leaf| {
-        hierarchy.share_of_area(leaf, mesh.elements[leaf].area_vector.length())
-    });
-    shares.into_iter().map(|sum| (sum / 3.0).sqrt()).collect()
-}
-
-/// The centroid of an element, as a place to be lit.
-pub(super) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
-    let patch = hierarchy.patch_of(element);
-    Receiver {
-        point: hierarchy.mesh.elements[element].centroid,
-        normal: patch.normal,
-        triangle: patch.triangle,
-    }
-}
-
 impl DirectField {
     /// Nothing is known yet.
     pub(super) fn new(lights: Lights) -> Self {
@@ -182,7 +157,7 @@ impl DirectField {
             centres: Vec::new(),
             covered: 0,
             samples: 0,
-            beyond: Beyond::default(),
+            offsets: OffsetPlaces::default(),
             shown: Vec::new(),
             is_full: false,
         }
@@ -456,6 +431,6 @@ impl DirectField {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
             + size_of_val(self.shown.as_slice())
-            + self.beyond.memory_bytes()
+            + self.offsets.memory_bytes()
     }
 }

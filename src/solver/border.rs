@@ -2,8 +2,9 @@
 //! contrast with what surrounds it, though the element is small.
 
 use super::{
-    adapt::{DirectField, Limits, SPREAD_SHARE, share_root},
+    adapt::{DirectField, Limits, SPREAD_SHARE},
     direct::DirectLight,
+    places::share_root,
 };
 use crate::{hierarchy::Hierarchy, transport::luminance};
 

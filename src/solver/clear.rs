@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::{
     Solver,
-    adapt::{Limits, SPREAD_SHARE, share_root},
+    adapt::{Limits, SPREAD_SHARE},
     closure::{Closure, Closures},
-    direct::{Lights, Receiver},
-    reconstruct::INSET,
+    direct::Lights,
+    places::{INSET, Receiver, share_root},
 };
 use crate::{hierarchy::Hierarchy, transport::luminance};
 

@@ -3,13 +3,13 @@
 //! An element that reaches out from under an object is dark in part. As a whole it would show a smudge beside the
 //! object; so it is divided until what is left of it is small, and that shows the light of its open corners.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Cancel, Solver, reconstruct::inset};
+use super::{Cancel, Solver, places::inset};
 use crate::{
     geometry::RayTree,
-    hierarchy::{Element, Hierarchy, Mesh},
+    hierarchy::{Element, Hierarchy},
     scene::{Scene, TriangleId},
 };
 
@@ -46,9 +46,6 @@ const LEAST_BACKS: usize = 2;
 
 /// Probes that may meet what may be lit.
 const MOST_LIT: usize = 1;
-
-/// Elements over which light is carried at most: vertices under an object and those beside them.
-const CARRIED: u32 = 2;
 
 impl Solver {
     /// Divide elements that lie under an object in part.
@@ -152,7 +149,7 @@ impl Solver {
     }
 }
 
-/// Which corners of an element, and whether its centroid, lie within a solid or beyond a wall, as [`Element::inside_solid`] has
+/// Which corners of an element, and whether its centroid, lie within a solid or behind a wall, as [`Element::inside_solid`] has
 /// it; and the rays shot. `scene` where it has solids.
 fn probe(
     scene: Option<&Scene>,
@@ -171,8 +168,8 @@ fn probe(
         let (is_covered, count) = match in_solid {
             (true, count) => (true, count),
             (false, count) => {
-                let (is_beyond, more) = is_beyond(rays, hierarchy, element, point);
-                (is_beyond, count + more)
+                let (is_behind, more) = is_behind_wall(rays, hierarchy, element, point);
+                (is_behind, count + more)
             }
         };
         covered |= u8::from(is_covered) << place;
@@ -230,9 +227,9 @@ fn is_in_solid(
     }
 }
 
-/// Whether a point of an element lies beyond a wall: backs are met from there and nothing that is lit, or one among many:
+/// Whether a point of an element lies behind a wall: backs are met from there and nothing that is lit, or one among many:
 /// another that reaches into the wall. And the rays shot.
-pub(super) fn is_beyond(
+pub(super) fn is_behind_wall(
     rays: &RayTree,
     hierarchy: &Hierarchy,
     element: usize,
@@ -257,48 +254,4 @@ pub(super) fn is_beyond(
         }
     }
     (backs >= LEAST_BACKS * (1 + lit), shot as u64)
-}
-
-/// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,
-/// the mean of those of these elements at which one does.
-pub(super) fn carry_over(
-    mesh: &Mesh,
-    tells: impl Fn(&Element, usize) -> bool,
-    values: &mut [Vec4],
-) {
-    let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
-    let contacts: Vec<usize> = mesh.active_leaves().filter(is_contact).collect();
-    if contacts.is_empty() {
-        return;
-    }
-    let mut told = vec![false; values.len()];
-    for leaf in mesh.active_leaves() {
-        let element = &mesh.elements[leaf];
-        for (side, vertex) in element.vertices.into_iter().enumerate() {
-            told[vertex as usize] |= tells(element, side);
-        }
-    }
-    for _ in 0..CARRIED {
-        let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
-        for &leaf in &contacts {
-            let element = &mesh.elements[leaf];
-            let area = element.area_vector.length();
-            let (from, to): (Vec<usize>, Vec<usize>) = element
-                .vertices
-                .into_iter()
-                .map(|vertex| vertex as usize)
-                .partition(|&vertex| told[vertex]);
-            for &from in &from {
-                for &to in &to {
-                    sums[to].0 += values[from] * area;
-                    sums[to].1 += area;
-                }
-            }
-        }
-        for (vertex, (sum, weight)) in sums.into_iter().enumerate() {
-            if weight > 0.0 {
-                (values[vertex], told[vertex]) = (sum / weight, true);
-            }
-        }
-    }
 }

@@ -3,13 +3,13 @@
 
 use std::ops::Range;
 
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
 use super::{
     Cancel,
-    adapt::{DirectField, Limits, vertex_share_roots},
-    direct::{DirectLight, Receiver, Tally},
-    reconstruct::inset,
+    adapt::{DirectField, Limits},
+    direct::{DirectLight, Tally},
+    places::{Receiver, vertex_share_roots},
 };
 use crate::{geometry::RayTree, hierarchy::Hierarchy};
 
@@ -258,7 +258,7 @@ impl DirectField {
         neighbours.iter().enumerate().map(is_disputed).collect()
     }
 
-    /// As [`super::beyond::Beyond::vertex_places`] has it, by what is known of each vertex.
+    /// As [`super::offset_places::OffsetPlaces::vertex_places`] has it, by what is known of each vertex.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
@@ -269,67 +269,6 @@ impl DirectField {
         let is_wanted: Vec<bool> = known
             .map(|(vertex, light)| is_wanted(vertex, *light))
             .collect();
-        self.beyond.vertex_places(hierarchy, elements, &is_wanted)
+        self.offsets.vertex_places(hierarchy, elements, &is_wanted)
     }
-}
-
-/// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal
-/// is nearest to the mean normal about the vertex, of those that are not within a solid there.
-pub(super) fn vertex_places(
-    hierarchy: &Hierarchy,
-    elements: Range<usize>,
-    is_wanted: &[bool],
-) -> Vec<(u32, Receiver)> {
-    let mesh = &hierarchy.mesh;
-    let about_wanted: Vec<usize> = mesh
-        .leaves_among(elements)
-        .filter(|&leaf| {
-            let corners = mesh.elements[leaf].vertices;
-            corners.iter().any(|&vertex| is_wanted[vertex as usize])
-        })
-        .collect();
-    let mut normals = vec![Vec3::ZERO; mesh.vertices.len()];
-    for &leaf in &about_wanted {
-        for &vertex in &mesh.elements[leaf].vertices {
-            normals[vertex as usize] += mesh.elements[leaf].area_vector;
-        }
-    }
-    /// How fit a leaf is, and which one it is.
-    type Choice = ((bool, f32), u32);
-    let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
-    for leaf in about_wanted.into_iter().filter(|&leaf| mesh.is_held(leaf)) {
-        let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
-        for (side, vertex) in element.vertices.into_iter().enumerate() {
-            let vertex = vertex as usize;
-            let fitness = (
-                !element.is_inside_solid_at(side),
-                normals[vertex].dot(normal),
-            );
-            let is_best = chosen[vertex].is_none_or(|(best, _)| fitness > best);
-            if is_best && is_wanted[vertex] {
-                chosen[vertex] = Some((fitness, leaf as u32));
-            }
-        }
-    }
-    let receiver = |(vertex, choice): (usize, Option<Choice>)| {
-        let (_, leaf) = choice?;
-        let patch = hierarchy.patch_of(leaf as usize);
-        let element = &mesh.elements[leaf as usize];
-        let inset = inset(element, mesh.corners(leaf as usize));
-        let point = mesh.position(vertex as u32).lerp(element.centroid, inset);
-        let normal = normals[vertex].try_normalize().unwrap_or(patch.normal);
-        Some((
-            vertex as u32,
-            Receiver {
-                point,
-                normal,
-                triangle: patch.triangle,
-            },
-        ))
-    };
-    chosen
-        .into_iter()
-        .enumerate()
-        .filter_map(receiver)
-        .collect()
 }

@@ -13,12 +13,11 @@ use rayon::prelude::*;
 
 use super::{
     Cancel, Solver,
-    adapt::{Limits, vertex_share_roots},
+    adapt::Limits,
     anderson::Anderson,
-    beyond::Beyond,
-    contact::carry_over,
-    direct::Receiver,
     gathered::{Gathered, factors},
+    offset_places::OffsetPlaces,
+    places::{Receiver, carry_over, vertex_share_roots},
     reconstruct::VertexMeans,
 };
 use crate::{
@@ -148,21 +147,19 @@ impl Solver {
             ask(&mut looks, &senders, &received);
         }
         let light = [&linked, &direct].map(Vec::as_slice);
-        self.gathered = self.settled_factors(
-            &mut looks, &senders, &edges, light, received, fineness, cancel,
-        )?;
+        self.gathered =
+            self.settled_factors(&mut looks, &senders, &edges, light, fineness, cancel)?;
         Some(())
     }
 
-    /// Correct the light at the vertices by what rays found where `received` was, ask them again, and so on until nothing
-    /// changes. Returns factors by vertex.
+    /// Correct linked and direct light at the vertices by what rays found, ask them again, and so on until nothing changes.
+    /// Returns factors by vertex.
     fn settled_factors(
         &self,
         looks: &mut [Look],
         senders: &[Sender],
         edges: &[[usize; 2]],
         [linked, direct]: [&[Vec4]; 2],
-        mut received: Vec<Vec4>,
         fineness: f32,
         cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
@@ -170,6 +167,7 @@ impl Solver {
         let tells = |element: &Element, side| !element.is_inside_solid_at(side);
         let most = SETTLED * fineness * self.settings.tolerance * self.mean_irradiance;
         let areas = mesh.areas_about_vertices();
+        let mut received: Vec<Vec4> = linked.iter().zip(direct).map(|(a, b)| a + b).collect();
         let mut acceleration = Anderson::new(DEPTH);
         let mut round = 0;
         loop {
@@ -224,9 +222,9 @@ impl Solver {
         };
         let all = vec![true; mesh.vertices.len()];
         let elements = 0..mesh.elements.len();
-        let none = Beyond::default();
-        let beyond = self.direct.as_ref().map_or(&none, |field| &field.beyond);
-        let places = beyond.vertex_places(&self.hierarchy, elements, &all);
+        let none = OffsetPlaces::default();
+        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
+        let places = offsets.vertex_places(&self.hierarchy, elements, &all);
         places.into_iter().filter_map(look).collect()
     }
 

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
-    adapt::{DirectField, centre_of},
-    direct::{DirectLight, Lights, Receiver},
+    adapt::DirectField,
+    direct::{DirectLight, Lights},
+    places::{Receiver, centre_of},
 };
 use crate::{
     geometry::RayTree,

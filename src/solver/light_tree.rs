@@ -6,11 +6,7 @@
 
 use glam::{DVec3, Vec3, Vec4};
 
-use super::{
-    direct::{Emitter, Receiver},
-    multipole::Multipole,
-    panel::Panel,
-};
+use super::{emitter::Emitter, multipole::Multipole, panel::Panel, places::Receiver};
 use crate::{geometry::point_irradiance, transport::luminance};
 
 /// Error of a node of a cut, as a share of all light at the point. Cuts have some hundred nodes, whose errors differ in sign but

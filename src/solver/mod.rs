@@ -7,7 +7,7 @@
 mod adapt;
 mod anderson;
 mod balance;
-mod beyond;
+mod before_walls;
 mod border;
 mod budget;
 mod clear;
@@ -16,6 +16,7 @@ mod contact;
 mod cover;
 mod direct;
 mod display;
+mod emitter;
 mod final_gather;
 mod gather;
 mod gathered;
@@ -25,7 +26,10 @@ mod iterate;
 mod light_parts;
 mod light_tree;
 mod multipole;
+mod offset_places;
+mod omission;
 mod panel;
+mod places;
 mod plan;
 mod prober;
 mod reconstruct;
@@ -45,7 +49,8 @@ use std::sync::{
 use glam::{Vec3, Vec4};
 
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
-pub use plan::{Keep, LeftOut, Omission};
+pub use omission::{Keep, Omission};
+pub use plan::LeftOut;
 pub use relight::Relit;
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
@@ -59,9 +64,9 @@ use crate::{
     },
 };
 use adapt::DirectField;
-use beyond::Beyond;
 use closure::Closures;
 use direct::Lights;
+use offset_places::OffsetPlaces;
 use plan::Plan;
 use reconstruct::LeafLight;
 use relight::Relighting;
@@ -337,11 +342,11 @@ impl Solver {
     /// Let each leaf gather once more, for the vertices.
     fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
         let (kernel, closures) = (self.kernel(), &self.closures);
-        let none = Beyond::default();
-        let beyond = self.direct.as_ref().map_or(&none, |field| &field.beyond);
+        let none = OffsetPlaces::default();
+        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
         let links = &self.links;
         self.leaves =
-            reconstruct::gather_leaves(kernel, links, closures, beyond, is_coarse, cancel)?;
+            reconstruct::gather_leaves(kernel, links, closures, offsets, is_coarse, cancel)?;
         Some(())
     }
 

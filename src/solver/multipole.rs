@@ -10,7 +10,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Mat3, Vec3, Vec4};
 
-use super::direct::{Emitter, Receiver};
+use super::{emitter::Emitter, places::Receiver};
 use crate::{
     hierarchy::{Moments, Reading},
     transport::luminance,

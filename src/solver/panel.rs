@@ -8,7 +8,7 @@ use std::{collections::HashMap, f32::consts::PI, ops::Range};
 
 use glam::Vec3;
 
-use super::direct::{Emitter, Receiver};
+use super::{emitter::Emitter, places::Receiver};
 use crate::{
     geometry::outline_irradiance,
     scene::{DisjointSets, HalfEdge, half_edges},

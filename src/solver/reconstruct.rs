@@ -9,39 +9,15 @@ use rayon::prelude::*;
 
 use super::{
     Cancel,
-    beyond::Beyond,
     closure::{Closure, Closures},
-    contact::carry_over,
+    offset_places::OffsetPlaces,
+    places::carry_over,
 };
 use crate::{
-    geometry::{RAY_OFFSET, Vectors4},
-    hierarchy::{Element, Hierarchy, Kind, NodeId},
+    geometry::Vectors4,
+    hierarchy::{Hierarchy, Kind, NodeId},
     transport::{Kernel, Link, LinkStore, Sights, self_irradiance},
 };
-
-/// Corners are moved this share of the way to the centroid before light is evaluated there: exactly on an edge, a
-/// neighbour at an angle would be seen edge-on, or from within the object that stands on it.
-pub(super) const INSET: f32 = 0.02;
-
-/// Distance from its edges at which light of an element is evaluated at least, if it is so wide: what is nearer than
-/// [`RAY_OFFSET`] a ray does not see, and a wall stands on many an edge.
-const CLEARANCE: f32 = 2.0 * RAY_OFFSET;
-
-/// But never further than this share of the way to the centroid. More, and small elements show light of another place; less,
-/// and narrow ones along walls show light of beyond.
-const MOST_INSET: f32 = 0.2;
-
-/// Share of the way to the centroid at which light of the corners of an element is evaluated; `corners` are where they are.
-pub(super) fn inset(element: &Element, [a, b, c]: [Vec3; 3]) -> f32 {
-    let longest = (a - b).length().max((b - c).length()).max((c - a).length());
-    // From the centroid to an edge is a third of the height above that.
-    let distance = 2.0 / 3.0 * element.area_vector.length() / longest.max(f32::MIN_POSITIVE);
-    if distance * INSET >= CLEARANCE {
-        INSET
-    } else {
-        (CLEARANCE / distance.max(f32::MIN_POSITIVE)).min(MOST_INSET)
-    }
-}
 
 /// Patches of the clusters whose leaves are visited by one task; fewer in small scenes.
 const TASK_PATCHES: u32 = 256;
@@ -74,7 +50,7 @@ pub(super) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
     closures: &Closures,
-    beyond: &Beyond,
+    offsets: &OffsetPlaces,
     is_coarse: bool,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
@@ -91,7 +67,7 @@ pub(super) fn gather_leaves(
                 kernel,
                 links,
                 closures,
-                beyond,
+                offsets,
                 sight_distance,
                 path: Vec::new(),
                 spare: Vec::new(),
@@ -179,7 +155,7 @@ struct Walk<'a> {
     kernel: Kernel<'a>,
     links: &'a LinkStore,
     closures: &'a Closures,
-    beyond: &'a Beyond,
+    offsets: &'a OffsetPlaces,
     /// See [`SIGHT_DISTANCE`].
     sight_distance: f32,
     /// Of the nodes above the current one.
@@ -299,7 +275,9 @@ impl<'a> Walk<'a> {
         }
         light.corners = [light.centre; 3];
         let corners = hierarchy.mesh.corners(index);
-        let [a, b, c] = self.beyond.places(&hierarchy.mesh.elements[index], corners);
+        let [a, b, c] = self
+            .offsets
+            .places(&hierarchy.mesh.elements[index], corners);
         let points = Vectors4::new([centroid, a, b, c]);
         let elements = self.path.iter().flat_map(|chain| chain.own);
         for link in elements.chain(own) {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{THRESHOLD_FACTOR, plan::Keep};
+use super::{THRESHOLD_FACTOR, omission::Keep};
 
 /// How a cluster's directional power and area are represented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

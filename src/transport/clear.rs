@@ -8,11 +8,13 @@
 use glam::{Vec3, Vec4};
 
 use super::{
-    Link, PairSampler, element_form_factor, element_form_factors, luminance,
+    Link, PairSampler, element_form_factor, element_form_factors,
+    kernel::inner_points,
+    luminance,
     refine::{Decision, Refinement, Refiner},
 };
 use crate::{
-    geometry::{Random, Vectors4, centroid, point_irradiances},
+    geometry::{Random, Vectors4, point_irradiances},
     hierarchy::{ElementId, Hierarchy, Kind, NodeId},
 };
 
@@ -26,9 +28,6 @@ const NEAR: f32 = 2.0;
 /// Relative change of a form factor per radius of the receiver over the distance: of the two cosines one, and of the
 /// squared distance two.
 const FAR_CHANGE: f32 = 4.0;
-
-/// Where on the way to its corners a receiver is looked at, beside its centroid.
-const TOWARDS_CORNER: f32 = 0.6;
 
 /// Where a form factor changes by more than this share of its mean, more points are taken: it is peaked where receiver and
 /// source touch, and a few points inside miss some of that.
@@ -90,14 +89,6 @@ impl InView {
             change,
         }
     }
-}
-
-/// The centroid of a triangle, and three points on the way to its corners. Weighed alike they are nearly a rule of degree
-/// 2 whose points lie inside.
-pub(super) fn inner_points(corners: [Vec3; 3]) -> Vectors4 {
-    let middle = centroid(corners);
-    let [a, b, c] = corners.map(|corner| middle.lerp(corner, TOWARDS_CORNER));
-    Vectors4::new([middle, a, b, c])
 }
 
 impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {

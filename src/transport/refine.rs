@@ -7,7 +7,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{
-    Judge, Judgement, Link, clear::inner_points, element_form_factor, element_form_factors,
+    Judge, Judgement, Link, element_form_factor, element_form_factors, kernel::inner_points,
 };
 use glam::Vec3;
 

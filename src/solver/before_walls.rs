@@ -1,84 +1,28 @@
-//! Vertices that lie a little beyond a wall.
+//! Vertices that lie a little behind a wall.
 //!
 //! Boards and boxes are let into walls by a little, so that no gap shows. Their vertices there get nothing, and that would
 //! show as a smudge all over the elements beside them. So where rays from such a vertex meet backs alone, its light is
 //! that of a place further within the element: just before the wall.
 
-use std::{collections::HashMap, ops::Range};
-
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
     Cancel,
     adapt::{DirectField, Limits},
-    contact::is_beyond,
-    cover::vertex_places,
-    direct::{DirectLight, Receiver},
-    reconstruct::inset,
+    contact::is_behind_wall,
+    direct::DirectLight,
+    offset_places::Moved,
+    places::inset,
 };
-use crate::{
-    geometry::RayTree,
-    hierarchy::{Element, Hierarchy},
-    transport::luminance,
-};
+use crate::{geometry::RayTree, hierarchy::Hierarchy, transport::luminance};
 
 /// Shares of the way from a vertex to the centroid of an element at which a place before the wall is looked for. Further
-/// within, light may be another; of an element that lies beyond the wall by more, the dark is not small.
+/// within, light may be another; of an element that lies behind the wall by more, the dark is not small.
 const INSETS: [f32; 3] = [0.2, 0.35, 0.5];
 
 /// Light of a vertex that is looked at, as a share of that at another of an element. Smaller misses vertices where a ray
 /// slips through an edge; larger looks at penumbrae.
 const DARK_SHARE: f32 = 0.1;
-
-/// Where light is evaluated for vertices that lie beyond a wall.
-#[derive(Default)]
-pub(super) struct Beyond {
-    moved: HashMap<u32, Moved>,
-    /// The element at which a vertex was looked at last, or `u32::MAX`.
-    looked_at: Vec<u32>,
-}
-
-/// Where light is evaluated for one of them.
-#[derive(Clone, Copy)]
-struct Moved {
-    place: Vec3,
-    /// Share of the way to the centroid.
-    inset: f32,
-}
-
-impl Beyond {
-    /// Where light of the corners of a leaf is evaluated; `corners` are where they are.
-    pub(super) fn places(&self, element: &Element, corners: [Vec3; 3]) -> [Vec3; 3] {
-        let usual = inset(element, corners);
-        [0, 1, 2].map(|side| {
-            let moved = self.moved.get(&element.vertices[side]);
-            let inset = moved.map_or(usual, |moved| moved.inset);
-            corners[side].lerp(element.centroid, inset)
-        })
-    }
-
-    /// As [`vertex_places`], but for vertices beyond walls before these.
-    pub(super) fn vertex_places(
-        &self,
-        hierarchy: &Hierarchy,
-        elements: Range<usize>,
-        is_wanted: &[bool],
-    ) -> Vec<(u32, Receiver)> {
-        let mut places = vertex_places(hierarchy, elements, is_wanted);
-        for (vertex, receiver) in &mut places {
-            if let Some(moved) = self.moved.get(vertex) {
-                receiver.point = moved.place;
-            }
-        }
-        places
-    }
-
-    /// Bytes held, about.
-    pub(super) fn memory_bytes(&self) -> usize {
-        size_of_val(self.looked_at.as_slice()) + self.moved.len() * size_of::<(u32, Moved)>()
-    }
-}
 
 impl DirectField {
     /// Find places before the wall for vertices that lie beyond one, and sample there. A vertex is looked at once at each
@@ -91,7 +35,7 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let count = hierarchy.mesh.vertices.len();
-        self.beyond.looked_at.resize(count, u32::MAX);
+        self.offsets.looked_at.resize(count, u32::MAX);
         let found: Vec<(u32, u32, (Option<Moved>, u64))> = self
             .dark_beside_light(hierarchy)
             .into_par_iter()
@@ -108,9 +52,9 @@ impl DirectField {
         let mut is_new = vec![false; count];
         for (vertex, leaf, (moved, rays)) in found {
             shot += rays;
-            self.beyond.looked_at[vertex as usize] = leaf;
+            self.offsets.looked_at[vertex as usize] = leaf;
             if let Some(moved) = moved {
-                self.beyond.moved.insert(vertex, moved);
+                self.offsets.moved.insert(vertex, moved);
                 self.vertices[vertex as usize] = Some(DirectLight::default());
                 is_new[vertex as usize] = true;
             }
@@ -153,12 +97,12 @@ impl DirectField {
         let found = lightest.into_iter().enumerate();
         found
             .filter_map(|(vertex, found)| Some((vertex as u32, found?.1)))
-            .filter(|&(vertex, leaf)| self.beyond.looked_at[vertex as usize] != leaf)
+            .filter(|&(vertex, leaf)| self.offsets.looked_at[vertex as usize] != leaf)
             .collect()
     }
 }
 
-/// Where light of a vertex is to be evaluated within an element, if it lies beyond a wall and a part of the element does
+/// Where light of a vertex is to be evaluated within an element, if it lies behind a wall and a part of the element does
 /// not; and the rays shot.
 fn before_wall(
     rays: &RayTree,
@@ -170,15 +114,15 @@ fn before_wall(
     let element = &mesh.elements[leaf];
     let place = |inset: f32| at.lerp(element.centroid, inset);
     let usual = inset(element, mesh.corners(leaf));
-    let (is_dark, mut ray_count) = is_beyond(rays, hierarchy, leaf, place(usual));
+    let (is_dark, mut ray_count) = is_behind_wall(rays, hierarchy, leaf, place(usual));
     if !is_dark {
         return (None, ray_count);
     }
     for inset in INSETS.into_iter().filter(|&further| further > usual) {
         let place = place(inset);
-        let (is_beyond, shot) = is_beyond(rays, hierarchy, leaf, place);
+        let (is_behind, shot) = is_behind_wall(rays, hierarchy, leaf, place);
         ray_count += shot;
-        if !is_beyond {
+        if !is_behind {
             return (Some(Moved { place, inset }), ray_count);
         }
     }
