@@ -112,8 +112,8 @@ impl Look {
 }
 
 impl Solver {
-    /// Find out by what linked light at vertices is to be multiplied, as well as a step of this fineness needs it.
-    pub(super) fn final_gather(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
+    /// Find out by what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
+    pub(super) fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
         if self.rays.is_clear() {
             return Some(());
         }
@@ -127,7 +127,7 @@ impl Solver {
             .collect();
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         let mut looks = self.looks(&linked);
-        let limits = self.direct_limits(fineness);
+        let limits = self.direct_limits(threshold_scale);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
         let senders = self.senders();
@@ -148,7 +148,7 @@ impl Solver {
         }
         let light = [&linked, &direct].map(Vec::as_slice);
         self.gathered =
-            self.settled_factors(&mut looks, &senders, &edges, light, fineness, cancel)?;
+            self.settled_factors(&mut looks, &senders, &edges, light, threshold_scale, cancel)?;
         Some(())
     }
 
@@ -160,12 +160,12 @@ impl Solver {
         senders: &[Sender],
         edges: &[[usize; 2]],
         [linked, direct]: [&[Vec4]; 2],
-        fineness: f32,
+        threshold_scale: f32,
         cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.hierarchy.mesh;
         let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        let most = SETTLED * fineness * self.settings.tolerance * self.mean_irradiance;
+        let most = SETTLED * threshold_scale * self.settings.tolerance * self.mean_irradiance;
         let areas = mesh.areas_about_vertices();
         let mut received: Vec<Vec4> = linked.iter().zip(direct).map(|(a, b)| a + b).collect();
         let mut acceleration = Anderson::new(DEPTH);

@@ -102,7 +102,7 @@ const THRESHOLD_FACTOR: f32 = 2.0;
 
 /// Steps whose thresholds are at least this many times the last one's are coarse: their links err by more than a few rays
 /// do. Smaller, and the first pictures come later; larger, and they are rougher than their links.
-const COARSE_FINENESS: f32 = 4.0;
+const COARSE_THRESHOLD_SCALE: f32 = 4.0;
 
 /// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
 /// `MOST_RAISES`: then the root's exchange with itself is left.
@@ -248,8 +248,8 @@ impl Solver {
     }
 
     /// Probe closures, of the first mesh.
-    fn probe_closures(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
-        if self.closures.serve(is_coarse(fineness)) {
+    fn probe_closures(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
+        if self.closures.serve(is_coarse(threshold_scale)) {
             return Some(());
         }
         if let Some(closures) = self.closures_in_clear() {
@@ -266,7 +266,7 @@ impl Solver {
             &self.hierarchy,
             &rays,
             &self.closures,
-            is_coarse(fineness),
+            is_coarse(threshold_scale),
             self.settings.seed,
             cancel,
         )?;
@@ -282,24 +282,24 @@ impl Solver {
             step: self.step + 1,
             ..StepReport::default()
         };
-        let fineness = self.fineness_of(report.step);
-        report.epsilon = self.settings.epsilon * fineness;
+        let threshold_scale = self.threshold_scale_of(report.step);
+        report.epsilon = self.settings.epsilon * threshold_scale;
         self.is_full = false;
         self.relighting.begin_step();
-        self.probe_closures(fineness, cancel)?;
-        self.adapt_to_linked(fineness);
-        self.adapt_to_direct(fineness, cancel)?;
+        self.probe_closures(threshold_scale, cancel)?;
+        self.adapt_to_linked(threshold_scale);
+        self.adapt_to_direct(threshold_scale, cancel)?;
         cancel.proceed()?;
         self.pull();
         cancel.proceed()?;
         self.estimate_mean();
-        report.epsilon = self.refine(fineness, cancel)?;
+        report.epsilon = self.refine(threshold_scale, cancel)?;
         self.probe_contacts(cancel)?;
         self.balance(cancel)?;
         // Links that are coarse err by more than light that has not quite settled.
-        let tolerance = self.settings.tolerance * fineness;
+        let tolerance = self.settings.tolerance * threshold_scale;
         self.iterate(&mut report, tolerance, cancel)?;
-        self.gather_for_leaves(is_coarse(fineness), cancel)?;
+        self.gather_for_leaves(is_coarse(threshold_scale), cancel)?;
         cancel.proceed()?;
         self.gathered.clear();
         if self.is_full || report.step >= self.settings.step_count() {
@@ -321,8 +321,8 @@ impl Solver {
     /// that of the last step.
     pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
         let before = std::mem::take(&mut self.gathered);
-        let fineness = self.fineness_of(self.step);
-        let found = self.final_gather(fineness, cancel).and_then(|()| {
+        let threshold_scale = self.threshold_scale_of(self.step);
+        let found = self.final_gather(threshold_scale, cancel).and_then(|()| {
             let mut report = self.relighting.last_report();
             self.fill(&mut report);
             self.show(cancel)?;
@@ -335,7 +335,7 @@ impl Solver {
     }
 
     /// By what the threshold of a step is above the last one's.
-    fn fineness_of(&self, step: u32) -> f32 {
+    fn threshold_scale_of(&self, step: u32) -> f32 {
         THRESHOLD_FACTOR.powi(self.settings.step_count().saturating_sub(step) as i32)
     }
 
@@ -443,8 +443,8 @@ impl Solver {
     }
 
     /// Make direct light known at all vertices, and divide elements where it bends.
-    fn adapt_to_direct(&mut self, fineness: f32, cancel: &Cancel) -> Option<()> {
-        let limits = self.direct_limits(fineness);
+    fn adapt_to_direct(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
+        let limits = self.direct_limits(threshold_scale);
         self.is_full |= !self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
@@ -463,11 +463,11 @@ impl Solver {
     }
 
     /// Where nothing else divides them, divide elements over which the light of the last step bends.
-    fn adapt_to_linked(&mut self, fineness: f32) {
+    fn adapt_to_linked(&mut self, threshold_scale: f32) {
         if !self.plan.follows_light {
             return;
         }
-        let (limits, mean) = (self.direct_limits(fineness), self.mean_irradiance);
+        let (limits, mean) = (self.direct_limits(threshold_scale), self.mean_irradiance);
         let wanted = adapt::bent_under(&self.hierarchy, &self.leaves, limits, mean);
         let fits = self.hierarchy.mesh.fits(&wanted, limits.most_elements);
         self.is_full |= !fits;
@@ -485,17 +485,17 @@ impl Solver {
         }
     }
 
-    fn direct_limits(&self, fineness: f32) -> adapt::Limits {
-        let tolerance = self.settings.mesh_tolerance * fineness;
+    fn direct_limits(&self, threshold_scale: f32) -> adapt::Limits {
+        let tolerance = self.settings.mesh_tolerance * threshold_scale;
         adapt::Limits {
             tolerance,
             // Coarse steps are seen for a moment.
-            contrast: match is_coarse(fineness) {
+            contrast: match is_coarse(threshold_scale) {
                 true => f32::INFINITY,
                 false => border::CONTRAST_TOLERANCE * tolerance,
             },
             min_area: self.min_area(),
-            shadow_samples: self.shadow_samples(is_coarse(fineness)),
+            shadow_samples: self.shadow_samples(is_coarse(threshold_scale)),
             seed: self.settings.seed,
             most_elements: self.most_elements(),
         }
@@ -533,11 +533,11 @@ impl Solver {
         self.mean_irradiance = mean;
     }
 
-    /// Bring the links to the threshold of a fineness; source tables are up to date before and after. Returns the threshold that
+    /// Bring the links to the threshold of a scale; source tables are up to date before and after. Returns the threshold that
     /// they have: where links do not fit into memory, those from before stay, and the first ones are made coarser.
-    fn refine(&mut self, fineness: f32, cancel: &Cancel) -> Option<f32> {
-        let limits = self.direct_limits(fineness);
-        let mut epsilon = self.settings.epsilon * fineness;
+    fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
+        let limits = self.direct_limits(threshold_scale);
+        let mut epsilon = self.settings.epsilon * threshold_scale;
         let (mut passes, mut raises) = (0, 0);
         let mut judged = None;
         while passes < MOST_PASSES {
@@ -624,9 +624,9 @@ impl Solver {
     }
 }
 
-/// Whether a step of this fineness is coarse.
-fn is_coarse(fineness: f32) -> bool {
-    fineness >= COARSE_FINENESS
+/// Whether a step of this threshold scale is coarse.
+fn is_coarse(threshold_scale: f32) -> bool {
+    threshold_scale >= COARSE_THRESHOLD_SCALE
 }
 
 /// A colour that is safe to show: finite and not negative.

@@ -358,10 +358,10 @@ mod tests {
         let mut solver = Solver::new(scene, SolveSettings::normal(), None, &cancel).unwrap();
         let cells = solver.hierarchy().mesh.elements.len();
         let mut probed = Vec::new();
-        for fineness in [16.0, 8.0, 4.0, 2.0, 1.0] {
+        for threshold_scale in [16.0, 8.0, 4.0, 2.0, 1.0] {
             let before = solver.ray_count;
-            solver.probe_closures(fineness, &cancel).unwrap();
-            assert!(solver.closures.serve(is_coarse(fineness)));
+            solver.probe_closures(threshold_scale, &cancel).unwrap();
+            assert!(solver.closures.serve(is_coarse(threshold_scale)));
             assert_eq!(solver.closures.count(), cells);
             probed.push(solver.ray_count - before);
             // Elements that are divided since are no cells.
