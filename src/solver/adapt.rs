@@ -229,6 +229,12 @@ impl DirectField {
             .map_or(Vec4::ZERO, |light| self.lights.bounded(light.irradiance()))
     }
 
+    /// Irradiance at a vertex without occlusion; 0 where it was not sampled.
+    pub(super) fn unoccluded(&self, vertex: u32) -> Vec4 {
+        let light = self.vertices[vertex as usize].unwrap_or_default();
+        light.unoccluded()
+    }
+
     /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot.
     pub(super) fn adapt(
         &mut self,
@@ -364,12 +370,8 @@ impl DirectField {
             .map(|&leaf| centre_of(hierarchy, leaf))
             .collect();
         let expected = |&leaf: &usize| {
-            let exact = |vertex: u32| {
-                self.vertices[vertex as usize]
-                    .unwrap_or_default()
-                    .unoccluded()
-            };
-            let corners = hierarchy.mesh.elements[leaf].vertices.map(exact);
+            let corners = hierarchy.mesh.elements[leaf].vertices;
+            let corners = corners.map(|vertex| self.unoccluded(vertex));
             DirectLight::expected(corners.into_iter().sum::<Vec4>() / 3.0)
         };
         let mut lights: Vec<DirectLight> = unknown.iter().map(expected).collect();

@@ -76,9 +76,10 @@ impl DirectField {
         for &(vertex, _) in &receivers {
             let vertex = vertex as usize;
             if self.vertices[vertex].is_none() {
-                let exact = |end: u32| self.vertices[end as usize].unwrap_or_default().unoccluded();
                 let ends = hierarchy.mesh.vertices[vertex].ends;
-                let expected = ends.map_or(Vec4::ZERO, |[a, b]| (exact(a) + exact(b)) * 0.5);
+                let expected = ends.map_or(Vec4::ZERO, |[a, b]| {
+                    (self.unoccluded(a) + self.unoccluded(b)) * 0.5
+                });
                 self.vertices[vertex] = Some(DirectLight::expected(expected));
             }
         }

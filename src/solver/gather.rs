@@ -147,11 +147,11 @@ fn push_moments(
             incident[place].merge(&above);
         }
     }
-    let held = hierarchy.active_patches();
+    let active = hierarchy.active_patches();
     let project = |patch: usize| {
         let holder = incident.get(holders.of_patch[patch] as usize);
         match holder {
-            Some(holder) if held.contains(&patch) => {
+            Some(holder) if active.contains(&patch) => {
                 holder.project(hierarchy.patches[patch].normal, reading)
             }
             _ => Vec4::ZERO,
