@@ -3,7 +3,7 @@
 //! Room is asked for before links are made and elements divided, so that the limit holds at every moment and what was
 //! computed before stays whole.
 
-use super::{Solver, adapt::DirectField};
+use super::{Solver, direct::DirectField};
 use crate::transport::Link;
 
 /// Bytes for each new link: it is collected in lists that may double, then sorted into the store.

@@ -9,9 +9,8 @@ use rayon::prelude::*;
 
 use super::{
     Solver,
-    adapt::{Limits, SPREAD_SHARE},
-    closure::{Closure, Closures},
-    direct::Lights,
+    coverage::{Closure, Closures},
+    direct::{Lights, Limits, SPREAD_SHARE},
     places::{INSET, Receiver, share_root},
 };
 use crate::{hierarchy::Hierarchy, transport::luminance};

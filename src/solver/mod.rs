@@ -4,42 +4,20 @@
 //! A step lowers the threshold, divides elements where direct light bends, refines the links that exist, iterates
 //! gathering and pushing until the light settles, and gathers once more for the vertices.
 
-mod adapt;
-mod anderson;
-mod balance;
-mod before_walls;
-mod border;
 mod budget;
 mod clear;
-mod closure;
-mod contact;
-mod cover;
+mod coverage;
 mod direct;
-mod display;
-mod emitter;
-mod final_gather;
-mod gather;
-mod gathered;
-mod inspect;
-mod inspection;
-mod iterate;
-mod light_parts;
-mod light_tree;
-mod multipole;
-mod offset_places;
+mod iteration;
 mod omission;
-mod panel;
+mod output;
 mod places;
 mod plan;
-mod prober;
-mod reconstruct;
 mod relight;
-mod report;
-mod seams;
 mod settings;
-mod smooth;
-mod snapshot;
+mod shown;
 mod textures;
+mod vertices;
 
 use std::sync::{
     Arc,
@@ -48,12 +26,14 @@ use std::sync::{
 
 use glam::{Vec3, Vec4};
 
-pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use omission::{Keep, Omission};
+pub use output::{
+    ClusterBox, DisplayMesh, InspectedLink, Inspection, PathNode, Place, Snapshot, StepReport,
+    Subject, VertexLight,
+};
 pub use plan::LeftOut;
 pub use relight::Relit;
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
-pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, StepReport, VertexLight};
 
 use crate::{
     geometry::RayTree,
@@ -63,13 +43,12 @@ use crate::{
         Estimate, Judge, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums, Refiner, luminance,
     },
 };
-use adapt::DirectField;
-use closure::Closures;
-use direct::Lights;
-use offset_places::OffsetPlaces;
+use coverage::Closures;
+use direct::{DirectField, Lights};
+use places::OffsetPlaces;
 use plan::Plan;
-use reconstruct::LeafLight;
 use relight::Relighting;
+use vertices::LeafLight;
 
 /// A request to stop, seen by everything that runs long. Clones share one flag.
 #[derive(Clone, Debug, Default)]
@@ -261,7 +240,7 @@ impl Solver {
             true => Arc::new(RayTree::new(&self.scene)),
             false => self.rays.clone(),
         };
-        let probed = prober::closures(
+        let probed = coverage::closures(
             &self.scene,
             &self.hierarchy,
             &rays,
@@ -345,8 +324,7 @@ impl Solver {
         let none = OffsetPlaces::default();
         let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
         let links = &self.links;
-        self.leaves =
-            reconstruct::gather_leaves(kernel, links, closures, offsets, is_coarse, cancel)?;
+        self.leaves = vertices::gather_leaves(kernel, links, closures, offsets, is_coarse, cancel)?;
         Some(())
     }
 
@@ -456,10 +434,10 @@ impl Solver {
     }
 
     /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
-    fn divide_coarse(&mut self, limits: adapt::Limits) -> bool {
+    fn divide_coarse(&mut self, limits: direct::Limits) -> bool {
         let lights = self.direct.as_ref().map(|field| &field.lights);
         let is_clear = self.plan.follows_light;
-        adapt::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
+        direct::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
     }
 
     /// Where nothing else divides them, divide elements over which the light of the last step bends.
@@ -468,7 +446,7 @@ impl Solver {
             return;
         }
         let (limits, mean) = (self.direct_limits(threshold_scale), self.mean_irradiance);
-        let wanted = adapt::bent_under(&self.hierarchy, &self.leaves, limits, mean);
+        let wanted = vertices::bent_under(&self.hierarchy, &self.leaves, limits, mean);
         let fits = self.hierarchy.mesh.fits(&wanted, limits.most_elements);
         self.is_full |= !fits;
         if fits {
@@ -485,14 +463,14 @@ impl Solver {
         }
     }
 
-    fn direct_limits(&self, threshold_scale: f32) -> adapt::Limits {
+    fn direct_limits(&self, threshold_scale: f32) -> direct::Limits {
         let tolerance = self.settings.mesh_tolerance * threshold_scale;
-        adapt::Limits {
+        direct::Limits {
             tolerance,
             // Coarse steps are seen for a moment.
             contrast: match is_coarse(threshold_scale) {
                 true => f32::INFINITY,
-                false => border::CONTRAST_TOLERANCE * tolerance,
+                false => direct::CONTRAST_TOLERANCE * tolerance,
             },
             min_area: self.min_area(),
             shadow_samples: self.shadow_samples(is_coarse(threshold_scale)),
@@ -519,12 +497,12 @@ impl Solver {
 
     /// Mean irradiance (luminance), to which thresholds relate. Before any link it is guessed from the direct light.
     fn estimate_mean(&mut self) {
-        let mut mean = gather::scale(&self.hierarchy, |leaf| {
+        let mut mean = iteration::scale(&self.hierarchy, |leaf| {
             self.linked[leaf] + self.direct_of(leaf)
         });
         let is_dark = |light: &Vec4| light.truncate() == Vec3::ZERO;
         if self.linked.iter().all(is_dark) {
-            let power = gather::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
+            let power = iteration::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
             let power = power / self.hierarchy.importance.area.max(f64::MIN_POSITIVE);
             let brightest = self.power.brightest(&self.hierarchy, Hierarchy::ROOT);
             // Far surroundings send most of their light past the scene.

@@ -16,9 +16,9 @@ use rayon::prelude::*;
 
 use super::{
     Cancel, Solver, StepReport,
-    iterate::CEILING_SLACK,
-    light_parts::{LightParts, Shooting, common_ratio},
-    reconstruct::LeafLight,
+    direct::{LightParts, Shooting, common_ratio},
+    iteration::CEILING_SLACK,
+    vertices::LeafLight,
 };
 use crate::{
     hierarchy::luminance,

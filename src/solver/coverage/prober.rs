@@ -1,0 +1,375 @@
+//! How closures are found: rays from groups of cells, and from each cell of those groups that are open.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::closure::{Closure, Closures};
+use crate::{
+    geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
+    hierarchy::{Element, Hierarchy},
+    scene::Scene,
+    solver::{Cancel, places::open_places},
+};
+
+/// Share of all rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and open places
+/// take light that is not theirs until the other rays are shot.
+const ROUGH_SHARE: f32 = 0.125;
+
+/// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
+const GROUP_PATCHES: u32 = 64;
+
+/// Boxes of triangles that a ray crosses in usual scenes. Where it crosses many more, rays are saved, and patches share
+/// them in larger groups.
+const USUAL_CROSSINGS: f32 = 64.0;
+
+/// Rays per group, at least.
+const GROUP_RAYS: usize = 24;
+
+/// More rays for groups with more cells than these times [`GROUP_RAYS`].
+const CELLS_PER_RAY: usize = 2;
+
+/// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
+/// `GROUP_RAYS` find closed may yet see a few holes, and where walls are white these few decide.
+const SECOND_RAYS: usize = 100_000;
+
+/// Rays of the second look per group at most.
+const MOST_SECOND_RAYS: usize = 1024;
+
+/// Rays spent on all cells together where the rays of a group did not all meet a lit side, as long as that leaves each
+/// cell between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
+const OPEN_RAYS: usize = 100_000;
+
+/// Rays per cell at least.
+const LEAST_CELL_RAYS: usize = 16;
+
+/// Open cells that are probed one by one. Beyond, neighbours share their rays: a large open scene would wait long for its
+/// first picture, and where all its triangles cross each other, each ray takes long, too.
+const MOST_PROBED_CELLS: usize = 60_000;
+
+/// Groups of neighbours that share their rays, about.
+const MOST_SHARES: usize = 15_000;
+
+/// Rays per cell at most.
+const MOST_CELL_RAYS: usize = 8192;
+
+/// Neighbouring cells of open groups count as closed if that many rays from them met nothing but lit sides. Fewer, and
+/// what leaks goes unseen; more, and few cells of small open scenes are known to be closed.
+const CLOSED_RAYS: f32 = 512.0;
+
+/// What the rays of a cell met.
+#[derive(Clone, Copy, Debug, Default)]
+struct Met {
+    /// Rays that met a lit side.
+    hits: f32,
+    /// Rays that count.
+    rays: f32,
+    /// Rays that began within a solid.
+    within: f32,
+}
+
+impl Met {
+    /// Half a hit and half a miss more, so that no finite number of rays proves a certainty.
+    fn share(self) -> f32 {
+        (self.hits + 0.5) / (self.rays + 1.0)
+    }
+
+    /// Standard error of the share, if it is that of so many rays.
+    fn deviation(self, rays: f32) -> f32 {
+        (self.share() * (1.0 - self.share()) / (rays + 1.0)).sqrt()
+    }
+
+    /// The closure of each of `sharing` cells, by what their rays met and what those of their neighbourhood did.
+    fn closure(self, around: Self, sharing: usize) -> Closure {
+        if self.rays == 0.0 {
+            return Closure::BURIED;
+        }
+        // Of cells that share their rays it is known no better than by a few of their own.
+        let rays = if sharing > 1 {
+            LEAST_CELL_RAYS as f32
+        } else {
+            self.rays
+        };
+        // One ray more that met what those about it do on average: few rays say little.
+        let share = (self.hits + around.share()) / (self.rays + 1.0);
+        Closure::estimated(share, self.deviation(rays))
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            hits: self.hits + other.hits,
+            rays: self.rays + other.rays,
+            within: self.within + other.within,
+        }
+    }
+}
+
+/// The closures of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of
+/// whose rays met lit sides are closed if these are enough to tell; the others are halved for as long as they are several.
+fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure>) {
+    let met = cells.iter().copied().fold(Met::default(), Met::and);
+    if met.hits >= met.rays && met.rays >= CLOSED_RAYS {
+        closures.resize(closures.len() + cells.len(), Closure::CLOSED);
+    } else if let [cell] = cells {
+        closures.push(cell.closure(around, sharing));
+    } else {
+        let (first, second) = cells.split_at(cells.len() / 2);
+        pooled(first, met, sharing, closures);
+        pooled(second, met, sharing, closures);
+    }
+}
+
+/// What is found about the cells of a mesh.
+pub(crate) struct Probed {
+    pub closures: Closures,
+    /// Cells that lie within a solid, in part or as a whole, so far as rays told.
+    pub within: Vec<usize>,
+    pub ray_count: u64,
+}
+
+/// Closures of all cells for coarse links or for others; `None` when cancelled. The cells are those of what is `known`, or,
+/// where nothing is, the leaves of the mesh as it is now.
+pub(crate) fn closures(
+    scene: &Scene,
+    hierarchy: &Hierarchy,
+    rays: &RayTree,
+    known: &Closures,
+    is_coarse: bool,
+    seed: u64,
+    cancel: &Cancel,
+) -> Option<Probed> {
+    let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
+    let prober = Prober {
+        scene,
+        hierarchy,
+        rays,
+        seed,
+        cancel,
+        share: if is_coarse { ROUGH_SHARE } else { 1.0 } / cost,
+    };
+    let count = match known.count() {
+        0 => hierarchy.mesh.elements.len(),
+        count => count,
+    };
+    let groups: Vec<Vec<usize>> = hierarchy
+        .groups((GROUP_PATCHES as f32 * cost) as u32)
+        .into_par_iter()
+        .map(|group| cells(hierarchy, group, count))
+        .filter(|cells| !cells.is_empty())
+        .collect();
+    let (open, looked) = prober.open_groups(&groups);
+    let (found, probed) = prober.probe_groups(&open);
+    cancel.proceed()?;
+    let elements = &hierarchy.mesh.elements[..count];
+    let untold = |element: &Element| match element.is_inside_solid() {
+        true => Closure::BURIED,
+        false => Closure::CLOSED,
+    };
+    let mut of: Vec<Closure> = elements.iter().map(untold).collect();
+    let mut within = Vec::new();
+    let cells = open.into_iter().flatten();
+    for (&cell, (closure, is_within)) in cells.zip(found.into_iter().flatten()) {
+        of[cell] = closure;
+        if is_within {
+            within.push(cell);
+        }
+    }
+    Some(Probed {
+        closures: Closures::new(hierarchy, of, is_coarse),
+        within,
+        ray_count: (looked + probed) as u64,
+    })
+}
+
+/// Shoots the rays of closures. When cancelled, what it finds is incomplete.
+struct Prober<'a> {
+    scene: &'a Scene,
+    hierarchy: &'a Hierarchy,
+    rays: &'a RayTree,
+    seed: u64,
+    cancel: &'a Cancel,
+    /// Rays that are shot, of all that would be if each cost what usual ones do.
+    share: f32,
+}
+
+impl Prober<'_> {
+    /// What is shot of so many rays.
+    fn budget(&self, rays: usize) -> usize {
+        (rays as f32 * self.share) as usize
+    }
+
+    /// What one ray from a cell meets.
+    fn look(&self, cell: usize, number: usize) -> Met {
+        self.probe(cell, 1, number as u32)
+    }
+
+    /// The groups of cells that are not surrounded by lit surfaces, and the rays spent on finding them.
+    fn open_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
+        let look = |group: &[usize], first: usize, count: usize| {
+            (0..count).all(|ray| {
+                !self.cancel.is_cancelled()
+                    && self
+                        .look(group[ray * group.len() / count], first + ray)
+                        .hits
+                        > 0.0
+            })
+        };
+        let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
+        let mut closed: Vec<bool> = groups
+            .par_iter()
+            .map(|group| look(group, 0, first_look(group)))
+            .collect();
+        let mut shot: usize = groups.iter().map(|group| first_look(group)).sum();
+        if closed.iter().any(|is_closed| !is_closed) {
+            let count = (self.budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
+            closed
+                .par_iter_mut()
+                .zip(groups)
+                .filter(|(is_closed, _)| **is_closed)
+                .for_each(|(is_closed, group)| *is_closed = look(group, first_look(group), count));
+            shot += groups.len() * count;
+        }
+        let open = groups
+            .iter()
+            .zip(&closed)
+            .filter(|(_, is_closed)| !**is_closed);
+        (open.map(|(group, _)| group.as_slice()).collect(), shot)
+    }
+
+    /// The closures of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
+    /// them. Where there are many cells, neighbours share their rays.
+    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(Closure, bool)>>, usize) {
+        let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
+        let cells = || groups.iter().copied().flatten();
+        let (cell_count, whole): (usize, f32) = (cells().count(), cells().map(area).sum());
+        let is_shared = cell_count > self.budget(MOST_PROBED_CELLS);
+        let sharing = if is_shared {
+            cell_count.div_ceil(self.budget(MOST_SHARES).max(1))
+        } else {
+            1
+        };
+        let even = sharing as f32 / cell_count.max(1) as f32;
+        let count = |part: &[usize]| {
+            let share = part.iter().map(area).sum::<f32>() / whole;
+            let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
+            (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
+        };
+        let look = |part: &[usize]| match part {
+            [cell] => self.probe(*cell, count(part) as u32, 0),
+            _ => {
+                let count = count(part);
+                let cell = |ray: usize| part[ray * part.len() / count];
+                let met = (0..count).map(|ray| self.look(cell(ray), ray));
+                met.fold(Met::default(), Met::and)
+            }
+        };
+        let found = groups.par_iter().map(|group| {
+            if self.cancel.is_cancelled() {
+                return Vec::new();
+            }
+            let met: Vec<Met> = group.chunks(sharing).map(look).collect();
+            let mut closures = Vec::with_capacity(met.len());
+            pooled(&met, Met::default(), sharing, &mut closures);
+            let is_within = met
+                .iter()
+                .flat_map(|met| std::iter::repeat_n(met.within > 0.0, sharing));
+            let parts = group.chunks(sharing).zip(closures);
+            parts
+                .flat_map(|(part, closure)| std::iter::repeat_n(closure, part.len()))
+                .zip(is_within)
+                .collect()
+        });
+        let shot = groups.iter().flat_map(|group| group.chunks(sharing));
+        let shot = shot.map(count).sum();
+        (found.collect(), shot)
+    }
+
+    /// What some cosine-weighted rays from an element meet; `first` numbers them within the element. Of an element that
+    /// lies within a solid in part it is what its open places see: its links are scaled to that. A ray that meets the
+    /// inside of a solid began there, and does not count.
+    fn probe(&self, element: usize, count: u32, first: u32) -> Met {
+        let mut random = Random::new(self.seed, (u64::from(first) << 32) | element as u64);
+        let shift = random.uniform_2d();
+        let [a, b, c] = self.hierarchy.mesh.corners(element);
+        let patch = self.hierarchy.patch_of(element);
+        let places = open_places(self.hierarchy, element);
+        let mut met = Met::default();
+        for index in 0..count {
+            // Only the directions are stratified: a point from the same sequence would go with its direction.
+            let at = triangle_point(random.uniform_2d());
+            let place = (random.uniform() * places.len() as f32) as usize;
+            let origin: Vec3 = match places.get(place) {
+                Some(&open) => open,
+                None => a * at.x + b * at.y + c * at.z,
+            };
+            let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
+            let hit = self.rays.closest(origin, direction, Some(patch.triangle));
+            let is_lit =
+                hit.is_some_and(|hit| self.hierarchy.patch_met(hit.triangle, direction).is_some());
+            let is_within = hit.is_some_and(|hit| {
+                self.scene.triangles[hit.triangle.index()].bounds_solid
+                    && self.hierarchy.side_met(hit.triangle, direction).is_none()
+            });
+            met.hits += f32::from(u8::from(is_lit));
+            if is_within {
+                met.within += 1.0;
+            } else {
+                met.rays += 1.0;
+            }
+        }
+        met
+    }
+}
+
+/// The elements of a cluster that are not buried and were leaves when there were `count` elements, in the order of its
+/// patches.
+fn cells(hierarchy: &Hierarchy, cluster: usize, count: usize) -> Vec<usize> {
+    let mut cells = Vec::new();
+    let mut pending: Vec<usize> = hierarchy.clusters[cluster].patches().rev().collect();
+    while let Some(index) = pending.pop() {
+        let element = &hierarchy.mesh.elements[index];
+        let is_cell = element.is_leaf() || element.children().start >= count;
+        if !is_cell {
+            pending.extend(element.children().rev());
+        } else if !element.is_inside_solid() {
+            cells.push(index);
+        }
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        scene::{SceneOptions, builtin::find_builtin},
+        solver::{SolveSettings, Solver, is_coarse},
+    };
+
+    #[test]
+    fn coarse_steps_shoot_a_share_of_the_rays_and_fine_ones_look_at_the_same_cells_again() {
+        let scene = find_builtin("room-1022").unwrap().builder();
+        let scene = Arc::new(scene.finish(&SceneOptions::default()).unwrap());
+        let cancel = Cancel::default();
+        let mut solver = Solver::new(scene, SolveSettings::normal(), None, &cancel).unwrap();
+        let cells = solver.hierarchy().mesh.elements.len();
+        let mut probed = Vec::new();
+        for threshold_scale in [16.0, 8.0, 4.0, 2.0, 1.0] {
+            let before = solver.ray_count;
+            solver.probe_closures(threshold_scale, &cancel).unwrap();
+            assert!(solver.closures.serve(is_coarse(threshold_scale)));
+            assert_eq!(solver.closures.count(), cells);
+            probed.push(solver.ray_count - before);
+            // Elements that are divided since are no cells.
+            let leaf = solver.hierarchy.mesh.leaves().next().unwrap();
+            solver.hierarchy.mesh.divide(&[leaf as u32]);
+        }
+        let [rough, _, _, all, _] = probed[..] else {
+            panic!("five steps");
+        };
+        assert!(rough > 0 && 3 * rough < all, "{probed:?}");
+        assert_eq!(probed[1..3], [0, 0]);
+        assert_eq!(probed[4], 0);
+    }
+}

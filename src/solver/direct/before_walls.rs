@@ -1,0 +1,134 @@
+//! Vertices that lie a little behind a wall.
+//!
+//! Boards and boxes are let into walls by a little, so that no gap shows. Their vertices there get nothing, and that would
+//! show as a smudge all over the elements beside them. So where rays from such a vertex meet backs alone, its light is
+//! that of a place further within the element: just before the wall.
+
+use rayon::prelude::*;
+
+use super::{
+    adapt::{DirectField, Limits},
+    lights::DirectLight,
+};
+use crate::{
+    geometry::RayTree,
+    hierarchy::Hierarchy,
+    solver::{
+        Cancel,
+        places::{Moved, inset, is_behind_wall},
+    },
+    transport::luminance,
+};
+
+/// Shares of the way from a vertex to the centroid of an element at which a place before the wall is looked for. Further
+/// within, light may be another; of an element that lies behind the wall by more, the dark is not small.
+const INSETS: [f32; 3] = [0.2, 0.35, 0.5];
+
+/// Light of a vertex that is looked at, as a share of that at another of an element. Smaller misses vertices where a ray
+/// slips through an edge; larger looks at penumbrae.
+const DARK_SHARE: f32 = 0.1;
+
+impl DirectField {
+    /// Find places before the wall for vertices that lie beyond one, and sample there. A vertex is looked at once at each
+    /// element, where it is dark and the element is not. Returns the rays shot.
+    pub(crate) fn move_before_walls(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        limits: Limits,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let count = hierarchy.mesh.vertices.len();
+        self.offsets.looked_at.resize(count, u32::MAX);
+        let found: Vec<(u32, u32, (Option<Moved>, u64))> = self
+            .dark_beside_light(hierarchy)
+            .into_par_iter()
+            .map(|(vertex, leaf)| match cancel.is_cancelled() {
+                true => (vertex, leaf, (None, 0)),
+                false => {
+                    let found = before_wall(rays, hierarchy, vertex, leaf as usize);
+                    (vertex, leaf, found)
+                }
+            })
+            .collect();
+        cancel.proceed()?;
+        let mut shot = 0;
+        let mut is_new = vec![false; count];
+        for (vertex, leaf, (moved, rays)) in found {
+            shot += rays;
+            self.offsets.looked_at[vertex as usize] = leaf;
+            if let Some(moved) = moved {
+                self.offsets.moved.insert(vertex, moved);
+                self.vertices[vertex as usize] = Some(DirectLight::default());
+                is_new[vertex as usize] = true;
+            }
+        }
+        if !is_new.contains(&true) {
+            return Some(shot);
+        }
+        let all = 0..hierarchy.mesh.elements.len();
+        let receivers = self.receivers(hierarchy, all, |vertex, _| is_new[vertex]);
+        let (samples, seed) = (limits.shadow_samples, limits.seed);
+        self.shoot(rays, &receivers, |_| samples, seed, cancel);
+        if cancel.is_cancelled() {
+            self.forget(&receivers);
+            return None;
+        }
+        Some(shot + self.shot(&receivers))
+    }
+
+    /// Vertices that are dark, each with the lightest element about it, if it was not looked at there.
+    fn dark_beside_light(&self, hierarchy: &Hierarchy) -> Vec<(u32, u32)> {
+        let mesh = &hierarchy.mesh;
+        let mut lightest: Vec<Option<(f32, u32)>> = vec![None; self.vertices.len()];
+        for leaf in mesh.active_leaves() {
+            let element = &mesh.elements[leaf];
+            let corners = element.vertices.map(|vertex| vertex as usize);
+            let lights = corners.map(|vertex| self.vertices[vertex].unwrap_or_default());
+            let seen = lights.map(|light| luminance(light.irradiance()));
+            let most = seen.into_iter().fold(0.0, f32::max);
+            if most <= 0.0 || !element.is_outside_solids() {
+                continue;
+            }
+            let is_dark = |&side: &usize| lights[side].shot > 0 && seen[side] <= DARK_SHARE * most;
+            for side in (0..3).filter(is_dark) {
+                let lightest = &mut lightest[corners[side]];
+                if lightest.is_none_or(|(best, _)| most > best) {
+                    *lightest = Some((most, leaf as u32));
+                }
+            }
+        }
+        let found = lightest.into_iter().enumerate();
+        found
+            .filter_map(|(vertex, found)| Some((vertex as u32, found?.1)))
+            .filter(|&(vertex, leaf)| self.offsets.looked_at[vertex as usize] != leaf)
+            .collect()
+    }
+}
+
+/// Where light of a vertex is to be evaluated within an element, if it lies behind a wall and a part of the element does
+/// not; and the rays shot.
+fn before_wall(
+    rays: &RayTree,
+    hierarchy: &Hierarchy,
+    vertex: u32,
+    leaf: usize,
+) -> (Option<Moved>, u64) {
+    let (at, mesh) = (hierarchy.mesh.position(vertex), &hierarchy.mesh);
+    let element = &mesh.elements[leaf];
+    let place = |inset: f32| at.lerp(element.centroid, inset);
+    let usual = inset(element, mesh.corners(leaf));
+    let (is_dark, mut ray_count) = is_behind_wall(rays, hierarchy, leaf, place(usual));
+    if !is_dark {
+        return (None, ray_count);
+    }
+    for inset in INSETS.into_iter().filter(|&further| further > usual) {
+        let place = place(inset);
+        let (is_behind, shot) = is_behind_wall(rays, hierarchy, leaf, place);
+        ray_count += shot;
+        if !is_behind {
+            return (Some(Moved { place, inset }), ray_count);
+        }
+    }
+    (None, ray_count)
+}

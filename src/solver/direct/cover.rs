@@ -1,0 +1,280 @@
+//! Where shadow rays are shot: first few from each vertex, more where neighbours disagree, and as many more as noise calls
+//! for.
+
+use std::ops::Range;
+
+use glam::Vec4;
+
+use super::{
+    adapt::{DirectField, Limits},
+    lights::{DirectLight, Tally},
+};
+use crate::{
+    geometry::RayTree,
+    hierarchy::Hierarchy,
+    solver::{
+        Cancel,
+        places::{Receiver, vertex_share_roots},
+    },
+};
+
+/// Share of the shadow rays that is shot first.
+const PROBING_SHARE: f32 = 0.25;
+
+/// Noise of a point, times the root of its share of the area, that is let be: this share of the tolerance. Larger leaves
+/// blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
+const NOISE_SHARE: f32 = 0.25;
+
+/// Shadow rays of a point at most, in multiples of the usual number.
+const MOST_SAMPLES: u32 = 16;
+
+impl Limits {
+    /// Shadow rays of a point at most.
+    pub(crate) fn most_samples(&self) -> u32 {
+        MOST_SAMPLES * self.shadow_samples
+    }
+
+    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root, by
+    /// what the rays of its neighbours found.
+    pub(crate) fn is_noisy(
+        &self,
+        light: &DirectLight,
+        neighbours: Tally,
+        weight: f32,
+        mean: f32,
+    ) -> bool {
+        let error = light.error_among(neighbours);
+        light.tried < self.most_samples()
+            && (error * weight > NOISE_SHARE * self.tolerance * mean
+                || self.is_grainy(light, error, weight, mean))
+    }
+}
+
+impl DirectField {
+    /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.
+    ///
+    /// A share of the rays comes first. Where those of all other vertices of the same elements agree there is no shadow
+    /// border, and they are enough, unless the vertex itself differs beyond chance. (To count its own rays, too, would be
+    /// biased: where a hundredth of the light arrives, only what few vertices saw would be thinned by more rays.)
+    pub(crate) fn cover(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        samples: u32,
+        seed: u64,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        // A vertex without light is new, and so are all elements about it.
+        let first = if samples > self.samples {
+            0
+        } else {
+            self.covered
+        };
+        let elements = first..hierarchy.mesh.elements.len();
+        if elements.is_empty() {
+            return Some(0);
+        }
+        self.vertices.resize(hierarchy.mesh.vertices.len(), None);
+        let is_due = |_, light: Option<DirectLight>| light.is_none_or(|had| had.tried < samples);
+        let receivers = self.receivers(hierarchy, elements.clone(), is_due);
+        let before = self.shot(&receivers);
+        for &(vertex, _) in &receivers {
+            let vertex = vertex as usize;
+            if self.vertices[vertex].is_none() {
+                let ends = hierarchy.mesh.vertices[vertex].ends;
+                let expected = ends.map_or(Vec4::ZERO, |[a, b]| {
+                    (self.unoccluded(a) + self.unoccluded(b)) * 0.5
+                });
+                self.vertices[vertex] = Some(DirectLight::expected(expected));
+            }
+        }
+        let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
+        self.shoot(rays, &receivers, |_| probing, seed, cancel);
+        let disputed = self.disputed(&self.neighbours(hierarchy, elements.clone()));
+        let rest: Vec<(u32, Receiver)> = receivers
+            .iter()
+            .copied()
+            .filter(|&(vertex, _)| disputed[vertex as usize])
+            .collect();
+        self.shoot(rays, &rest, |_| samples, seed, cancel);
+        if cancel.is_cancelled() {
+            self.forget(&receivers);
+            return None;
+        }
+        self.covered = elements.end;
+        self.samples = self.samples.max(samples);
+        Some(self.shot(&receivers) - before)
+    }
+
+    /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
+    pub(crate) fn settle(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        limits: Limits,
+        mean: f32,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let weights = vertex_share_roots(hierarchy);
+        let all = 0..hierarchy.mesh.elements.len();
+        let neighbours = self.neighbours(hierarchy, all.clone());
+        // Where no contrast counts, nothing is doubtful.
+        let disputed = limits
+            .contrast
+            .is_finite()
+            .then(|| self.disputed(&neighbours));
+        let may_be_noisy = |vertex: usize, light: &DirectLight| {
+            let is_disputed = || disputed.as_ref().is_some_and(|disputed| disputed[vertex]);
+            limits.is_noisy(light, neighbours[vertex], weights[vertex], mean)
+                || is_disputed() && limits.is_doubtful(light, weights[vertex], mean)
+        };
+        let is_noisy = |vertex: usize, light: Option<DirectLight>| {
+            light.is_some_and(|light| may_be_noisy(vertex, &light))
+        };
+        let mut known = self.vertices.iter().enumerate();
+        if !known.any(|(vertex, light)| is_noisy(vertex, *light)) {
+            return Some(0);
+        }
+        let receivers = self.receivers(hierarchy, all, is_noisy);
+        let before = self.shot(&receivers);
+        let mut known = self.known(&receivers);
+        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
+        let noisy =
+            |index: usize, light: &DirectLight| may_be_noisy(receivers[index].0 as usize, light);
+        self.double(rays, &places, noisy, limits.seed, &mut known, cancel)?;
+        self.learn(&receivers, known);
+        Some(self.shot(&receivers) - before)
+    }
+
+    /// Double the rays of points for as long as they are too noisy.
+    pub(crate) fn double(
+        &self,
+        rays: &RayTree,
+        receivers: &[Receiver],
+        is_noisy: impl Fn(usize, &DirectLight) -> bool,
+        seed: u64,
+        known: &mut [DirectLight],
+        cancel: &Cancel,
+    ) -> Option<()> {
+        loop {
+            let noisy: Vec<usize> = (0..known.len())
+                .filter(|&index| is_noisy(index, &known[index]))
+                .collect();
+            if noisy.is_empty() {
+                return Some(());
+            }
+            let places: Vec<Receiver> = noisy.iter().map(|&index| receivers[index]).collect();
+            let mut lights: Vec<DirectLight> = noisy.iter().map(|&index| known[index]).collect();
+            self.lights.shoot(
+                rays,
+                &places,
+                |light| 2 * light.tried,
+                seed,
+                &mut lights,
+                cancel,
+            );
+            cancel.proceed()?;
+            for (index, light) in noisy.into_iter().zip(lights) {
+                known[index] = light;
+            }
+        }
+    }
+
+    /// What is known of some vertices.
+    fn known(&self, receivers: &[(u32, Receiver)]) -> Vec<DirectLight> {
+        let known = |&(vertex, _): &(u32, Receiver)| self.vertices[vertex as usize];
+        receivers
+            .iter()
+            .map(|receiver| known(receiver).unwrap_or_default())
+            .collect()
+    }
+
+    /// What is now known of some vertices.
+    fn learn(&mut self, receivers: &[(u32, Receiver)], known: Vec<DirectLight>) {
+        for (&(vertex, _), light) in receivers.iter().zip(known) {
+            self.vertices[vertex as usize] = Some(light);
+        }
+    }
+
+    /// Have some vertices sampled anew.
+    pub(crate) fn forget(&mut self, receivers: &[(u32, Receiver)]) {
+        for &(vertex, _) in receivers {
+            self.vertices[vertex as usize] = None;
+        }
+        self.covered = 0;
+    }
+
+    /// Rays shot from some vertices.
+    pub(crate) fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
+        let shot = |&(vertex, _): &(u32, Receiver)| {
+            self.vertices[vertex as usize].map_or(0, |light| u64::from(light.shot))
+        };
+        receivers.iter().map(shot).sum()
+    }
+
+    pub(crate) fn shoot(
+        &mut self,
+        rays: &RayTree,
+        receivers: &[(u32, Receiver)],
+        wanted: impl Fn(&DirectLight) -> u32 + Sync,
+        seed: u64,
+        cancel: &Cancel,
+    ) {
+        let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
+        let mut known = self.known(receivers);
+        self.lights
+            .shoot(rays, &places, wanted, seed, &mut known, cancel);
+        self.learn(receivers, known);
+    }
+
+    /// What the rays of the other corners of these elements found, by vertex.
+    fn neighbours(&self, hierarchy: &Hierarchy, elements: Range<usize>) -> Vec<Tally> {
+        let mut neighbours = vec![Tally::default(); self.vertices.len()];
+        for leaf in hierarchy.mesh.leaves_among(elements) {
+            let corners = hierarchy.mesh.elements[leaf].vertices;
+            for (side, vertex) in corners.into_iter().enumerate() {
+                for other in [corners[(side + 1) % 3], corners[(side + 2) % 3]] {
+                    neighbours[vertex as usize] += self.tally(other);
+                }
+            }
+        }
+        neighbours
+    }
+
+    /// What the rays of a vertex found.
+    fn tally(&self, vertex: u32) -> Tally {
+        let light = self.vertices[vertex as usize];
+        light.map_or(Tally::default(), |light| light.tally())
+    }
+
+    /// What the rays of the corners of an element found.
+    pub(crate) fn tally_of_corners(&self, hierarchy: &Hierarchy, element: usize) -> Tally {
+        let mut sum = Tally::default();
+        for vertex in hierarchy.mesh.elements[element].vertices {
+            sum += self.tally(vertex);
+        }
+        sum
+    }
+
+    /// Which vertices lie among others whose rays had different outcomes, or another one than their own.
+    fn disputed(&self, neighbours: &[Tally]) -> Vec<bool> {
+        let is_disputed = |(vertex, others): (usize, &Tally)| {
+            others.is_mixed() || others.shot > 0 && !self.tally(vertex as u32).is_like(*others)
+        };
+        neighbours.iter().enumerate().map(is_disputed).collect()
+    }
+
+    /// As [`crate::solver::places::OffsetPlaces::vertex_places`] has it, by what is known of each vertex.
+    pub(crate) fn receivers(
+        &self,
+        hierarchy: &Hierarchy,
+        elements: Range<usize>,
+        is_wanted: impl Fn(usize, Option<DirectLight>) -> bool,
+    ) -> Vec<(u32, Receiver)> {
+        let known = self.vertices.iter().enumerate();
+        let is_wanted: Vec<bool> = known
+            .map(|(vertex, light)| is_wanted(vertex, *light))
+            .collect();
+        self.offsets.vertex_places(hierarchy, elements, &is_wanted)
+    }
+}

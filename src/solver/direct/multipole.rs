@@ -1,0 +1,257 @@
+//! The light of many emitters from afar: moments that give the irradiance at a point, and how far it may be off.
+//!
+//! At a point whose unit normal is n, an emitter of radiosity B and area vector S at the place x from there gives
+//! `B (S·−x)+ (n·x)+ / (π |x|⁴)`. Emitters that all face the point and lie above its horizon need no clamping, and the sum
+//! over them is expanded about the centre of their power: to the first order in the place for each area vector and colour,
+//! and to the second for their sum, which counts as spread alike for all directions.
+//! Where some face away, the directional moments that clusters of the hierarchy have, too, bound what shows.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use glam::{Mat3, Vec3, Vec4};
+
+use super::emitter::Emitter;
+use crate::{
+    hierarchy::{Moments, Reading},
+    solver::places::Receiver,
+    transport::luminance,
+};
+
+/// Nearer than this many radii the expansion says nothing.
+const NEAREST: f32 = 1.5;
+
+/// Error of the expansion, relative to the irradiance, in multiples of `(spread/distance)² · radius/distance`: the terms of
+/// the third order that are left out have coefficients of up to this size. Smaller, and the error of a cut is above its
+/// tolerance; larger, and cuts have more nodes than they need.
+const TRUNCATION: f32 = 8.0;
+
+/// A point is told from one in the plane of the emitters if it lies this far before it, frame units: at the rim of the frame
+/// single precision resolves less than half of it, and shadow rays begin ten times as far off. Smaller, and points beside many
+/// lamps in one ceiling look at each of them; larger, and surfaces just before an emitter stay dark.
+const RESOLUTION: f32 = 1e-5;
+
+/// Moments of the light of some emitters.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Multipole {
+    /// Centre of the power (luminance).
+    pub(crate) centre: Vec3,
+    /// Radius of a sphere about the centre that holds all emitters.
+    radius: f32,
+    /// Luminance of the power.
+    pub(crate) power: f32,
+    /// Mean of `e eᵀ` over the power (luminance), with e the place relative to the centre.
+    second: Mat3,
+    /// Root of the mean of `|e|²`.
+    spread: f32,
+    /// Normals differ from this one by no more than the angle, radians; π where it says nothing.
+    axis: Vec3,
+    angle: f32,
+    /// Sine and cosine of the angle.
+    sin_cos: (f32, f32),
+    /// How far emitters lie from the plane through the centre that the axis is normal to, at most.
+    thickness: f32,
+    /// Moments of `B S`.
+    directional: Moments<Vec4>,
+    /// `Σ B S_a e_b`.
+    first: [[Vec4; 3]; 3],
+}
+
+/// What a point sees of a multipole.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sight {
+    /// The centre relative to the point, and its squared distance.
+    separation: Vec3,
+    squared: f32,
+    /// Height of the centre over the horizon of the point.
+    height: f32,
+    /// Largest cosines at the emitters and at the point.
+    most_cosines: [f32; 2],
+    /// Whether all emitters lie above the horizon and face the point.
+    is_whole: bool,
+}
+
+impl Multipole {
+    /// Of one emitter.
+    pub(crate) fn of(emitter: &Emitter) -> Self {
+        let centre = emitter.corners.iter().sum::<Vec3>() / 3.0;
+        let outwards = emitter.corners.map(|corner| corner - centre);
+        // The second moment of a triangle is a twelfth of the sum over its corners.
+        let second = outwards.map(|e| outer(e, e)).into_iter().sum::<Mat3>() * (1.0 / 12.0);
+        let axis = emitter.normal;
+        let lengths = outwards.map(Vec3::length);
+        Self {
+            centre,
+            radius: lengths.into_iter().fold(0.0, f32::max),
+            power: luminance(emitter.radiosity) * emitter.area,
+            second,
+            spread: trace(&second).sqrt(),
+            axis,
+            angle: 0.0,
+            sin_cos: (0.0, 1.0),
+            thickness: 0.0,
+            directional: Moments::of(axis * emitter.area, emitter.radiosity),
+            first: [[Vec4::ZERO; 3]; 3],
+        }
+    }
+
+    /// Of the emitters of both.
+    pub(crate) fn merged(&self, other: &Self) -> Self {
+        let power = self.power + other.power;
+        let share = match other.power / power {
+            share if share.is_finite() => share,
+            _ => 0.5,
+        };
+        let centre = self.centre.lerp(other.centre, share);
+        let (axis, angle) = enclosing_cone((self.axis, self.angle), (other.axis, other.angle));
+        let mut merged = Self {
+            centre,
+            radius: 0.0,
+            power,
+            second: Mat3::ZERO,
+            spread: 0.0,
+            axis,
+            angle,
+            sin_cos: angle.sin_cos(),
+            thickness: 0.0,
+            directional: Moments::default(),
+            first: [[Vec4::ZERO; 3]; 3],
+        };
+        for (part, share) in [(self, 1.0 - share), (other, share)] {
+            let shift = part.centre - centre;
+            merged.radius = merged.radius.max(part.radius + shift.length());
+            let tilt = part.radius * axis.cross(part.axis).length();
+            let thickness = part.thickness + shift.dot(axis).abs() + tilt;
+            merged.thickness = merged.thickness.max(thickness);
+            merged.second += (part.second + outer(shift, shift)) * share;
+            merged.directional.merge(&part.directional);
+            for a in 0..3 {
+                for b in 0..3 {
+                    merged.first[a][b] += part.first[a][b] + part.directional.linear[a] * shift[b];
+                }
+            }
+        }
+        merged.spread = trace(&merged.second).sqrt();
+        merged
+    }
+
+    /// What a receiver sees of it; `None` where that is nothing for certain.
+    pub(crate) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
+        let separation = self.centre - receiver.point;
+        let squared = separation.length_squared();
+        let distance = squared.sqrt();
+        let height = separation.dot(receiver.normal);
+        if height <= -self.radius {
+            return None;
+        }
+        // Heights of the receiver over the planes of the emitters, which are tilted by up to the angle.
+        let along = -separation.dot(self.axis);
+        let across = (squared - along * along).max(0.0).sqrt();
+        let (sin, cos) = self.sin_cos;
+        let slack = self.thickness + self.radius * if self.angle < FRAC_PI_2 { sin } else { 1.0 };
+        let most = if along >= distance * cos {
+            distance
+        } else {
+            along * cos + across * sin
+        } + slack;
+        if most <= RESOLUTION {
+            return None;
+        }
+        let least = if self.angle < FRAC_PI_2 {
+            along * cos - across * sin - slack
+        } else {
+            -distance
+        };
+        let cosine = |height: f32| (height / distance).min(1.0);
+        Some(Sight {
+            separation,
+            squared,
+            height,
+            most_cosines: [cosine(most), cosine(height + self.radius)],
+            is_whole: least >= 0.0 && height >= self.radius,
+        })
+    }
+
+    /// How far the luminance of the irradiance may be off, about; infinite where nothing is known.
+    pub(crate) fn error(&self, sight: &Sight) -> f32 {
+        let distance = sight.squared.sqrt();
+        if distance <= NEAREST * self.radius {
+            return f32::INFINITY;
+        }
+        let [of_emitters, of_receiver] = sight.most_cosines;
+        let scale = of_receiver / (PI * sight.squared);
+        let most = self.power * of_emitters * scale;
+        let truncation =
+            TRUNCATION * self.spread * self.spread * self.radius / (distance * sight.squared);
+        if sight.is_whole {
+            return most * truncation;
+        }
+        let (least_shown, most_shown) = self.directional.bounds(-sight.separation / distance);
+        let unknown = luminance(most_shown - least_shown) * scale;
+        // Without terms of first and second order, and cut off by the horizon.
+        let ratio = self.radius / distance;
+        most * (truncation + ratio) + unknown
+    }
+
+    /// Irradiance at a receiver without occlusion.
+    pub(crate) fn irradiance(&self, sight: &Sight, normal: Vec3) -> Vec4 {
+        let (y, height) = (sight.separation, sight.height);
+        let scale = 1.0 / (PI * sight.squared * sight.squared);
+        if !sight.is_whole {
+            let distance = sight.squared.sqrt();
+            let shown = self.directional.project(-y / distance, Reading::Bounded);
+            return shown * (distance * height.max(0.0) * scale);
+        }
+        let over = 1.0 / sight.squared;
+        let (of_y, of_normal) = (self.second * y, self.second * normal);
+        let factor =
+            height - 4.0 * normal.dot(of_y) * over - 2.0 * height * trace(&self.second) * over
+                + 12.0 * height * y.dot(of_y) * over * over;
+        let towards = y * factor + of_normal - of_y * (4.0 * height * over);
+        let sideways = normal - y * (4.0 * height * over);
+        let mut sum = Vec4::ZERO;
+        for a in 0..3 {
+            let weights = sideways * y[a];
+            sum += self.directional.linear[a] * towards[a]
+                + self.first[a][0] * weights.x
+                + self.first[a][1] * weights.y
+                + self.first[a][2] * weights.z
+                + self.first[a][a] * height;
+        }
+        (-sum * scale).max(Vec4::ZERO)
+    }
+
+    /// Whether a point is so far away that the emitters are seen about alike.
+    pub(crate) fn is_far(&self, sight: &Sight) -> bool {
+        sight.squared > (2.0 * self.radius).powi(2)
+    }
+}
+
+fn outer(a: Vec3, b: Vec3) -> Mat3 {
+    Mat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+fn trace(matrix: &Mat3) -> f32 {
+    matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z
+}
+
+/// The narrowest cone about two, each given by its unit axis and half its angle.
+fn enclosing_cone(one: (Vec3, f32), other: (Vec3, f32)) -> (Vec3, f32) {
+    let (wide, narrow) = if one.1 >= other.1 {
+        (one, other)
+    } else {
+        (other, one)
+    };
+    let cross = wide.0.cross(narrow.0);
+    let between = cross.length().atan2(wide.0.dot(narrow.0));
+    if between + narrow.1 <= wide.1 {
+        return wide;
+    }
+    let angle = 0.5 * (between + wide.1 + narrow.1);
+    if angle >= PI || angle.is_nan() {
+        return (wide.0, PI);
+    }
+    let turn = angle - wide.1;
+    let side = (narrow.0 - wide.0 * wide.0.dot(narrow.0)).normalize_or_zero();
+    let axis = (wide.0 * turn.cos() + side * turn.sin()).normalize_or(wide.0);
+    (axis, angle)
+}

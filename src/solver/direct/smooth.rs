@@ -1,0 +1,136 @@
+//! Shadow fractions smoothed over the mesh, as far as their own noise explains how neighbours differ.
+//!
+//! A few shadow rays leave a grain in penumbrae, which triangles draw out into streaks. Neighbouring vertices of a
+//! smooth surface see nearly the same fraction of the light, so they exchange some of it: fully while they differ by no
+//! more than the noise of the surer one, and less the further they are off. What one gives the other takes, so that where few
+//! rays get through, vertices that saw nothing make up for those that saw too much.
+
+use glam::Vec4;
+
+use super::lights::DirectLight;
+use crate::hierarchy::Hierarchy;
+
+/// Rounds of averaging. None leaves visible grain, many widen narrow penumbrae and draw their borders as saw teeth.
+const ROUNDS: u32 = 1;
+
+/// Standard errors by which neighbours may differ before they count by half. Smaller leaves grain, larger blurs borders.
+const HALF_DEVIATIONS: f32 = 3.0;
+
+/// Weight of a vertex's own value; each neighbour that agrees has 2, since inner edges belong to two elements.
+const OWN_WEIGHT: f32 = 2.0;
+
+/// The visible fraction at one vertex.
+#[derive(Clone, Copy, Default)]
+struct Fraction {
+    color: Vec4,
+    /// Mean over the colours.
+    mean: f32,
+    /// Square of the standard error of the mean; above 0 where all rays agree.
+    variance: f32,
+    /// Whether some rays got through and others did not.
+    is_mixed: bool,
+}
+
+/// Visible fractions of the vertices, by colour; those of vertices without samples are 0.
+pub(crate) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) -> Vec<Vec4> {
+    let mut fractions: Vec<Fraction> = samples
+        .iter()
+        .map(|sample| {
+            sample.map_or(Fraction::default(), |light| {
+                let color = light.fraction();
+                Fraction {
+                    color,
+                    mean: color.truncate().element_sum() / 3.0,
+                    variance: light.fraction_doubt().powi(2),
+                    is_mixed: light.tally().is_mixed(),
+                }
+            })
+        })
+        .collect();
+    let edges: Vec<[usize; 2]> = hierarchy
+        .mesh
+        .leaves()
+        .flat_map(|leaf| hierarchy.mesh.elements[leaf].edges())
+        .filter(|edge| {
+            edge.iter()
+                .all(|&vertex| samples.get(vertex).is_some_and(Option::is_some))
+        })
+        .filter(|edge| edge.iter().any(|&vertex| fractions[vertex].is_mixed))
+        .collect();
+    for _ in 0..ROUNDS {
+        fractions = round(&fractions, &edges);
+    }
+    fractions
+        .into_iter()
+        .map(|fraction| fraction.color)
+        .collect()
+}
+
+/// How much a neighbour counts whose value is off by a gap, 0…1: by half where that is so many standard errors, of which the
+/// square is `variance`.
+pub(crate) fn agreement(gap: f32, variance: f32, half_deviations: f32) -> f32 {
+    let noise = variance * half_deviations * half_deviations;
+    noise / (noise + gap * gap).max(f32::MIN_POSITIVE)
+}
+
+/// One round of exchange. The variance stays that of the rays: it says how far neighbours may differ.
+fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
+    let weight = |a: Fraction, b: Fraction| {
+        let variance = 2.0 * a.variance.min(b.variance);
+        agreement(a.mean - b.mean, variance, HALF_DEVIATIONS)
+    };
+    let mut weights = vec![OWN_WEIGHT; fractions.len()];
+    for &[a, b] in edges {
+        let weight = weight(fractions[a], fractions[b]);
+        weights[a] += weight;
+        weights[b] += weight;
+    }
+    let mut next: Vec<Vec4> = fractions.iter().map(|fraction| fraction.color).collect();
+    for &[a, b] in edges {
+        let (one, other) = (fractions[a], fractions[b]);
+        let share = weight(one, other) / weights[a].max(weights[b]);
+        let given = (one.color - other.color) * share;
+        next[a] -= given;
+        next[b] += given;
+    }
+    fractions
+        .iter()
+        .zip(next)
+        .map(|(fraction, color)| Fraction {
+            color,
+            mean: color.truncate().element_sum() / 3.0,
+            ..*fraction
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fraction(mean: f32, rays: f32) -> Fraction {
+        let doubtful = (mean * rays + 0.5) / (rays + 1.0);
+        Fraction {
+            color: Vec4::splat(mean),
+            mean,
+            variance: doubtful * (1.0 - doubtful) / (rays + 1.0),
+            is_mixed: mean > 0.0 && mean < 1.0,
+        }
+    }
+
+    #[test]
+    fn what_a_vertex_loses_its_neighbours_gain() {
+        let fractions = [fraction(0.0, 8.0), fraction(0.125, 8.0), fraction(0.0, 8.0)];
+        let smoothed = round(&fractions, &[[0, 1], [1, 2]]);
+        let sum: f32 = smoothed.iter().map(|fraction| fraction.mean).sum();
+        assert!((sum - 0.125).abs() < 1e-6);
+        assert!(smoothed[0].mean > 0.01 && smoothed[1].mean < 0.1);
+    }
+
+    #[test]
+    fn hardly_anything_leaks_into_what_many_rays_found_dark() {
+        let fractions = [fraction(0.0, 32.0), fraction(0.5, 32.0)];
+        let smoothed = round(&fractions, &[[0, 1]]);
+        assert!(smoothed[0].mean < 0.01, "{}", smoothed[0].mean);
+    }
+}

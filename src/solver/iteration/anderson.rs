@@ -1,0 +1,307 @@
+//! Anderson acceleration of a fixed point `x = g(x)` over colours (Anderson 1965; Walker & Ni 2011).
+//!
+//! Of the last few iterates the combination is taken whose residual `g(x) − x` would be smallest if `g` were linear.
+//! Each colour channel has coefficients of its own, since channels hardly know of each other. Sums are in double
+//! precision and in fixed order, so that the same values come out on any number of threads.
+
+use std::collections::VecDeque;
+
+use glam::{DVec3, Vec3, Vec4};
+use rayon::prelude::*;
+
+/// Values that one task sums. It sets the order of sums, so it must not depend on the number of threads.
+const CHUNK: usize = 4096;
+
+/// A direction whose part that is new, squared, is a smaller share than this adds nothing but rounding.
+/// Larger, and slow modes are thrown away; smaller, and single precision is amplified.
+const LEAST_NEW: f64 = 1e-10;
+
+/// Iterates that differ by a smaller share of all light than this differ by rounding.
+const LEAST_CHANGE: f64 = 1e-5;
+
+/// Differences between two successive iterates, and between their images.
+struct Change {
+    residual: Vec<Vec3>,
+    image: Vec<Vec3>,
+}
+
+/// The memory of an accelerated iteration.
+pub(crate) struct Anderson {
+    depth: usize,
+    changes: VecDeque<Change>,
+    /// Residual and image of the last iterate.
+    last: Option<(Vec<Vec3>, Vec<Vec3>)>,
+}
+
+impl Anderson {
+    /// Without memory. With a depth of 0 the iteration is the plain one.
+    pub(crate) fn new(depth: usize) -> Self {
+        Self {
+            depth,
+            changes: VecDeque::with_capacity(depth),
+            last: None,
+        }
+    }
+
+    /// Bytes that the memory grows to for so many values.
+    pub(crate) const fn memory_bytes(depth: usize, count: usize) -> usize {
+        2 * (depth + 1) * count * size_of::<Vec3>()
+    }
+
+    /// The next iterate from the present one and its image; not negative, and with the image's fourth channel.
+    /// `weights` are the shares by which squares are summed.
+    pub(crate) fn next(&mut self, weights: &[f32], at: &[Vec4], image: &[Vec4]) -> Vec<Vec4> {
+        let residual = map(image, at, |image, at| (image - at).truncate());
+        let image_colors: Vec<Vec3> = image.par_iter().map(|image| image.truncate()).collect();
+        if let Some((last_residual, last_image)) = self.last.take()
+            && self.depth > 0
+        {
+            if self.changes.len() == self.depth {
+                self.changes.pop_front();
+            }
+            self.changes.push_back(Change {
+                residual: map(&residual, &last_residual, |new, old| new - old),
+                image: map(&image_colors, &last_image, |new, old| new - old),
+            });
+        }
+        let shares = self.shares(weights, &residual);
+        let next = image
+            .par_iter()
+            .enumerate()
+            .map(|(index, image)| {
+                let mut color = image.truncate();
+                for (change, share) in self.changes.iter().zip(&shares) {
+                    color -= change.image[index] * *share;
+                }
+                let color = if color.is_finite() {
+                    color.max(Vec3::ZERO)
+                } else {
+                    image.truncate()
+                };
+                color.extend(image.w)
+            })
+            .collect();
+        self.last = Some((residual, image_colors));
+        next
+    }
+
+    /// Ratio of the last two images' distance to that of the iterates: below 1 where the iteration contracts. Nothing
+    /// before the second iterate, or where iterates differ by rounding only.
+    pub(crate) fn contraction(&self, weights: &[f32]) -> Option<f32> {
+        let change = self.changes.back()?;
+        let (_, image) = self.last.as_ref()?;
+        let sum = |of: &(dyn Fn(usize) -> Vec3 + Sync)| {
+            ordered_sum(weights.len(), |index| {
+                of(index).abs().as_dvec3() * f64::from(weights[index])
+            })
+            .element_sum()
+        };
+        let between_images = sum(&|index| change.image[index]);
+        let between_iterates = sum(&|index| change.image[index] - change.residual[index]);
+        let is_measurable = between_iterates > LEAST_CHANGE * sum(&|index| image[index]);
+        is_measurable.then(|| (between_images / between_iterates) as f32)
+    }
+
+    /// How much of each remembered change to take back, by channel: the least squares solution of
+    /// `residual = Σ share · change of the residual`.
+    fn shares(&self, weights: &[f32], residual: &[Vec3]) -> Vec<Vec3> {
+        let count = self.changes.len();
+        let mut matrix = vec![vec![DVec3::ZERO; count]; count];
+        let mut right = vec![DVec3::ZERO; count];
+        for (row, change) in self.changes.iter().enumerate() {
+            for (column, other) in self.changes.iter().enumerate().take(row + 1) {
+                let product = weighted_product(weights, &change.residual, &other.residual);
+                matrix[row][column] = product;
+                matrix[column][row] = product;
+            }
+            right[row] = weighted_product(weights, &change.residual, residual);
+        }
+        let mut shares = vec![Vec3::ZERO; count];
+        for channel in 0..3 {
+            let entry = |row: usize, column: usize| matrix[row][column][channel];
+            let solution = solve(count, entry, |row| right[row][channel]);
+            for (share, value) in shares.iter_mut().zip(solution) {
+                share[channel] = value as f32;
+            }
+        }
+        shares
+    }
+}
+
+/// Element by element.
+fn map<A: Copy + Sync, B: Copy + Sync>(
+    first: &[A],
+    second: &[B],
+    of: impl Fn(A, B) -> Vec3 + Sync,
+) -> Vec<Vec3> {
+    first
+        .par_iter()
+        .zip(second)
+        .with_min_len(CHUNK)
+        .map(|(a, b)| of(*a, *b))
+        .collect()
+}
+
+/// Σ weight · a · b, by channel.
+fn weighted_product(weights: &[f32], first: &[Vec3], second: &[Vec3]) -> DVec3 {
+    ordered_sum(weights.len(), |index| {
+        first[index].as_dvec3() * second[index].as_dvec3() * f64::from(weights[index])
+    })
+}
+
+/// A sum over indices whose order does not depend on the number of threads.
+pub(crate) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> DVec3 {
+    let parts: Vec<DVec3> = (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let end = ((chunk + 1) * CHUNK).min(count);
+            (chunk * CHUNK..end).map(&of).sum()
+        })
+        .collect();
+    parts.into_iter().sum()
+}
+
+/// Solve symmetric equations by elimination. What depends on those before it is left out, and gets 0; so does
+/// everything where a number is not finite.
+fn solve(
+    count: usize,
+    entry: impl Fn(usize, usize) -> f64,
+    right: impl Fn(usize) -> f64,
+) -> Vec<f64> {
+    // Newest first, so that old directions are those left out; scaled to a unit diagonal.
+    let order: Vec<usize> = (0..count).rev().collect();
+    let scale: Vec<f64> = order.iter().map(|&i| entry(i, i).max(0.0).sqrt()).collect();
+    let scaled = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
+    let mut rows: Vec<Vec<f64>> = (0..count)
+        .map(|i| {
+            (0..count)
+                .map(|j| scaled(entry(order[i], order[j]), scale[i] * scale[j]))
+                .chain([scaled(right(order[i]), scale[i])])
+                .collect()
+        })
+        .collect();
+    let mut used = vec![false; count];
+    for pivot in 0..count {
+        used[pivot] = rows[pivot][pivot] > LEAST_NEW;
+        if !used[pivot] {
+            continue;
+        }
+        let pivot_row = rows[pivot].clone();
+        for row in rows.iter_mut().skip(pivot + 1) {
+            let factor = row[pivot] / pivot_row[pivot];
+            for (value, &of_pivot) in row.iter_mut().zip(&pivot_row) {
+                *value -= factor * of_pivot;
+            }
+        }
+    }
+    let mut solution = vec![0.0; count];
+    for pivot in (0..count).rev().filter(|&pivot| used[pivot]) {
+        let known: f64 = (pivot + 1..count)
+            .map(|column| rows[pivot][column] * solution[column])
+            .sum();
+        solution[pivot] = (rows[pivot][count] - known) / rows[pivot][pivot];
+    }
+    let mut shares = vec![0.0; count];
+    for (position, &index) in order.iter().enumerate() {
+        shares[index] = scaled(solution[position], scale[position]);
+    }
+    if shares.iter().all(|share| share.is_finite()) {
+        shares
+    } else {
+        vec![0.0; count]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Random;
+
+    /// Sweeps until `x = matrix · x + 1` is solved to the tolerance, and the largest error.
+    fn sweeps(matrix: &[Vec<f32>], expected: &[f32], depth: usize) -> (u32, f32) {
+        let count = matrix.len();
+        let weights = vec![1.0; count];
+        let mut at = vec![Vec4::ZERO; count];
+        let mut anderson = Anderson::new(depth);
+        for sweep in 1..10_000 {
+            let image: Vec<Vec4> = matrix
+                .iter()
+                .map(|row| {
+                    let sum: Vec4 = row.iter().zip(&at).map(|(k, x)| *x * *k).sum();
+                    sum + Vec4::ONE
+                })
+                .collect();
+            let error = at
+                .iter()
+                .zip(expected)
+                .map(|(x, e)| (x.truncate() / *e - 1.0).abs().max_element())
+                .fold(0.0, f32::max);
+            if error < 1e-3 {
+                return (sweep, error);
+            }
+            at = anderson.next(&weights, &at, &image);
+            assert!(at.iter().all(|x| x.is_finite() && x.min_element() >= 0.0));
+        }
+        panic!("no end");
+    }
+
+    /// A closed scene: rows add to `reflectance`, so that the solution is 1 / (1 − reflectance) everywhere.
+    fn closed(reflectance: f32, seed: u64) -> (Vec<Vec<f32>>, Vec<f32>) {
+        let mut random = Random::new(seed, 0);
+        let matrix = (0..40)
+            .map(|_| {
+                let row: Vec<f32> = (0..40).map(|_| random.uniform()).collect();
+                let sum: f32 = row.iter().sum();
+                row.iter().map(|x| x * reflectance / sum).collect()
+            })
+            .collect();
+        (matrix, vec![1.0 / (1.0 - reflectance); 40])
+    }
+
+    #[test]
+    fn white_walls_take_few_sweeps() {
+        for seed in 0..20 {
+            let (matrix, expected) = closed(0.999, seed);
+            let (plain, _) = sweeps(&matrix, &expected, 0);
+            let (accelerated, _) = sweeps(&matrix, &expected, 3);
+            assert!(plain > 5000, "seed {seed}: {plain}");
+            assert!(accelerated <= 6, "seed {seed}: {accelerated}");
+        }
+    }
+
+    #[test]
+    fn a_chain_of_rooms_takes_few_sweeps() {
+        // Light walks from room to room: slow modes of many shapes, not one.
+        let count = 12;
+        let mut matrix = vec![vec![0.0; count]; count];
+        for room in 0..count {
+            matrix[room][room] = 0.88;
+            if room > 0 {
+                matrix[room][room - 1] = 0.05;
+            }
+            if room + 1 < count {
+                matrix[room][room + 1] = 0.05;
+            }
+        }
+        let mut expected = vec![0.0f32; count];
+        for _ in 0..5000 {
+            expected = (0..count)
+                .map(|i| 1.0 + (0..count).map(|j| matrix[i][j] * expected[j]).sum::<f32>())
+                .collect();
+        }
+        let (plain, _) = sweeps(&matrix, &expected, 0);
+        let (accelerated, _) = sweeps(&matrix, &expected, 3);
+        assert!(3 * accelerated < plain, "{accelerated} of {plain}");
+    }
+
+    #[test]
+    fn dependent_directions_are_left_out() {
+        let matrix = [[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 0.0]];
+        let right = [2.0, 1.0, 0.0];
+        let found = solve(3, |i, j| matrix[i][j], |i| right[i]);
+        let residual = (2.0 * found[0] + found[1] - 1.0).abs();
+        assert!(residual < 1e-12 && found.contains(&0.0), "{found:?}");
+        let none = solve(2, |_, _| f64::NAN, |_| 1.0);
+        assert_eq!(none, [0.0, 0.0]);
+    }
+}

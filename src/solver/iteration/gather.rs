@@ -1,0 +1,284 @@
+//! One sweep: light gathered over all links, then pushed down to the leaves.
+//!
+//! Clusters collect the vector irradiances of their links as moments, elements as plain irradiance. Pushing adds what a
+//! cluster has to its children and lets each face take its share by its own normal (eq. 15), for all links at once.
+//! The paper's other way, each vector pushed to each face at once, is [`Push::AtOnce`].
+
+use glam::Vec4;
+use rayon::prelude::*;
+
+use super::anderson::ordered_sum;
+use crate::{
+    hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
+    solver::{Cancel, Push},
+    transport::{Kernel, LinkStore, luminance, self_irradiance},
+};
+
+/// Nodes that one task gathers for.
+const TASK_NODES: usize = 256;
+
+/// Clusters with links that one task gathers for.
+const TASK_HOLDERS: usize = 32;
+
+/// The clusters that have links of their own, for all sweeps over these links: most have none, and what is pushed passes
+/// them by.
+pub(crate) struct Holders {
+    /// The clusters, parents before children.
+    clusters: Vec<u32>,
+    /// For each, the place in this list of the nearest one above it, or [`Self::NONE`].
+    above: Vec<u32>,
+    /// By patch, the place of the nearest one that it belongs to, or [`Self::NONE`].
+    of_patch: Vec<u32>,
+}
+
+impl Holders {
+    const NONE: u32 = u32::MAX;
+
+    /// Those of some links.
+    pub(crate) fn new(hierarchy: &Hierarchy, links: &LinkStore) -> Self {
+        let mut holders = Self {
+            clusters: Vec::new(),
+            above: Vec::new(),
+            of_patch: vec![Self::NONE; hierarchy.patches.len()],
+        };
+        let mut nearest = vec![Self::NONE; hierarchy.clusters.len()];
+        for (index, cluster) in hierarchy.clusters.iter().enumerate() {
+            let above = nearest.get(cluster.parent as usize).copied();
+            nearest[index] = above.unwrap_or(Self::NONE);
+            if !links.of(NodeId(index as u32)).is_empty() {
+                holders.above.push(nearest[index]);
+                nearest[index] = holders.clusters.len() as u32;
+                holders.clusters.push(index as u32);
+            }
+            if cluster.is_leaf() {
+                holders.of_patch[cluster.patches()].fill(nearest[index]);
+            }
+        }
+        holders
+    }
+}
+
+/// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples. `None` when
+/// cancelled.
+pub(crate) fn gather(
+    kernel: Kernel<'_>,
+    links: &LinkStore,
+    holders: &Holders,
+    push: Push,
+    cancel: &Cancel,
+) -> Option<Vec<Vec4>> {
+    let hierarchy = kernel.hierarchy;
+    let mut irradiance = own_irradiance(kernel, links, cancel);
+    cancel.proceed()?;
+    let from_clusters = match push {
+        Push::Combined => push_moments(kernel, links, holders, cancel)?,
+        Push::AtOnce => push_at_once(kernel, links, cancel),
+    };
+    cancel.proceed()?;
+    let patch_count = from_clusters.len();
+    irradiance[..patch_count]
+        .par_iter_mut()
+        .zip(from_clusters)
+        .for_each(|(sum, above)| *sum += above);
+    // Parents come before their children.
+    for index in patch_count..irradiance.len() {
+        let parent = hierarchy.mesh.elements[index].parent as usize;
+        let above = irradiance[parent];
+        irradiance[index] += above;
+    }
+    Some(irradiance)
+}
+
+/// What elements receive over their own links; nothing where cancelled.
+fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<Vec4> {
+    let hierarchy = kernel.hierarchy;
+    let base = hierarchy.clusters.len() as u32;
+    (0..hierarchy.mesh.elements.len())
+        .into_par_iter()
+        .with_min_len(TASK_NODES)
+        .map(|index| {
+            let mut sum = Vec4::ZERO;
+            let links = links.of(NodeId(base + index as u32));
+            if links.is_empty() || cancel.is_cancelled() {
+                return sum;
+            }
+            let (point, normal) = (
+                hierarchy.mesh.elements[index].centroid,
+                hierarchy.patch_of(index).normal,
+            );
+            for link in links {
+                sum += match hierarchy.kind(link.source) {
+                    Kind::Element(source) => kernel.tables.elements[source] * link.form_factor,
+                    Kind::Cluster(_) => {
+                        kernel.irradiance(link.source, point, normal) * link.transmission()
+                    }
+                };
+            }
+            sum
+        })
+        .collect()
+}
+
+/// What patches receive from the links of clusters, through the moments of all clusters above them. `None` when
+/// cancelled.
+fn push_moments(
+    kernel: Kernel<'_>,
+    links: &LinkStore,
+    holders: &Holders,
+    cancel: &Cancel,
+) -> Option<Vec<Vec4>> {
+    let hierarchy = kernel.hierarchy;
+    let reading = kernel.reading.unwrap_or(Reading::Bounded);
+    let mut incident: Vec<Moments<Vec4>> = holders
+        .clusters
+        .par_iter()
+        .with_min_len(TASK_HOLDERS)
+        .map(|&index| {
+            if cancel.is_cancelled() {
+                return Moments::default();
+            }
+            cluster_incident(kernel, links, index as usize)
+        })
+        .collect();
+    cancel.proceed()?;
+    // Those above come first, with all that is above them.
+    for (place, &above) in holders.above.iter().enumerate() {
+        if above != Holders::NONE {
+            let above = incident[above as usize];
+            incident[place].merge(&above);
+        }
+    }
+    let active = hierarchy.active_patches();
+    let project = |patch: usize| {
+        let holder = incident.get(holders.of_patch[patch] as usize);
+        match holder {
+            Some(holder) if active.contains(&patch) => {
+                holder.project(hierarchy.patches[patch].normal, reading)
+            }
+            _ => Vec4::ZERO,
+        }
+    };
+    let pushed = (0..hierarchy.patches.len())
+        .into_par_iter()
+        .with_min_len(TASK_NODES)
+        .map(project)
+        .collect();
+    Some(pushed)
+}
+
+/// The vector irradiances of all links of one cluster.
+fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Moments<Vec4> {
+    let hierarchy = kernel.hierarchy;
+    let cluster = &hierarchy.clusters[index];
+    let mut sum = Moments::default();
+    for link in links.of(NodeId(index as u32)) {
+        if link.source.index() == index {
+            sum.add_isotropic(
+                self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
+                    * link.transmission(),
+            );
+        } else {
+            kernel
+                .vector_irradiance(link.source, cluster.centroid)
+                .add_to(&mut sum, link.transmission());
+        }
+    }
+    sum
+}
+
+/// What patches receive from the links of clusters, each vector pushed by itself; nothing where cancelled.
+fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<Vec4> {
+    let hierarchy = kernel.hierarchy;
+    let leaves: Vec<usize> = (0..hierarchy.clusters.len())
+        .filter(|&index| hierarchy.clusters[index].is_leaf())
+        .collect();
+    let parts: Vec<(usize, Vec<Vec4>)> = leaves
+        .par_iter()
+        .map(|&leaf| {
+            let range = hierarchy.clusters[leaf].patches();
+            let mut sums = vec![Vec4::ZERO; range.len()];
+            let mut at = leaf;
+            while !cancel.is_cancelled() {
+                for link in links.of(NodeId(at as u32)) {
+                    push_one(
+                        kernel,
+                        at,
+                        link.source,
+                        link.transmission(),
+                        &hierarchy.patches[range.clone()],
+                        &mut sums,
+                    );
+                }
+                match hierarchy.clusters[at].parent {
+                    u32::MAX => break,
+                    parent => at = parent as usize,
+                }
+            }
+            (range.start, sums)
+        })
+        .collect();
+    let mut irradiance = vec![Vec4::ZERO; hierarchy.patches.len()];
+    for (start, sums) in parts {
+        irradiance[start..start + sums.len()].copy_from_slice(&sums);
+    }
+    irradiance
+}
+
+/// Eq. 15 for one link of a cluster and some of its patches.
+fn push_one(
+    kernel: Kernel<'_>,
+    cluster: usize,
+    source: NodeId,
+    transmission: Vec4,
+    patches: &[crate::hierarchy::Patch],
+    sums: &mut [Vec4],
+) {
+    let hierarchy = kernel.hierarchy;
+    if source.index() == cluster {
+        let irradiance =
+            self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total())
+                * transmission;
+        sums.iter_mut().for_each(|sum| *sum += irradiance);
+        return;
+    }
+    let receiver = &hierarchy.clusters[cluster];
+    let incident = kernel.vector_irradiance(source, receiver.centroid);
+    for (sum, patch) in sums.iter_mut().zip(patches) {
+        *sum += incident.on_face(patch.normal) * transmission;
+    }
+}
+
+/// Sum over leaves of area times a colour, in fixed order and in double precision.
+pub(crate) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> glam::DVec3 {
+    let elements = &hierarchy.mesh.elements;
+    ordered_sum(elements.len(), |index| {
+        if !elements[index].is_leaf() {
+            return glam::DVec3::ZERO;
+        }
+        let area = f64::from(elements[index].area_vector.length());
+        of(index).truncate().as_dvec3() * area
+    })
+}
+
+/// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
+pub(crate) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
+    let importance = &hierarchy.importance;
+    let elements = &hierarchy.mesh.elements;
+    let measured = |leaf: usize| of(leaf) * importance.measure(elements[leaf].patch as usize);
+    let sum = area_sum(hierarchy, measured) / importance.area.max(f64::MIN_POSITIVE);
+    sum.as_vec3().extend(0.0)
+}
+
+/// Part of the scene that is taken to be lit at least: light on less of it is measured by its root mean square and not by
+/// its mean, which would tell of the dark.
+const LEAST_LIT: f32 = 1.0 / 9.0;
+
+/// The luminance by which errors of a quantity are measured: its mean over the scene, or, where it is concentrated on a
+/// small part, what the mean would be if that part were [`LEAST_LIT`] of the scene.
+pub(crate) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
+    let moments = mean(hierarchy, |leaf| {
+        let value = luminance(of(leaf));
+        Vec4::new(value, value * value, 0.0, 0.0)
+    });
+    moments.x.max((moments.y * LEAST_LIT).sqrt())
+}

@@ -1,0 +1,98 @@
+//! Vertices on texture seams.
+//!
+//! All triangles about a vertex share its light, but not always its texture coordinates: where a picture is cut open, or
+//! begins again after whole periods, those on either side have others. Such a vertex is shown once for each, the
+//! repetitions after all others.
+
+use std::collections::HashMap;
+
+use glam::Vec2;
+
+use crate::solver::DisplayMesh;
+
+/// Texture coordinates that differ by less are one, in periods of the picture. Smaller, and rounding opens seams where
+/// there are none; larger, and a picture is pulled by more than a pixel of 1024.
+const SAME_PLACE: f32 = 1.0 / 1024.0;
+
+/// The repetitions of the vertices of a display mesh.
+#[derive(Default)]
+pub(crate) struct Seams {
+    repetitions: HashMap<u32, Vec<u32>>,
+}
+
+impl Seams {
+    /// The vertex, or the repetition of it, that has these texture coordinates; made where there is none. A vertex without
+    /// coordinates, which are not numbers then, takes them.
+    pub(crate) fn vertex_with(&mut self, vertex: u32, uv: Vec2, mesh: &mut DisplayMesh) -> u32 {
+        let held = &mut mesh.texcoords[vertex as usize];
+        if held.is_nan() {
+            *held = uv;
+        }
+        let has_them = |vertex: u32| {
+            let held = mesh.texcoords[vertex as usize];
+            held == uv || held.abs_diff_eq(uv, SAME_PLACE)
+        };
+        if has_them(vertex) {
+            return vertex;
+        }
+        let others = self.repetitions.entry(vertex).or_default();
+        if let Some(&other) = others.iter().find(|&&other| has_them(other)) {
+            return other;
+        }
+        let other = mesh.positions.len() as u32;
+        others.push(other);
+        mesh.positions.push(mesh.positions[vertex as usize]);
+        mesh.texcoords.push(uv);
+        mesh.repeated.push(vertex);
+        other
+    }
+}
+
+/// Let values of the first `count` vertices hold for their repetitions, too.
+pub(crate) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32]) {
+    values.truncate(count);
+    for &vertex in repeated {
+        values.push(values[vertex as usize]);
+    }
+}
+
+impl DisplayMesh {
+    /// Vertices that are no repetitions.
+    pub(crate) fn own_vertex_count(&self) -> usize {
+        self.positions.len() - self.repeated.len()
+    }
+
+    /// The vertex that a vertex repeats, or itself.
+    pub(crate) fn own_vertex(&self, vertex: u32) -> usize {
+        let beyond = (vertex as usize).checked_sub(self.own_vertex_count());
+        beyond.map_or(vertex, |place| self.repeated[place]) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn a_vertex_is_repeated_once_for_each_place_in_the_picture() {
+        let mut mesh = DisplayMesh {
+            positions: vec![Vec3::X, Vec3::Y],
+            texcoords: vec![Vec2::NAN; 2],
+            ..DisplayMesh::default()
+        };
+        let mut seams = Seams::default();
+        let mut at = |vertex, u| seams.vertex_with(vertex, Vec2::new(u, 0.5), &mut mesh);
+        assert_eq!((at(0, 0.0), at(1, 0.5)), (0, 1));
+        // Rounding is no seam, a whole period is.
+        assert_eq!((at(0, 1e-5), at(0, 1.0), at(0, 1.0)), (0, 2, 2));
+        assert_eq!((at(0, 2.0), at(0, 1.0), at(1, 0.5)), (3, 2, 1));
+        assert_eq!(mesh.repeated, [0, 0]);
+        assert_eq!(mesh.positions, [Vec3::X, Vec3::Y, Vec3::X, Vec3::X]);
+        assert_eq!([0, 1, 2, 3].map(|v| mesh.own_vertex(v)), [0, 1, 0, 0]);
+        let mut light = vec![3.0, 4.0, 9.0, 9.0];
+        repeat(&mut light, mesh.own_vertex_count(), &mesh.repeated);
+        assert_eq!(light, [3.0, 4.0, 3.0, 3.0]);
+    }
+}

@@ -1,0 +1,362 @@
+//! Indirect light at vertices, gathered once more by rays where links are found to be wrong.
+//!
+//! A link knows of what stands between its ends only which part gets through, and it takes that part for the same all
+//! over its receiver. In the corner between a floor and what stands on it that shows: light from beyond the object
+//! leaks into the corner, however small the elements there are, and into closed rooms. So a few cosine-weighted rays from
+//! each vertex look at the radiosity of what they meet. Where vertices and their neighbours together find something else
+//! than the links, many rays do. What rays met is remembered, so that it can be asked again once the light there has been
+//! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
+//! factor by vertex, so that it holds for other lights on the same links, too.
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::{
+    gathered::{Gathered, factors},
+    reconstruct::VertexMeans,
+};
+use crate::{
+    geometry::{Random, barycentric, cosine_direction, low_discrepancy_2d},
+    hierarchy::{Element, Hierarchy},
+    solver::{
+        Cancel, Solver,
+        direct::Limits,
+        iteration::Anderson,
+        places::{OffsetPlaces, Receiver, carry_over, vertex_share_roots},
+    },
+    transport::luminance,
+};
+
+/// Rays from each vertex. Fewer miss shallow corners, more cost time everywhere.
+const LOOKING: u32 = 16;
+
+/// Rays from all vertices, about: of large meshes fewer are shot from each. Fewer tell less than links do, more take longer
+/// than all steps before.
+const MOST_LOOKING: usize = 1 << 21;
+
+/// Rays from each vertex at least.
+const LEAST_LOOKING: u32 = 2;
+
+/// One of so many rays may meet a back. From a vertex that lies within something what rays find is dark, and would show
+/// around it.
+const RAYS_OF_BACK: u32 = 4;
+
+/// Rays from a vertex in a corner at most. Fewer leave grain, more cost time there.
+const GATHERING: u32 = 256;
+
+/// Standard errors by which what a vertex and its neighbours find must differ from what links tell to be a corner.
+/// Smaller gathers by chance, larger misses corners.
+const DEVIATIONS: f32 = 1.5;
+
+/// Part of the light at a vertex that must be indirect for rays to look at it.
+const LEAST_INDIRECT: f32 = 0.1;
+
+/// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
+const MOST_ROUNDS: u32 = 64;
+
+/// Rays are asked again until that changes no vertex by more than this part of the tolerance of sweeps, times the scene's
+/// mean. Larger leaves light in closed rooms, where each round takes away what walls absorb; smaller takes time.
+const SETTLED: f32 = 0.1;
+
+/// Rounds that are remembered to accelerate them. Fewer take longer in white rooms, more gain nothing.
+const DEPTH: usize = 3;
+
+/// What a ray met.
+#[derive(Clone, Copy)]
+enum Met {
+    /// Nothing that sends light.
+    Nothing,
+    /// The back of a one-sided surface.
+    Back,
+    /// A leaf, with the shares that its first two corners have in the light there.
+    Leaf(u32, [f32; 2]),
+}
+
+/// What a leaf sends, from the light at its corners.
+#[derive(Clone, Copy, Default)]
+struct Sender {
+    vertices: [u32; 3],
+    reflectance: Vec4,
+    emitted: Vec4,
+}
+
+impl Sender {
+    /// Radiosity where the first two corners have these shares, of irradiance `received` at vertices and linear between
+    /// them.
+    fn radiosity(&self, [a, b]: [f32; 2], received: &[Vec4]) -> Vec4 {
+        let [first, second, third] = self.vertices.map(|vertex| received[vertex as usize]);
+        let irradiance = first * a + second * b + third * (1.0 - a - b);
+        self.emitted + self.reflectance * irradiance
+    }
+}
+
+/// A vertex that rays look at.
+struct Look {
+    vertex: usize,
+    place: Receiver,
+    /// Linked irradiance.
+    linked: Vec4,
+    /// Luminance of all irradiance.
+    all: f32,
+    /// Root of the vertex's share of the area.
+    weight: f32,
+    met: Vec<Met>,
+    found: Gathered,
+}
+
+impl Look {
+    /// Whether noise of what was found would show.
+    fn is_noisy(&self, limits: Limits) -> bool {
+        let (_, variance) = self.found.gap(self.linked);
+        limits.is_noise_seen(variance.sqrt(), self.all, self.weight)
+    }
+}
+
+impl Solver {
+    /// Find out by what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
+    pub(crate) fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
+        if self.rays.is_clear() {
+            return Some(());
+        }
+        if let Some(field) = &mut self.direct {
+            field.smooth(&self.hierarchy);
+        }
+        let linked = VertexMeans::new(&self.hierarchy, &self.leaves, &[]).irradiance;
+        let direct: Vec<Vec4> = (0..linked.len() as u32)
+            .into_par_iter()
+            .map(|vertex| self.direct_shown(vertex))
+            .collect();
+        let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
+        let mut looks = self.looks(&linked);
+        let limits = self.direct_limits(threshold_scale);
+        let looking = MOST_LOOKING / looks.len().max(1);
+        let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
+        let senders = self.senders();
+        self.shoot(&mut looks, |_| looking, cancel)?;
+        ask(&mut looks, &senders, &received);
+        looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
+        let edges = edges(&self.hierarchy);
+        let is_corner = in_corners(&edges, self.hierarchy.mesh.vertices.len(), &looks, limits);
+        let mut most = looking;
+        while most < GATHERING {
+            most *= 2;
+            let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(limits) {
+                true => most,
+                false => look.found.rays,
+            };
+            self.shoot(&mut looks, more, cancel)?;
+            ask(&mut looks, &senders, &received);
+        }
+        let light = [&linked, &direct].map(Vec::as_slice);
+        self.gathered =
+            self.settled_factors(&mut looks, &senders, &edges, light, threshold_scale, cancel)?;
+        Some(())
+    }
+
+    /// Correct linked and direct light at the vertices by what rays found, ask them again, and so on until nothing changes.
+    /// Returns factors by vertex.
+    fn settled_factors(
+        &self,
+        looks: &mut [Look],
+        senders: &[Sender],
+        edges: &[[usize; 2]],
+        [linked, direct]: [&[Vec4]; 2],
+        threshold_scale: f32,
+        cancel: &Cancel,
+    ) -> Option<Vec<Vec4>> {
+        let mesh = &self.hierarchy.mesh;
+        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
+        let most = SETTLED * threshold_scale * self.settings.tolerance * self.mean_irradiance;
+        let areas = mesh.areas_about_vertices();
+        let mut received: Vec<Vec4> = linked.iter().zip(direct).map(|(a, b)| a + b).collect();
+        let mut acceleration = Anderson::new(DEPTH);
+        let mut round = 0;
+        loop {
+            cancel.proceed()?;
+            let mut ratios = vec![None; mesh.vertices.len()];
+            for look in &*looks {
+                ratios[look.vertex] = Some(look.found.over(look.linked));
+            }
+            let mut factors = factors(ratios, edges);
+            carry_over(mesh, tells, &mut factors);
+            let lights = linked.iter().zip(direct).zip(&factors);
+            let corrected: Vec<Vec4> = lights.map(|((l, d), factor)| l * *factor + d).collect();
+            let changes = corrected.iter().zip(&received);
+            let change = changes
+                .map(|(new, old)| luminance((new - old).abs()))
+                .fold(0.0, f32::max);
+            round += 1;
+            if change <= most || round >= MOST_ROUNDS {
+                return Some(factors);
+            }
+            received = acceleration.next(&areas, &received, &corrected);
+            ask(looks, senders, &received);
+        }
+    }
+
+    /// Direct irradiance that is shown at a vertex.
+    fn direct_shown(&self, vertex: u32) -> Vec4 {
+        let field = self.direct.as_ref();
+        field.map_or(Vec4::ZERO, |field| field.vertex(&self.hierarchy, vertex).0)
+    }
+
+    /// The vertices at which enough light is indirect, by linked irradiance.
+    fn looks(&self, linked: &[Vec4]) -> Vec<Look> {
+        let mesh = &self.hierarchy.mesh;
+        let weights = vertex_share_roots(&self.hierarchy);
+        let look = |(vertex, place): (u32, Receiver)| {
+            let linked = linked[vertex as usize];
+            let direct = match &self.direct {
+                Some(field) => field.corner(vertex),
+                None => Vec4::ZERO,
+            };
+            let all = luminance(linked + direct);
+            (luminance(linked) > LEAST_INDIRECT * all).then(|| Look {
+                vertex: vertex as usize,
+                place,
+                linked,
+                all,
+                weight: weights[vertex as usize],
+                met: Vec::new(),
+                found: Gathered::default(),
+            })
+        };
+        let all = vec![true; mesh.vertices.len()];
+        let elements = 0..mesh.elements.len();
+        let none = OffsetPlaces::default();
+        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
+        let places = offsets.vertex_places(&self.hierarchy, elements, &all);
+        places.into_iter().filter_map(look).collect()
+    }
+
+    /// Shoot rays until each vertex has had as many as are wanted.
+    fn shoot(
+        &mut self,
+        looks: &mut [Look],
+        wanted: impl Fn(&Look) -> u32 + Sync,
+        cancel: &Cancel,
+    ) -> Option<()> {
+        let this = &*self;
+        let shot: Vec<u32> = looks
+            .par_iter_mut()
+            .with_min_len(16)
+            .map(|look| {
+                if cancel.is_cancelled() {
+                    return 0;
+                }
+                let mut random = Random::new(this.settings.seed, look.vertex as u64);
+                let shift = random.uniform_2d();
+                let (before, rays) = (look.met.len() as u32, wanted(look));
+                for index in before..rays {
+                    let square = low_discrepancy_2d(index, shift);
+                    let direction = cosine_direction(look.place.normal, square);
+                    look.met.push(this.meet(&look.place, direction));
+                }
+                rays - before
+            })
+            .collect();
+        cancel.proceed()?;
+        self.ray_count += shot.into_iter().map(u64::from).sum::<u64>();
+        Some(())
+    }
+
+    /// What a ray meets first.
+    fn meet(&self, from: &Receiver, direction: Vec3) -> Met {
+        let hit = self
+            .rays
+            .closest(from.point, direction, Some(from.triangle));
+        let Some(hit) = hit else {
+            return Met::Nothing;
+        };
+        let hierarchy = &self.hierarchy;
+        let Some(patch) = hierarchy.side_met(hit.triangle, direction) else {
+            return Met::Back;
+        };
+        if !hierarchy.active_patches().contains(&patch) {
+            return Met::Nothing;
+        }
+        let point = from.point + direction * hit.distance;
+        let Some(leaf) = hierarchy.mesh.leaf_at(patch, point) else {
+            return Met::Back;
+        };
+        let [a, b, _] = barycentric(point, hierarchy.mesh.corners(leaf)).to_array();
+        Met::Leaf(leaf as u32, [a, b])
+    }
+
+    /// What each element sends over links if it is a leaf.
+    fn senders(&self) -> Vec<Sender> {
+        let elements = &self.hierarchy.mesh.elements;
+        let sender = |index: usize| Sender {
+            vertices: elements[index].vertices,
+            reflectance: self.hierarchy.reflectance_of(index).extend(0.0),
+            emitted: self.radiosity_under(index, Vec4::ZERO).with_w(0.0),
+        };
+        (0..elements.len())
+            .into_par_iter()
+            .map(|index| {
+                let element = &elements[index];
+                let sends = element.is_leaf() && !element.is_inside_solid();
+                if sends {
+                    sender(index)
+                } else {
+                    Sender::default()
+                }
+            })
+            .collect()
+    }
+}
+
+/// Count the radiosity of what rays met, of irradiance `received` at vertices.
+fn ask(looks: &mut [Look], senders: &[Sender], received: &[Vec4]) {
+    let radiosity = |met: &Met| match *met {
+        Met::Nothing => Some(Vec4::ZERO),
+        Met::Back => None,
+        Met::Leaf(leaf, shares) => Some(senders[leaf as usize].radiosity(shares, received)),
+    };
+    looks.par_iter_mut().with_min_len(64).for_each(|look| {
+        look.found = Gathered::default();
+        for met in &look.met {
+            look.found.count(radiosity(met));
+        }
+    });
+}
+
+/// Vertices at the ends of the edges of leaves; inner edges come twice.
+fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
+    let mesh = &hierarchy.mesh;
+    let of = |leaf: usize| mesh.elements[leaf].edges();
+    mesh.active_leaves().flat_map(of).collect()
+}
+
+/// Vertices that find something else than links tell, together with their neighbours, and these neighbours.
+fn in_corners(
+    edges: &[[usize; 2]],
+    vertex_count: usize,
+    looks: &[Look],
+    limits: Limits,
+) -> Vec<bool> {
+    // Gap, its variance, and how many.
+    let mut own = vec![(0.0f32, 0.0f32, 0.0f32); vertex_count];
+    for look in looks {
+        let (gap, variance) = look.found.gap(look.linked);
+        own[look.vertex] = (gap, variance, 1.0);
+    }
+    let mut pooled = own.clone();
+    for &[vertex, next] in edges {
+        // An inner edge comes once from each end, so each neighbour is taken once, but at borders.
+        let (sum, next) = (&mut pooled[vertex], own[next]);
+        *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
+    }
+    let mut differs = vec![false; vertex_count];
+    for look in looks {
+        let (gap, variance, number) = pooled[look.vertex];
+        let is_seen = limits.is_seen(gap.abs() / number.max(1.0), look.all, look.weight);
+        differs[look.vertex] = is_seen && gap * gap > DEVIATIONS * DEVIATIONS * variance;
+    }
+    let mut wanted = differs.clone();
+    for &[a, b] in edges {
+        wanted[a] |= differs[b];
+        wanted[b] |= differs[a];
+    }
+    wanted
+}

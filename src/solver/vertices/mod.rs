@@ -1,0 +1,8 @@
+//! Light at vertices: from links, and from rays in the last step.
+
+mod final_gather;
+mod gathered;
+mod reconstruct;
+
+pub(crate) use reconstruct::{LeafLight, VertexMeans, link_irradiance, own_irradiance};
+pub(crate) use reconstruct::{bent_under, gather_leaves};

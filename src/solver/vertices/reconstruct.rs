@@ -1,0 +1,396 @@
+//! From links to light at vertices.
+//!
+//! Each leaf gathers once more, over its own links and those of everything above it, now at its own place and not at
+//! the clusters' centroids: light of clusters at its centroid, light of links to elements at each of its corners. A
+//! vertex takes the mean of the leaves that share it, so light is never carried over a crease or a material border.
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use crate::{
+    geometry::Vectors4,
+    hierarchy::{Hierarchy, Kind, NodeId},
+    solver::{
+        Cancel,
+        coverage::{Closure, Closures},
+        direct::{Limits, SPREAD_SHARE},
+        places::{OffsetPlaces, carry_over, project, share_root},
+    },
+    transport::{Kernel, Link, LinkStore, Sights, luminance, self_irradiance},
+};
+
+/// Patches of the clusters whose leaves are visited by one task; fewer in small scenes.
+const TASK_PATCHES: u32 = 256;
+
+/// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
+/// seams show between groups; larger, and the same is worked out again and again.
+const SIGHT_DISTANCE: f32 = 8.0;
+
+/// The same in coarse steps, whose links err by more.
+const COARSE_SIGHT_DISTANCE: f32 = 4.0;
+
+/// What an element that lies within a solid in part counts at a vertex beside others: links see it as a whole.
+const CONTACT_TRUST: f32 = 1e-3;
+
+/// What a leaf found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LeafLight {
+    /// The leaf.
+    pub element: u32,
+    /// Linked irradiance at its corners.
+    pub corners: [Vec4; 3],
+    /// Linked irradiance at its centroid.
+    pub centre: Vec4,
+    /// Sum of the errors of its links (luminance).
+    pub error: f32,
+}
+
+/// Linked irradiance of all leaves, in the order of the tree; `None` when cancelled.
+pub(crate) fn gather_leaves(
+    kernel: Kernel<'_>,
+    links: &LinkStore,
+    closures: &Closures,
+    offsets: &OffsetPlaces,
+    is_coarse: bool,
+    cancel: &Cancel,
+) -> Option<Vec<LeafLight>> {
+    let hierarchy = kernel.hierarchy;
+    let sight_distance = match is_coarse {
+        true => COARSE_SIGHT_DISTANCE,
+        false => SIGHT_DISTANCE,
+    };
+    let found: Vec<Vec<LeafLight>> = hierarchy
+        .groups(hierarchy.task_patches(TASK_PATCHES))
+        .into_par_iter()
+        .map(|group| {
+            let mut walk = Walk {
+                kernel,
+                links,
+                closures,
+                offsets,
+                sight_distance,
+                path: Vec::new(),
+                spare: Vec::new(),
+                found: Vec::new(),
+            };
+            if !cancel.is_cancelled() {
+                walk.enter(group);
+            }
+            walk.found
+        })
+        .collect();
+    cancel.proceed()?;
+    Some(found.into_iter().flatten().collect())
+}
+
+/// Scale the light of the leaves of one cell so that their form factors add to the closure; `nearby` is the mean radiosity
+/// of the neighbourhood.
+fn scale_to_closure(
+    hierarchy: &Hierarchy,
+    closure: Closure,
+    nearby: Vec3,
+    leaves: &mut [LeafLight],
+) {
+    let sums = leaves.iter().fold((0.0, 0.0), |(areas, rows), leaf| {
+        let area = hierarchy.mesh.elements[leaf.element as usize]
+            .area_vector
+            .length();
+        (areas + area, rows + area * leaf.centre.w)
+    });
+    for leaf in leaves {
+        for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
+            *value = closure.scaled(*value, sums, nearby);
+        }
+    }
+}
+
+/// Links of a node, and what is left of those above it, as far as they are worked out for all leaves below together.
+#[derive(Default)]
+struct Chain<'a> {
+    /// Irradiance that is the same everywhere.
+    even: Vec4,
+    /// Sources that are far enough to look alike from everywhere, with their transmissions.
+    sights: Sights,
+    /// The others.
+    rest: Vec<&'a Link>,
+    /// Links of elements, whose light is wanted at the corners of the leaves.
+    own: &'a [Link],
+    /// Sum of the errors of the links of clusters.
+    error: f32,
+}
+
+impl<'a> Chain<'a> {
+    /// As new, with its memory.
+    fn emptied(mut self) -> Self {
+        self.sights.clear();
+        self.rest.clear();
+        Self {
+            sights: self.sights,
+            rest: self.rest,
+            ..Self::default()
+        }
+    }
+
+    /// Take a link over. It is worked out if its source is further than `far` from a centre.
+    fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, far: f32) {
+        match kernel.hierarchy.kind(link.source) {
+            Kind::Cluster(index)
+                if centre.distance_squared(kernel.tables.centres[index]) > far * far =>
+            {
+                let sight = kernel.sight(index, centre);
+                self.sights.push(&sight, link.transmission());
+            }
+            _ => self.rest.push(link),
+        }
+    }
+
+    /// Irradiance over the links that are worked out.
+    fn known(&self, point: Vec3, normal: Vec3) -> Vec4 {
+        self.sights.add_to(self.even, point, normal)
+    }
+}
+
+/// A walk over the leaves below a cluster, in the order of the tree.
+struct Walk<'a> {
+    kernel: Kernel<'a>,
+    links: &'a LinkStore,
+    closures: &'a Closures,
+    offsets: &'a OffsetPlaces,
+    /// See [`SIGHT_DISTANCE`].
+    sight_distance: f32,
+    /// Of the nodes above the current one.
+    path: Vec<Chain<'a>>,
+    /// Those that are no longer needed, for their memory.
+    spare: Vec<Chain<'a>>,
+    found: Vec<LeafLight>,
+}
+
+impl<'a> Walk<'a> {
+    /// Visit all leaves below a cluster.
+    fn enter(&mut self, group: usize) {
+        let hierarchy = self.kernel.hierarchy;
+        let mut above: Vec<usize> = Vec::new();
+        let mut at = hierarchy.clusters[group].parent;
+        while at != u32::MAX {
+            above.push(at as usize);
+            at = hierarchy.clusters[at as usize].parent;
+        }
+        for &cluster in above.iter().rev() {
+            self.push_cluster(cluster);
+        }
+        let mut pending = vec![(group, self.path.len())];
+        while let Some((cluster, depth)) = pending.pop() {
+            self.leave(depth);
+            self.push_cluster(cluster);
+            if hierarchy.clusters[cluster].is_leaf() {
+                for patch in hierarchy.clusters[cluster].patches() {
+                    self.visit_patch(patch);
+                }
+            } else {
+                let children = hierarchy.children(NodeId(cluster as u32));
+                pending.extend(children.rev().map(|child| (child as usize, depth + 1)));
+            }
+        }
+    }
+
+    /// Cut the path to a length.
+    fn leave(&mut self, depth: usize) {
+        while self.path.len() > depth {
+            self.spare.extend(self.path.pop().map(Chain::emptied));
+        }
+    }
+
+    /// Add a node to the path, with the links that are not worked out above it.
+    fn push(&mut self, centre: Vec3, radius: f32, mut chain: Chain<'a>) {
+        let far = self.sight_distance * radius;
+        if let Some(above) = self.path.last() {
+            for link in &above.rest {
+                chain.add(self.kernel, link, centre, far);
+            }
+        }
+        self.path.push(chain);
+    }
+
+    fn push_cluster(&mut self, index: usize) {
+        let cluster = &self.kernel.hierarchy.clusters[index];
+        let far = self.sight_distance * cluster.radius;
+        let mut chain = self.spare.pop().unwrap_or_default();
+        for link in self.links.of(NodeId(index as u32)) {
+            chain.error += link.error;
+            if link.source.index() == index {
+                chain.even += own_irradiance(self.kernel, index, link);
+            } else {
+                chain.add(self.kernel, link, cluster.centroid, far);
+            }
+        }
+        self.push(cluster.centroid, cluster.radius, chain);
+    }
+
+    /// Visit the leaves of a patch.
+    fn visit_patch(&mut self, patch: usize) {
+        let hierarchy = self.kernel.hierarchy;
+        let normal = hierarchy.patches[patch].normal;
+        let base = hierarchy.clusters.len() as u32;
+        let (first, above) = (self.found.len(), self.path.len());
+        // Elements with the length of the path above them: depth first, without recursion.
+        let mut pending = vec![(patch, above)];
+        while let Some((index, depth)) = pending.pop() {
+            let element = &hierarchy.mesh.elements[index];
+            self.leave(depth);
+            let own = self.links.of(NodeId(base + index as u32));
+            if element.is_leaf() {
+                let light = self.leaf_light(index, normal, own);
+                self.found.push(light);
+                continue;
+            }
+            let mut chain = self.spare.pop().unwrap_or_default();
+            chain.own = own;
+            self.push(element.centroid, element.radius, chain);
+            pending.extend(element.children().rev().map(|child| (child, depth + 1)));
+        }
+        self.leave(above);
+        // Leaves come depth first, so those of a cell follow each other.
+        let cell = |leaf: &LeafLight| self.closures.cell(hierarchy, leaf.element as usize);
+        let nearby = self.closures.nearby(self.kernel.tables, patch);
+        for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
+            let closure = self.closures.of(cell(&leaves[0]));
+            scale_to_closure(hierarchy, closure, nearby, leaves);
+        }
+    }
+
+    /// What a leaf finds; `own` are its links.
+    fn leaf_light(&self, index: usize, normal: Vec3, own: &[Link]) -> LeafLight {
+        let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
+        let centroid = hierarchy.mesh.elements[index].centroid;
+        let mut light = LeafLight {
+            element: index as u32,
+            ..LeafLight::default()
+        };
+        for chain in &self.path {
+            light.error += chain.error;
+            light.centre += chain.known(centroid, normal);
+        }
+        for link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
+            light.centre += link_irradiance(kernel, link, centroid, normal);
+        }
+        light.corners = [light.centre; 3];
+        let corners = hierarchy.mesh.corners(index);
+        let [a, b, c] = self
+            .offsets
+            .places(&hierarchy.mesh.elements[index], corners);
+        let points = Vectors4::new([centroid, a, b, c]);
+        let elements = self.path.iter().flat_map(|chain| chain.own);
+        for link in elements.chain(own) {
+            light.error += link.error;
+            let transmission = transmission(kernel, link);
+            let [centre, corners @ ..] = kernel.irradiances(link.source, &points, normal);
+            light.centre += centre * transmission;
+            for (sum, corner) in light.corners.iter_mut().zip(corners) {
+                *sum += corner * transmission;
+            }
+        }
+        light
+    }
+}
+
+/// What all faces of a cluster receive over its link with itself.
+pub(crate) fn own_irradiance(kernel: Kernel<'_>, cluster: usize, link: &Link) -> Vec4 {
+    let total = kernel.tables.clusters[cluster].total();
+    self_irradiance(kernel.hierarchy, cluster, total) * link.transmission()
+}
+
+/// What a face receives over a link from another node, of its own or of what is above it.
+pub(crate) fn link_irradiance(kernel: Kernel<'_>, link: &Link, point: Vec3, normal: Vec3) -> Vec4 {
+    kernel.irradiance(link.source, point, normal) * transmission(kernel, link)
+}
+
+/// What gets through over a link where form factors are evaluated anew.
+fn transmission(kernel: Kernel<'_>, link: &Link) -> Vec4 {
+    match kernel.hierarchy.kind(link.source) {
+        Kind::Cluster(_) => link.transmission(),
+        Kind::Element(_) => Vec4::splat(link.visibility),
+    }
+}
+
+/// Area-weighted means of the leaves about each vertex.
+pub(crate) struct VertexMeans {
+    /// Linked irradiance.
+    pub irradiance: Vec<Vec4>,
+    /// Sum of link errors.
+    pub error: Vec<f32>,
+}
+
+impl VertexMeans {
+    /// Average what leaves found over the vertices that they share. Irradiance is multiplied by `factors`, or by
+    /// 1 where there are none. Vertices that only close an edge take the mean of its ends.
+    pub(crate) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight], factors: &[Vec4]) -> Self {
+        let count = hierarchy.mesh.vertices.len();
+        let (mut irradiance, mut error) = (vec![Vec4::ZERO; count], vec![0.0f32; count]);
+        let mut weight = vec![0.0f32; count];
+        for leaf in leaves {
+            let element = &hierarchy.mesh.elements[leaf.element as usize];
+            let trust = if element.is_outside_solids() {
+                1.0
+            } else {
+                CONTACT_TRUST
+            };
+            let area = (element.area_vector.length() * trust).max(f32::MIN_POSITIVE);
+            for (&vertex, &value) in element.vertices.iter().zip(&leaf.corners) {
+                irradiance[vertex as usize] += value * area;
+                error[vertex as usize] += leaf.error * area;
+                weight[vertex as usize] += area;
+            }
+        }
+        // Of patches that no light reaches it is known that they receive nothing.
+        for patch in hierarchy.active_patches().end..hierarchy.patches.len() {
+            for &vertex in &hierarchy.mesh.elements[patch].vertices {
+                weight[vertex as usize] += hierarchy.patches[patch].area;
+            }
+        }
+        for index in (0..count).filter(|&index| weight[index] > 0.0) {
+            irradiance[index] /= weight[index];
+            error[index] /= weight[index];
+        }
+        carry_over(
+            &hierarchy.mesh,
+            |element, _| element.is_outside_solids(),
+            &mut irradiance,
+        );
+        let centres = leaves
+            .iter()
+            .map(|leaf| (leaf.element as usize, leaf.centre))
+            .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
+        project(hierarchy, &mut irradiance, centres);
+        for (value, factor) in irradiance.iter_mut().zip(factors) {
+            *value *= *factor;
+        }
+        for index in (0..count).filter(|&index| weight[index] <= 0.0) {
+            if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {
+                // Ends were made before the vertices between them.
+                irradiance[index] = (irradiance[a as usize] + irradiance[b as usize]) * 0.5;
+                error[index] = (error[a as usize] + error[b as usize]) * 0.5;
+            }
+        }
+        Self { irradiance, error }
+    }
+}
+
+/// Leaves between whose corners the light that they found over links bends, as [`DirectField::adapt`] has it.
+pub(crate) fn bent_under(
+    hierarchy: &Hierarchy,
+    found: &[LeafLight],
+    limits: Limits,
+    mean: f32,
+) -> Vec<u32> {
+    let is_bent = |light: &LeafLight| {
+        let element = &hierarchy.mesh.elements[light.element as usize];
+        let corners = light.corners.map(luminance);
+        let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
+        let bend = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
+        let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
+        element.area_vector.length() * 0.25 >= limits.min_area
+            && (bend + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
+    };
+    let bent = found.iter().filter(|light| is_bent(light));
+    bent.map(|light| light.element).collect()
+}
