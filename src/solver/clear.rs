@@ -1,61 +1,12 @@
-//! Where nothing casts a shadow: over which elements the light of sampled emitters is as good as linear, how much light
-//! varies over others, and what is known of closures.
-//!
-//! Elements are divided where their corners do not tell what lies between. Shadows could hide from all of them, and so
-//! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
+//! Where nothing casts a shadow: how much light varies over elements, and what is known of closures.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
     Solver,
     coverage::{Closure, Closures},
-    direct::{Lights, Limits, SPREAD_SHARE},
-    places::{INSET, Receiver, share_root},
 };
-use crate::{hierarchy::Hierarchy, transport::luminance};
-
-/// Places on a triangle, barycentric: the middles of its sides and those of its quarters.
-const PLACES: [Vec3; 7] = [
-    Vec3::new(0.5, 0.5, 0.0),
-    Vec3::new(0.0, 0.5, 0.5),
-    Vec3::new(0.5, 0.0, 0.5),
-    Vec3::new(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0),
-    Vec3::new(2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0),
-    Vec3::new(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
-    Vec3::new(1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0),
-];
-
-impl Lights {
-    /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
-    /// emitters are not sampled, so that it is not known.
-    pub(super) fn bend_over(&self, hierarchy: &Hierarchy, element: usize, limits: Limits) -> bool {
-        if !self.are_all(hierarchy) {
-            return true;
-        }
-        let mut sums = Vec::new();
-        let patch = hierarchy.patch_of(element);
-        let centroid = hierarchy.mesh.elements[element].centroid;
-        let [a, b, c] = hierarchy.mesh.corners(element);
-        let mut light = |at: Vec3| {
-            let point = (a * at.x + b * at.y + c * at.z).lerp(centroid, INSET);
-            let receiver = Receiver {
-                point,
-                normal: patch.normal,
-                triangle: patch.triangle,
-            };
-            luminance(self.unoccluded(&receiver, None, &mut sums))
-        };
-        let corners = Vec3::from_array(Vec3::AXES.map(&mut light));
-        let bend = PLACES
-            .map(|place| (light(place) - corners.dot(place)).abs())
-            .into_iter()
-            .fold(0.0, f32::max);
-        let spread = corners.max_element() - corners.min_element();
-        let mean = self.mean_power(hierarchy).max(f32::MIN_POSITIVE);
-        (bend + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
-    }
-}
+use crate::transport::luminance;
 
 impl Solver {
     /// Closures that need no rays: 1 on closed surfaces, and none where all form factors are exact. Elsewhere they must be

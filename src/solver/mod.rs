@@ -5,34 +5,34 @@
 //! gathering and pushing until the light settles, and gathers once more for the vertices.
 
 mod budget;
+mod cancel;
 mod clear;
 mod coverage;
 mod direct;
 mod iteration;
+mod limits;
 mod omission;
 mod output;
 mod places;
 mod plan;
 mod relight;
+mod schedule;
 mod settings;
 mod shown;
+mod sums;
 mod textures;
 mod vertices;
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
-};
+use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 
+pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, InspectedLink, Inspection, PathNode, Place, Snapshot, StepReport,
-    Subject, VertexLight,
+    ClusterBox, DisplayMesh, InspectedLink, Inspection, LeftOut, PathNode, Place, Relit, Snapshot,
+    StepReport, Subject, VertexLight,
 };
-pub use plan::LeftOut;
-pub use relight::Relit;
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 
 use crate::{
@@ -45,43 +45,16 @@ use crate::{
 };
 use coverage::Closures;
 use direct::{DirectField, Lights};
+use limits::{Limits, min_area, shadow_samples};
 use places::OffsetPlaces;
 use plan::Plan;
 use relight::Relighting;
+use schedule::{is_coarse, threshold_scale};
 use vertices::LeafLight;
-
-/// A request to stop, seen by everything that runs long. Clones share one flag.
-#[derive(Clone, Debug, Default)]
-pub struct Cancel(Arc<AtomicBool>);
-
-impl Cancel {
-    /// Ask to stop.
-    pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether stopping was asked for.
-    pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-
-    /// `None` where stopping was asked for.
-    pub(super) fn proceed(&self) -> Option<()> {
-        (!self.is_cancelled()).then_some(())
-    }
-}
 
 /// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
 /// comes soon; the first step shoots the others.
 const FIRST_RAYS: usize = 1 << 20;
-
-/// The threshold falls by this factor from step to step. Larger, and steps come late; smaller, and judging old links
-/// again costs more than the new ones.
-const THRESHOLD_FACTOR: f32 = 2.0;
-
-/// Steps whose thresholds are at least this many times the last one's are coarse: their links err by more than a few rays
-/// do. Smaller, and the first pictures come later; larger, and they are rougher than their links.
-const COARSE_THRESHOLD_SCALE: f32 = 4.0;
 
 /// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
 /// `MOST_RAISES`: then the root's exchange with itself is left.
@@ -214,11 +187,14 @@ impl Solver {
 
     /// Sample direct light on the first mesh, so that there is something to see before the first link.
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
-        let limits = self.direct_limits(1.0);
+        let limits = self.limits(1.0);
         self.divide_coarse(limits);
         self.divide_contacts(cancel)?;
         let most = (FIRST_RAYS / self.hierarchy.mesh.vertices.len().max(1)).max(1);
-        let (count, seed) = (self.shadow_samples(true).min(most as u32), limits.seed);
+        let (count, seed) = (
+            shadow_samples(&self.settings, true).min(most as u32),
+            limits.seed,
+        );
         if let Some(field) = &mut self.direct {
             self.ray_count += field.cover(&self.rays, &self.hierarchy, count, seed, cancel)?;
         }
@@ -261,7 +237,7 @@ impl Solver {
             step: self.step + 1,
             ..StepReport::default()
         };
-        let threshold_scale = self.threshold_scale_of(report.step);
+        let threshold_scale = threshold_scale(report.step, self.settings.step_count());
         report.epsilon = self.settings.epsilon * threshold_scale;
         self.is_full = false;
         self.relighting.begin_step();
@@ -300,7 +276,7 @@ impl Solver {
     /// that of the last step.
     pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
         let before = std::mem::take(&mut self.gathered);
-        let threshold_scale = self.threshold_scale_of(self.step);
+        let threshold_scale = threshold_scale(self.step, self.settings.step_count());
         let found = self.final_gather(threshold_scale, cancel).and_then(|()| {
             let mut report = self.relighting.last_report();
             self.fill(&mut report);
@@ -311,11 +287,6 @@ impl Solver {
             self.gathered = before;
         }
         found
-    }
-
-    /// By what the threshold of a step is above the last one's.
-    fn threshold_scale_of(&self, step: u32) -> f32 {
-        THRESHOLD_FACTOR.powi(self.settings.step_count().saturating_sub(step) as i32)
     }
 
     /// Let each leaf gather once more, for the vertices.
@@ -422,7 +393,7 @@ impl Solver {
 
     /// Make direct light known at all vertices, and divide elements where it bends.
     fn adapt_to_direct(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
-        let limits = self.direct_limits(threshold_scale);
+        let limits = self.limits(threshold_scale);
         self.is_full |= !self.divide_coarse(limits);
         if let Some(field) = &mut self.direct {
             self.ray_count += field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
@@ -434,7 +405,7 @@ impl Solver {
     }
 
     /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
-    fn divide_coarse(&mut self, limits: direct::Limits) -> bool {
+    fn divide_coarse(&mut self, limits: Limits) -> bool {
         let lights = self.direct.as_ref().map(|field| &field.lights);
         let is_clear = self.plan.follows_light;
         direct::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
@@ -445,7 +416,7 @@ impl Solver {
         if !self.plan.follows_light {
             return;
         }
-        let (limits, mean) = (self.direct_limits(threshold_scale), self.mean_irradiance);
+        let (limits, mean) = (self.limits(threshold_scale), self.mean_irradiance);
         let wanted = vertices::bent_under(&self.hierarchy, &self.leaves, limits, mean);
         let fits = self.hierarchy.mesh.fits(&wanted, limits.most_elements);
         self.is_full |= !fits;
@@ -455,28 +426,9 @@ impl Solver {
         }
     }
 
-    /// Shadow rays per vertex.
-    fn shadow_samples(&self, is_coarse: bool) -> u32 {
-        match is_coarse {
-            true => self.settings.shadow_samples.div_ceil(2),
-            false => self.settings.shadow_samples,
-        }
-    }
-
-    fn direct_limits(&self, threshold_scale: f32) -> direct::Limits {
-        let tolerance = self.settings.mesh_tolerance * threshold_scale;
-        direct::Limits {
-            tolerance,
-            // Coarse steps are seen for a moment.
-            contrast: match is_coarse(threshold_scale) {
-                true => f32::INFINITY,
-                false => direct::CONTRAST_TOLERANCE * tolerance,
-            },
-            min_area: self.min_area(),
-            shadow_samples: self.shadow_samples(is_coarse(threshold_scale)),
-            seed: self.settings.seed,
-            most_elements: self.most_elements(),
-        }
+    fn limits(&self, threshold_scale: f32) -> Limits {
+        let (settings, hierarchy) = (&self.settings, &self.hierarchy);
+        Limits::new(settings, hierarchy, threshold_scale, self.most_elements())
     }
 
     /// Elements inherit the linked irradiance, and the factor of what they send, of the one that was divided, and have colours of their own.
@@ -490,19 +442,14 @@ impl Solver {
         }
     }
 
-    /// Smallest element area that may be divided off, frame units.
-    fn min_area(&self) -> f32 {
-        (f64::from(self.settings.min_area) * self.hierarchy.importance.area) as f32
-    }
-
     /// Mean irradiance (luminance), to which thresholds relate. Before any link it is guessed from the direct light.
     fn estimate_mean(&mut self) {
-        let mut mean = iteration::scale(&self.hierarchy, |leaf| {
+        let mut mean = sums::scale(&self.hierarchy, |leaf| {
             self.linked[leaf] + self.direct_of(leaf)
         });
         let is_dark = |light: &Vec4| light.truncate() == Vec3::ZERO;
         if self.linked.iter().all(is_dark) {
-            let power = iteration::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
+            let power = sums::area_sum(&self.hierarchy, |leaf| self.power.elements[leaf]);
             let power = power / self.hierarchy.importance.area.max(f64::MIN_POSITIVE);
             let brightest = self.power.brightest(&self.hierarchy, Hierarchy::ROOT);
             // Far surroundings send most of their light past the scene.
@@ -514,7 +461,7 @@ impl Solver {
     /// Bring the links to the threshold of a scale; source tables are up to date before and after. Returns the threshold that
     /// they have: where links do not fit into memory, those from before stay, and the first ones are made coarser.
     fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
-        let limits = self.direct_limits(threshold_scale);
+        let limits = self.limits(threshold_scale);
         let mut epsilon = self.settings.epsilon * threshold_scale;
         let (mut passes, mut raises) = (0, 0);
         let mut judged = None;
@@ -550,7 +497,7 @@ impl Solver {
                     links_of: |node| self.links.of(node),
                     judged,
                     threshold: epsilon * self.mean_irradiance,
-                    min_area: self.min_area(),
+                    min_area: min_area(&self.settings, &self.hierarchy),
                     seed: self.settings.seed,
                     cancelled: &|| cancel.is_cancelled(),
                     budget: LinkBudget::new(most_links),
@@ -600,18 +547,6 @@ impl Solver {
         }
         Some(epsilon)
     }
-}
-
-/// Whether a step of this threshold scale is coarse.
-fn is_coarse(threshold_scale: f32) -> bool {
-    threshold_scale >= COARSE_THRESHOLD_SCALE
-}
-
-/// A colour that is safe to show: finite and not negative.
-fn displayable(color: Vec4) -> Vec3 {
-    color
-        .truncate()
-        .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
 }
 
 #[cfg(test)]

@@ -28,9 +28,7 @@
 
 use std::sync::Arc;
 
-use serde::Serialize;
-
-use super::{Cancel, Method, Omission, Oracle, SolveSettings};
+use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::LeftOut};
 use crate::{
     hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
     scene::{ActiveMaterials, Scene, WarningKind},
@@ -41,21 +39,6 @@ use crate::{
 /// all pairs are too many: a sphere of 320 patches would take a quarter more time.
 const FEW_PATCHES: usize = 256;
 
-/// One thing that was left out, for people.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    /// What it is called; where it is the name of an [`Omission`], it can be kept.
-    pub name: &'static str,
-    /// How many of it.
-    pub count: u64,
-    /// What was left out.
-    pub what: String,
-    /// Why it is not needed.
-    pub reason: String,
-    /// How far the light may differ from that with it.
-    pub bound: &'static str,
-}
-
 impl LeftOut {
     /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
     pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
@@ -64,19 +47,6 @@ impl LeftOut {
         let is_cancelled = || cancel.is_cancelled();
         let (plan, _) = Plan::make(scene, sheets.as_ref(), settings, active, &is_cancelled)?;
         Some(Arc::unwrap_or_clone(plan.left_out))
-    }
-}
-
-impl std::fmt::Display for LeftOut {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            name,
-            what,
-            reason,
-            bound,
-            ..
-        } = self;
-        write!(out, "{name}: {what}, since {reason}; {bound}")
     }
 }
 

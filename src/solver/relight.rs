@@ -15,7 +15,7 @@ use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    Cancel, Solver, StepReport,
+    Cancel, Relit, Solver, StepReport,
     direct::{LightParts, Shooting, common_ratio},
     iteration::CEILING_SLACK,
     vertices::LeafLight,
@@ -28,18 +28,6 @@ use crate::{
 /// Corners of elements are lit by at most this many times the mean of the element, where that is told by the light before.
 /// Smaller flattens corners near what is bright, larger shows bright corners where an element was all but dark before.
 const MOST_AT_CORNERS: f32 = 4.0;
-
-/// What came of relighting.
-#[derive(Clone, Debug)]
-pub struct Relit {
-    /// The figures of the last step, but for what has changed.
-    pub report: StepReport,
-    /// Whether [`Solver::finish_relighting`] would tell more of the light within elements.
-    pub is_rough: bool,
-    /// Whether light reaches what was left out of the solve: it is missing, and only a solve that begins anew for these
-    /// appearances will show it.
-    pub needs_restart: bool,
-}
 
 /// Light that was solved when materials looked so.
 struct Solved {

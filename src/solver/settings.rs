@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{THRESHOLD_FACTOR, omission::Keep};
+use super::{omission::Keep, schedule::THRESHOLD_FACTOR};
 
 /// How a cluster's directional power and area are represented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::Solver;
+use super::{Solver, limits::min_area};
 use crate::{hierarchy::Hierarchy, scene::Appearance, transport::luminance};
 
 /// Error of the light that leaves, relative to all of it. Larger shows lamps in wrong places, smaller divides more finely
@@ -101,7 +101,7 @@ impl Solver {
 
     /// Leaves that textures may divide.
     fn textured_leaves(&self) -> Vec<usize> {
-        let (hierarchy, min_area) = (&self.hierarchy, self.min_area());
+        let (hierarchy, min_area) = (&self.hierarchy, min_area(&self.settings, &self.hierarchy));
         if self.scene.texcoords.is_empty() {
             return Vec::new();
         }

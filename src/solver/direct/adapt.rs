@@ -1,19 +1,16 @@
-//! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
-//! Elements are divided where linear interpolation between their corners would miss it.
+//! Division of elements where linear interpolation between their corners would miss direct light.
 
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::{
-    lights::{DirectLight, Lights},
-    smooth,
-};
+use super::{border::SPREAD_SHARE, field::DirectField, lights::Lights, samples::DirectLight};
 use crate::{
     geometry::RayTree,
-    hierarchy::{Element, Hierarchy, longest_edge_squared},
+    hierarchy::{Hierarchy, longest_edge_squared},
     solver::{
         Cancel,
-        places::{OffsetPlaces, Receiver, carry_over, centre_of, project, share_root},
+        limits::Limits,
+        places::{Receiver, centre_of, share_root},
     },
     transport::luminance,
 };
@@ -26,9 +23,6 @@ const LARGEST_SHARE: f32 = 1.0 / 1000.0;
 /// Larger elements are left whole where no other surface stands above their plane within this many radii and light does
 /// not bend: nothing can cast a shadow there. Smaller misses shadows that fall far, larger divides empty ground.
 const EMPTY_RADII: f32 = 16.0;
-
-/// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
-pub(crate) const SPREAD_SHARE: f32 = 0.15;
 
 /// Where all corners of an element lie in shadow, its centroid is sampled if it could get more light than this many
 /// times the tolerance. Smaller costs rays in the shade, larger loses light on narrow faces.
@@ -44,42 +38,6 @@ const BEND_SCALE: f32 = 30.0;
 
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
-
-/// When to divide.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Limits {
-    /// Error of interpolation, times the root of the element's share of the area, relative to the mean.
-    pub tolerance: f32,
-    /// Contrast of an error, times the fourth root of the element's share of the area; infinite where it does not count.
-    pub contrast: f32,
-    /// Children are not smaller, frame units.
-    pub min_area: f32,
-    /// Shadow rays per point.
-    pub shadow_samples: u32,
-    /// Seed of the rays.
-    pub seed: u64,
-    /// Elements that there may be.
-    pub most_elements: u64,
-}
-
-/// Direct light on a mesh.
-pub(crate) struct DirectField {
-    pub(crate) lights: Lights,
-    /// By vertex, where it was sampled; shorter than the vertices where some are new.
-    pub(crate) vertices: Vec<Option<DirectLight>>,
-    /// By element, where it was needed.
-    pub(crate) centres: Vec<Option<DirectLight>>,
-    /// Elements whose corners are all sampled: those that come after are new.
-    pub(crate) covered: usize,
-    /// Shadow rays that these corners have where it takes all.
-    pub(crate) samples: u32,
-    /// Vertices behind walls.
-    pub(crate) offsets: OffsetPlaces,
-    /// Irradiance to show by vertex; shorter than the vertices where some are new.
-    shown: Vec<Vec4>,
-    /// Whether the number of elements kept the last adaptation from being finer.
-    pub(crate) is_full: bool,
-}
 
 /// Divide elements that are too large to be trusted with their corners. Returns whether all could be. Where nothing casts
 /// a shadow, in all of the scene if `is_clear`, `lights` tell over which elements their light does not bend: these stay
@@ -129,92 +87,6 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
 }
 
 impl DirectField {
-    /// Nothing is known yet.
-    pub(crate) fn new(lights: Lights) -> Self {
-        Self {
-            lights,
-            vertices: Vec::new(),
-            centres: Vec::new(),
-            covered: 0,
-            samples: 0,
-            offsets: OffsetPlaces::default(),
-            shown: Vec::new(),
-            is_full: false,
-        }
-    }
-
-    /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
-    /// solid in part, that of its open part.
-    pub(crate) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
-        let leaf = &hierarchy.mesh.elements[element];
-        if leaf.is_contact() {
-            let open = (0..3).filter(|&side| !leaf.is_inside_solid_at(side));
-            let known = open.clone().map(|side| self.corner(leaf.vertices[side]));
-            return known.sum::<Vec4>() / (open.count().max(1) as f32);
-        }
-        let [a, b, c] = leaf.vertices.map(|vertex| self.corner(vertex));
-        let corners = a + b + c;
-        match self.centres.get(element).copied().flatten() {
-            Some(centre) => {
-                self.lights.bounded(centre.irradiance()) * 0.75 + corners * (0.25 / 3.0)
-            }
-            None => corners / 3.0,
-        }
-    }
-
-    /// Bring what is shown at vertices up to date with the samples.
-    pub(crate) fn smooth(&mut self, hierarchy: &Hierarchy) {
-        let fractions = smooth::fractions(hierarchy, &self.vertices);
-        let known = self.vertices.iter().zip(fractions);
-        self.shown = known
-            .map(|(light, fraction)| {
-                let unoccluded = light.map_or(Vec4::ZERO, |light| light.unoccluded());
-                self.lights.bounded(unoccluded * fraction)
-            })
-            .collect();
-        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        carry_over(&hierarchy.mesh, tells, &mut self.shown);
-        let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
-        let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
-            let centre = self.centres.get(leaf).copied().flatten()?;
-            Some((leaf, self.lights.bounded(centre.irradiance())))
-        });
-        project(hierarchy, &mut self.shown, centres);
-    }
-
-    /// Direct irradiance to show at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
-    /// mean of its ends.
-    pub(crate) fn vertex(&self, hierarchy: &Hierarchy, vertex: u32) -> (Vec4, f32) {
-        if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
-            let shown = self.shown.get(vertex as usize).copied();
-            let shown = shown.unwrap_or_else(|| self.lights.bounded(light.irradiance()));
-            return (shown, light.error());
-        }
-        match hierarchy.mesh.vertices[vertex as usize].ends {
-            // Ends were made before the vertices between them, so this descends.
-            Some(ends) => {
-                let [(a, a_error), (b, b_error)] = ends.map(|end| self.vertex(hierarchy, end));
-                ((a + b) * 0.5, (a_error + b_error) * 0.5)
-            }
-            None => (Vec4::ZERO, 0.0),
-        }
-    }
-
-    /// Direct irradiance at a corner of a leaf.
-    pub(crate) fn corner(&self, vertex: u32) -> Vec4 {
-        self.vertices
-            .get(vertex as usize)
-            .copied()
-            .flatten()
-            .map_or(Vec4::ZERO, |light| self.lights.bounded(light.irradiance()))
-    }
-
-    /// Irradiance at a vertex without occlusion; 0 where it was not sampled.
-    pub(crate) fn unoccluded(&self, vertex: u32) -> Vec4 {
-        let light = self.vertices[vertex as usize].unwrap_or_default();
-        light.unoccluded()
-    }
-
     /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot.
     pub(crate) fn adapt(
         &mut self,
@@ -259,10 +131,6 @@ impl DirectField {
         let mean = self.mean(hierarchy);
         let settling = self.settle(rays, hierarchy, limits, mean, cancel)?;
         Some((covering + moving + settling, mean))
-    }
-
-    fn mean(&self, hierarchy: &Hierarchy) -> f32 {
-        crate::solver::iteration::scale(hierarchy, |leaf| self.element(hierarchy, leaf))
     }
 
     /// How much the luminance of the corners varies, times the weight of the element, relative to the mean.
@@ -406,13 +274,5 @@ impl DirectField {
             })
             .map(|leaf| leaf as u32)
             .collect()
-    }
-
-    /// Bytes held.
-    pub(crate) fn memory_bytes(&self) -> usize {
-        size_of_val(self.vertices.as_slice())
-            + size_of_val(self.centres.as_slice())
-            + size_of_val(self.shown.as_slice())
-            + self.offsets.memory_bytes()
     }
 }

@@ -6,15 +6,13 @@
 
 use rayon::prelude::*;
 
-use super::{
-    adapt::{DirectField, Limits},
-    lights::DirectLight,
-};
+use super::{field::DirectField, samples::DirectLight};
 use crate::{
     geometry::RayTree,
     hierarchy::Hierarchy,
     solver::{
         Cancel,
+        limits::Limits,
         places::{Moved, inset, is_behind_wall},
     },
     transport::luminance,

@@ -6,49 +6,21 @@ use std::ops::Range;
 use glam::Vec4;
 
 use super::{
-    adapt::{DirectField, Limits},
-    lights::{DirectLight, Tally},
+    field::DirectField,
+    samples::{DirectLight, Tally},
 };
 use crate::{
     geometry::RayTree,
     hierarchy::Hierarchy,
     solver::{
         Cancel,
+        limits::Limits,
         places::{Receiver, vertex_share_roots},
     },
 };
 
 /// Share of the shadow rays that is shot first.
 const PROBING_SHARE: f32 = 0.25;
-
-/// Noise of a point, times the root of its share of the area, that is let be: this share of the tolerance. Larger leaves
-/// blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
-const NOISE_SHARE: f32 = 0.25;
-
-/// Shadow rays of a point at most, in multiples of the usual number.
-const MOST_SAMPLES: u32 = 16;
-
-impl Limits {
-    /// Shadow rays of a point at most.
-    pub(crate) fn most_samples(&self) -> u32 {
-        MOST_SAMPLES * self.shadow_samples
-    }
-
-    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root, by
-    /// what the rays of its neighbours found.
-    pub(crate) fn is_noisy(
-        &self,
-        light: &DirectLight,
-        neighbours: Tally,
-        weight: f32,
-        mean: f32,
-    ) -> bool {
-        let error = light.error_among(neighbours);
-        light.tried < self.most_samples()
-            && (error * weight > NOISE_SHARE * self.tolerance * mean
-                || self.is_grainy(light, error, weight, mean))
-    }
-}
 
 impl DirectField {
     /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.

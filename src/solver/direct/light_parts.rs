@@ -6,10 +6,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{
-    adapt::DirectField,
-    lights::{DirectLight, Lights},
-};
+use super::{field::DirectField, lights::Lights, samples::DirectLight};
 use crate::{
     geometry::RayTree,
     hierarchy::Hierarchy,

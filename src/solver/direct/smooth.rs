@@ -7,8 +7,8 @@
 
 use glam::Vec4;
 
-use super::lights::DirectLight;
-use crate::hierarchy::Hierarchy;
+use super::samples::DirectLight;
+use crate::{hierarchy::Hierarchy, solver::places::agreement};
 
 /// Rounds of averaging. None leaves visible grain, many widen narrow penumbrae and draw their borders as saw teeth.
 const ROUNDS: u32 = 1;
@@ -64,13 +64,6 @@ pub(crate) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
         .into_iter()
         .map(|fraction| fraction.color)
         .collect()
-}
-
-/// How much a neighbour counts whose value is off by a gap, 0…1: by half where that is so many standard errors, of which the
-/// square is `variance`.
-pub(crate) fn agreement(gap: f32, variance: f32, half_deviations: f32) -> f32 {
-    let noise = variance * half_deviations * half_deviations;
-    noise / (noise + gap * gap).max(f32::MIN_POSITIVE)
 }
 
 /// One round of exchange. The variance stays that of the rays: it says how far neighbours may differ.

@@ -9,7 +9,9 @@ use std::collections::VecDeque;
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-/// Values that one task sums. It sets the order of sums, so it must not depend on the number of threads.
+use crate::solver::sums::ordered_sum;
+
+/// Values that one task combines.
 const CHUNK: usize = 4096;
 
 /// A direction whose part that is new, squared, is a smaller share than this adds nothing but rounding.
@@ -147,18 +149,6 @@ fn weighted_product(weights: &[f32], first: &[Vec3], second: &[Vec3]) -> DVec3 {
     ordered_sum(weights.len(), |index| {
         first[index].as_dvec3() * second[index].as_dvec3() * f64::from(weights[index])
     })
-}
-
-/// A sum over indices whose order does not depend on the number of threads.
-pub(crate) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> DVec3 {
-    let parts: Vec<DVec3> = (0..count.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let end = ((chunk + 1) * CHUNK).min(count);
-            (chunk * CHUNK..end).map(&of).sum()
-        })
-        .collect();
-    parts.into_iter().sum()
 }
 
 /// Solve symmetric equations by elimination. What depends on those before it is left out, and gets 0; so does

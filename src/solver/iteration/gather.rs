@@ -7,11 +7,10 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::anderson::ordered_sum;
 use crate::{
     hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
     solver::{Cancel, Push},
-    transport::{Kernel, LinkStore, luminance, self_irradiance},
+    transport::{Kernel, LinkStore, self_irradiance},
 };
 
 /// Nodes that one task gathers for.
@@ -246,39 +245,4 @@ fn push_one(
     for (sum, patch) in sums.iter_mut().zip(patches) {
         *sum += incident.on_face(patch.normal) * transmission;
     }
-}
-
-/// Sum over leaves of area times a colour, in fixed order and in double precision.
-pub(crate) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> glam::DVec3 {
-    let elements = &hierarchy.mesh.elements;
-    ordered_sum(elements.len(), |index| {
-        if !elements[index].is_leaf() {
-            return glam::DVec3::ZERO;
-        }
-        let area = f64::from(elements[index].area_vector.length());
-        of(index).truncate().as_dvec3() * area
-    })
-}
-
-/// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
-pub(crate) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
-    let importance = &hierarchy.importance;
-    let elements = &hierarchy.mesh.elements;
-    let measured = |leaf: usize| of(leaf) * importance.measure(elements[leaf].patch as usize);
-    let sum = area_sum(hierarchy, measured) / importance.area.max(f64::MIN_POSITIVE);
-    sum.as_vec3().extend(0.0)
-}
-
-/// Part of the scene that is taken to be lit at least: light on less of it is measured by its root mean square and not by
-/// its mean, which would tell of the dark.
-const LEAST_LIT: f32 = 1.0 / 9.0;
-
-/// The luminance by which errors of a quantity are measured: its mean over the scene, or, where it is concentrated on a
-/// small part, what the mean would be if that part were [`LEAST_LIT`] of the scene.
-pub(crate) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
-    let moments = mean(hierarchy, |leaf| {
-        let value = luminance(of(leaf));
-        Vec4::new(value, value * value, 0.0, 0.0)
-    });
-    moments.x.max((moments.y * LEAST_LIT).sqrt())
 }

@@ -21,10 +21,13 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 use super::{
-    anderson::{Anderson, ordered_sum},
+    anderson::Anderson,
     gather::{self, Holders},
 };
-use crate::solver::{Cancel, Solver, StepReport};
+use crate::solver::{
+    Cancel, Solver, StepReport,
+    sums::{area_sum, ordered_sum},
+};
 
 /// Iterates that acceleration remembers: 24 bytes each for every element. See above; below 3 white rooms take many
 /// sweeps, above 5 little is gained.
@@ -194,7 +197,7 @@ impl Solver {
     }
 
     pub(crate) fn leaf_sum(&self, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
-        gather::area_sum(&self.hierarchy, of).element_sum()
+        area_sum(&self.hierarchy, of).element_sum()
     }
 
     /// Direct irradiance of the leaves, 0 for other elements: the same in every sweep.

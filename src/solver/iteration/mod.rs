@@ -6,5 +6,4 @@ mod gather;
 mod iterate;
 
 pub(crate) use anderson::Anderson;
-pub(crate) use gather::{area_sum, mean, scale};
 pub(crate) use iterate::CEILING_SLACK;

@@ -1,13 +1,13 @@
-//! What a solve shows of itself: a display mesh with light at its vertices, the cluster tree, and one report per step.
+//! What a solve shows of itself: a display mesh with light at its vertices and the cluster tree.
 //!
 //! Parts that did not change between two snapshots are shared, so that a reader can tell by pointer what to upload.
 
 use std::sync::Arc;
 
 use glam::Vec3;
-use serde::Serialize;
 
-use crate::{scene::Appearance, solver::LeftOut};
+use super::left_out::LeftOut;
+use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -120,52 +120,4 @@ impl Snapshot {
             + size_of_val(light.uncertainty.as_slice())
             + size_of_val(self.clusters.as_slice())
     }
-}
-
-/// Figures of one step. Quantities in world units.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct StepReport {
-    /// Number of the step, from 1.
-    pub step: u32,
-    /// Seconds since the scene was read; filled in by the caller that owns a clock.
-    pub elapsed_s: f64,
-    /// Seconds spent in solver steps; filled in by the caller that owns a clock.
-    pub solve_s: f64,
-    /// Link threshold of this step.
-    pub epsilon: f32,
-    /// Links in use.
-    pub links: u64,
-    /// Clusters, patches and elements.
-    pub nodes: u64,
-    /// Leaves that receive light.
-    pub elements: u64,
-    /// Vertices of the display mesh.
-    pub vertices: u64,
-    /// Rays shot so far.
-    pub shadow_rays: u64,
-    /// Bytes held by the solver.
-    pub memory_bytes: u64,
-    /// Sweeps of the iteration in this step.
-    pub sweeps: u32,
-    /// What gathering once more changes, relative to the total power: the residual of the equation that is solved.
-    pub residual: f32,
-    /// Largest ratio by which a sweep changed the distance of two lights; below 1 while the iteration contracts, 0 where
-    /// too few sweeps were needed to tell.
-    pub contraction: f32,
-    /// Power arriving over links and samples, relative to the power that left for it; 1 in a closed scene.
-    pub energy_balance: f64,
-    /// Smallest sum of form factors over the elements; 1 in a closed scene.
-    pub row_sum_min: f32,
-    /// Area-weighted mean of the sums of form factors.
-    pub row_sum_mean: f32,
-    /// Largest sum of form factors.
-    pub row_sum_max: f32,
-    /// Sum of the link error estimates, root mean square over the area, relative to the mean irradiance.
-    pub estimated_error: f32,
-    /// Whether a further step can change anything.
-    pub is_final: bool,
-    /// Whether the memory limit kept the step from being finer: further ones would fare alike.
-    pub is_full: bool,
-    /// What the solver had to do to stay stable, one sentence each.
-    pub notes: Vec<String>,
 }

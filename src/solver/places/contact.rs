@@ -51,7 +51,7 @@ const MOST_LIT: usize = 1;
 impl Solver {
     /// Divide elements that lie under an object in part.
     pub(crate) fn divide_contacts(&mut self, cancel: &Cancel) -> Option<()> {
-        let limits = self.direct_limits(1.0);
+        let limits = self.limits(1.0);
         loop {
             self.probe_contacts(cancel)?;
             let least = self.least_contact();
@@ -144,7 +144,7 @@ impl Solver {
     /// Elements in contact that are no larger are not divided, frame units.
     fn least_contact(&self) -> f32 {
         // The same in all steps, whose tolerances fall.
-        let limits = self.direct_limits(1.0);
+        let limits = self.limits(1.0);
         let root = CONTACT_TOLERANCE * limits.tolerance;
         (root * root * self.hierarchy.importance.area as f32).max(limits.min_area)
     }

@@ -1,11 +1,15 @@
 //! Where light is evaluated, and what counts how much there.
 
+mod agreement;
+mod carry;
 mod contact;
 mod offsets;
 mod receivers;
+mod shares;
 
+pub(crate) use agreement::agreement;
+pub(crate) use carry::{carry_over, project};
 pub(crate) use contact::{is_behind_wall, open_places};
 pub(crate) use offsets::{Moved, OffsetPlaces};
-pub(crate) use receivers::{
-    INSET, Receiver, carry_over, centre_of, inset, project, share_root, vertex_share_roots,
-};
+pub(crate) use receivers::{INSET, Receiver, centre_of, inset};
+pub(crate) use shares::{share_root, vertex_share_roots};

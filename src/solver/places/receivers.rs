@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
 use crate::{
     geometry::RAY_OFFSET,
-    hierarchy::{Element, Hierarchy, Mesh},
+    hierarchy::{Element, Hierarchy},
     scene::TriangleId,
 };
 
@@ -22,9 +22,6 @@ const CLEARANCE: f32 = 2.0 * RAY_OFFSET;
 /// But never further than this share of the way to the centroid. More, and small elements show light of another place; less,
 /// and narrow ones along walls show light of beyond.
 const MOST_INSET: f32 = 0.2;
-
-/// Elements over which light is carried at most: vertices under an object and those beside them.
-const CARRIED: u32 = 2;
 
 /// Where direct light is wanted.
 #[derive(Clone, Copy, Debug)]
@@ -117,96 +114,5 @@ pub(crate) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
         point: hierarchy.mesh.elements[element].centroid,
         normal: patch.normal,
         triangle: patch.triangle,
-    }
-}
-
-/// Root of an element's share of the area: what an error on it counts.
-pub(crate) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
-    let area = hierarchy.mesh.elements[element].area_vector.length();
-    hierarchy.share_of_area(element, area).sqrt()
-}
-
-/// The same for each vertex: a third of the leaves about it is its own.
-pub(crate) fn vertex_share_roots(hierarchy: &Hierarchy) -> Vec<f32> {
-    let mesh = &hierarchy.mesh;
-    let shares = mesh.sums_about_vertices(|leaf| {
-        hierarchy.share_of_area(leaf, mesh.elements[leaf].area_vector.length())
-    });
-    shares.into_iter().map(|sum| (sum / 3.0).sqrt()).collect()
-}
-
-/// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,
-/// the mean of those of these elements at which one does.
-pub(crate) fn carry_over(
-    mesh: &Mesh,
-    tells: impl Fn(&Element, usize) -> bool,
-    values: &mut [Vec4],
-) {
-    let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
-    let contacts: Vec<usize> = mesh.active_leaves().filter(is_contact).collect();
-    if contacts.is_empty() {
-        return;
-    }
-    let mut told = vec![false; values.len()];
-    for leaf in mesh.active_leaves() {
-        let element = &mesh.elements[leaf];
-        for (side, vertex) in element.vertices.into_iter().enumerate() {
-            told[vertex as usize] |= tells(element, side);
-        }
-    }
-    for _ in 0..CARRIED {
-        let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
-        for &leaf in &contacts {
-            let element = &mesh.elements[leaf];
-            let area = element.area_vector.length();
-            let (from, to): (Vec<usize>, Vec<usize>) = element
-                .vertices
-                .into_iter()
-                .map(|vertex| vertex as usize)
-                .partition(|&vertex| told[vertex]);
-            for &from in &from {
-                for &to in &to {
-                    sums[to].0 += values[from] * area;
-                    sums[to].1 += area;
-                }
-            }
-        }
-        for (vertex, (sum, weight)) in sums.into_iter().enumerate() {
-            if weight > 0.0 {
-                (values[vertex], told[vertex]) = (sum / weight, true);
-            }
-        }
-    }
-}
-
-/// Share of an element's mean that its centroid tells by the rule of degree 2; the corners tell the rest.
-const CENTRE_SHARE: f32 = 0.75;
-
-/// Move the values of vertices so that, taken linearly between them, they add to what the elements receive. Vertices lie
-/// in corners and at contacts, where light is less: as they are, they would show all surfaces too dark. Of each element
-/// with a known centroid: index and value there. Values stay between those around them.
-pub(crate) fn project(
-    hierarchy: &Hierarchy,
-    values: &mut [Vec4],
-    centres: impl Iterator<Item = (usize, Vec4)>,
-) {
-    let mut moves = vec![(Vec4::ZERO, Vec4::INFINITY, Vec4::NEG_INFINITY); values.len()];
-    let areas = hierarchy.mesh.areas_about_vertices();
-    for (element, centre) in centres {
-        let element = &hierarchy.mesh.elements[element];
-        let (corners, area) = (element.vertices, element.area_vector.length());
-        let [a, b, c] = corners.map(|vertex| values[vertex as usize]);
-        let missing = (centre - (a + b + c) / 3.0) * (CENTRE_SHARE * area);
-        let (least, most) = (a.min(b).min(c).min(centre), a.max(b).max(c).max(centre));
-        for vertex in corners {
-            let (sum, lower, upper) = &mut moves[vertex as usize];
-            *sum += missing;
-            (*lower, *upper) = (lower.min(least), upper.max(most));
-        }
-    }
-    for ((value, (sum, lower, upper)), area) in values.iter_mut().zip(moves).zip(areas) {
-        if area > 0.0 && lower.x <= upper.x {
-            *value = (*value + sum / area).clamp(lower, upper);
-        }
     }
 }

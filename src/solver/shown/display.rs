@@ -10,8 +10,7 @@ use crate::{
     hierarchy::{Cluster, NodeId},
     scene::TriangleId,
     solver::{
-        Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, displayable,
-        vertices::VertexMeans,
+        Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, vertices::VertexMeans,
     },
     transport::luminance,
 };
@@ -266,4 +265,11 @@ impl Solver {
             face_power: moments.six_faces().map(luminance),
         }
     }
+}
+
+/// A colour that is safe to show: finite and not negative.
+fn displayable(color: Vec4) -> Vec3 {
+    color
+        .truncate()
+        .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
 }

@@ -3,7 +3,7 @@
 use crate::{
     solver::{
         Solver, StepReport,
-        iteration::{area_sum, mean},
+        sums::{area_sum, mean},
     },
     transport::luminance,
 };

@@ -20,8 +20,8 @@ use crate::{
     hierarchy::{Element, Hierarchy},
     solver::{
         Cancel, Solver,
-        direct::Limits,
         iteration::Anderson,
+        limits::Limits,
         places::{OffsetPlaces, Receiver, carry_over, vertex_share_roots},
     },
     transport::luminance,
@@ -128,7 +128,7 @@ impl Solver {
             .collect();
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         let mut looks = self.looks(&linked);
-        let limits = self.direct_limits(threshold_scale);
+        let limits = self.limits(threshold_scale);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
         let senders = self.senders();

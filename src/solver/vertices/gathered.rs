@@ -6,7 +6,7 @@
 
 use glam::Vec4;
 
-use crate::{solver::direct::agreement, transport::luminance};
+use crate::{solver::places::agreement, transport::luminance};
 
 /// Standard errors of their difference by which neighbours may differ to be pooled by half. Smaller leaves grain, larger
 /// blurs.

@@ -13,7 +13,8 @@ use crate::{
     solver::{
         Cancel,
         coverage::{Closure, Closures},
-        direct::{Limits, SPREAD_SHARE},
+        direct::SPREAD_SHARE,
+        limits::Limits,
         places::{OffsetPlaces, carry_over, project, share_root},
     },
     transport::{Kernel, Link, LinkStore, Sights, luminance, self_irradiance},

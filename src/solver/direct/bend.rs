@@ -1,0 +1,57 @@
+//! Over which elements the light of sampled emitters is as good as linear, where nothing casts a shadow.
+//!
+//! Elements are divided where their corners do not tell what lies between. Shadows could hide from all of them, and so
+//! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
+
+use glam::Vec3;
+
+use super::{border::SPREAD_SHARE, lights::Lights};
+use crate::{
+    hierarchy::{Hierarchy, luminance},
+    solver::{
+        limits::Limits,
+        places::{INSET, Receiver, share_root},
+    },
+};
+
+/// Places on a triangle, barycentric: the middles of its sides and those of its quarters.
+const PLACES: [Vec3; 7] = [
+    Vec3::new(0.5, 0.5, 0.0),
+    Vec3::new(0.0, 0.5, 0.5),
+    Vec3::new(0.5, 0.0, 0.5),
+    Vec3::new(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0),
+    Vec3::new(2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0),
+    Vec3::new(1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0),
+    Vec3::new(1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0),
+];
+
+impl Lights {
+    /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
+    /// emitters are not sampled, so that it is not known.
+    pub(super) fn bend_over(&self, hierarchy: &Hierarchy, element: usize, limits: Limits) -> bool {
+        if !self.are_all(hierarchy) {
+            return true;
+        }
+        let mut sums = Vec::new();
+        let patch = hierarchy.patch_of(element);
+        let centroid = hierarchy.mesh.elements[element].centroid;
+        let [a, b, c] = hierarchy.mesh.corners(element);
+        let mut light = |at: Vec3| {
+            let point = (a * at.x + b * at.y + c * at.z).lerp(centroid, INSET);
+            let receiver = Receiver {
+                point,
+                normal: patch.normal,
+                triangle: patch.triangle,
+            };
+            luminance(self.unoccluded(&receiver, None, &mut sums))
+        };
+        let corners = Vec3::from_array(Vec3::AXES.map(&mut light));
+        let bend = PLACES
+            .map(|place| (light(place) - corners.dot(place)).abs())
+            .into_iter()
+            .fold(0.0, f32::max);
+        let spread = corners.max_element() - corners.min_element();
+        let mean = self.mean_power(hierarchy).max(f32::MIN_POSITIVE);
+        (bend + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
+    }
+}

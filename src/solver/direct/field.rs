@@ -1,0 +1,132 @@
+//! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
+
+use glam::Vec4;
+
+use super::{lights::Lights, samples::DirectLight, smooth};
+use crate::{
+    hierarchy::{Element, Hierarchy},
+    solver::{
+        places::{OffsetPlaces, carry_over, project},
+        sums,
+    },
+};
+
+/// Direct light on a mesh.
+pub(crate) struct DirectField {
+    pub(crate) lights: Lights,
+    /// By vertex, where it was sampled; shorter than the vertices where some are new.
+    pub(crate) vertices: Vec<Option<DirectLight>>,
+    /// By element, where it was needed.
+    pub(crate) centres: Vec<Option<DirectLight>>,
+    /// Elements whose corners are all sampled: those that come after are new.
+    pub(crate) covered: usize,
+    /// Shadow rays that these corners have where it takes all.
+    pub(crate) samples: u32,
+    /// Vertices behind walls.
+    pub(crate) offsets: OffsetPlaces,
+    /// Irradiance to show by vertex; shorter than the vertices where some are new.
+    shown: Vec<Vec4>,
+    /// Whether the number of elements kept the last adaptation from being finer.
+    pub(crate) is_full: bool,
+}
+
+impl DirectField {
+    /// Nothing is known yet.
+    pub(crate) fn new(lights: Lights) -> Self {
+        Self {
+            lights,
+            vertices: Vec::new(),
+            centres: Vec::new(),
+            covered: 0,
+            samples: 0,
+            offsets: OffsetPlaces::default(),
+            shown: Vec::new(),
+            is_full: false,
+        }
+    }
+
+    /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
+    /// solid in part, that of its open part.
+    pub(crate) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
+        let leaf = &hierarchy.mesh.elements[element];
+        if leaf.is_contact() {
+            let open = (0..3).filter(|&side| !leaf.is_inside_solid_at(side));
+            let known = open.clone().map(|side| self.corner(leaf.vertices[side]));
+            return known.sum::<Vec4>() / (open.count().max(1) as f32);
+        }
+        let [a, b, c] = leaf.vertices.map(|vertex| self.corner(vertex));
+        let corners = a + b + c;
+        match self.centres.get(element).copied().flatten() {
+            Some(centre) => {
+                self.lights.bounded(centre.irradiance()) * 0.75 + corners * (0.25 / 3.0)
+            }
+            None => corners / 3.0,
+        }
+    }
+
+    /// Bring what is shown at vertices up to date with the samples.
+    pub(crate) fn smooth(&mut self, hierarchy: &Hierarchy) {
+        let fractions = smooth::fractions(hierarchy, &self.vertices);
+        let known = self.vertices.iter().zip(fractions);
+        self.shown = known
+            .map(|(light, fraction)| {
+                let unoccluded = light.map_or(Vec4::ZERO, |light| light.unoccluded());
+                self.lights.bounded(unoccluded * fraction)
+            })
+            .collect();
+        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
+        carry_over(&hierarchy.mesh, tells, &mut self.shown);
+        let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
+        let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
+            let centre = self.centres.get(leaf).copied().flatten()?;
+            Some((leaf, self.lights.bounded(centre.irradiance())))
+        });
+        project(hierarchy, &mut self.shown, centres);
+    }
+
+    /// Direct irradiance to show at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
+    /// mean of its ends.
+    pub(crate) fn vertex(&self, hierarchy: &Hierarchy, vertex: u32) -> (Vec4, f32) {
+        if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
+            let shown = self.shown.get(vertex as usize).copied();
+            let shown = shown.unwrap_or_else(|| self.lights.bounded(light.irradiance()));
+            return (shown, light.error());
+        }
+        match hierarchy.mesh.vertices[vertex as usize].ends {
+            // Ends were made before the vertices between them, so this descends.
+            Some(ends) => {
+                let [(a, a_error), (b, b_error)] = ends.map(|end| self.vertex(hierarchy, end));
+                ((a + b) * 0.5, (a_error + b_error) * 0.5)
+            }
+            None => (Vec4::ZERO, 0.0),
+        }
+    }
+
+    /// Direct irradiance at a corner of a leaf.
+    pub(crate) fn corner(&self, vertex: u32) -> Vec4 {
+        self.vertices
+            .get(vertex as usize)
+            .copied()
+            .flatten()
+            .map_or(Vec4::ZERO, |light| self.lights.bounded(light.irradiance()))
+    }
+
+    /// Irradiance at a vertex without occlusion; 0 where it was not sampled.
+    pub(crate) fn unoccluded(&self, vertex: u32) -> Vec4 {
+        let light = self.vertices[vertex as usize].unwrap_or_default();
+        light.unoccluded()
+    }
+
+    /// The luminance by which errors of direct light are measured.
+    pub(super) fn mean(&self, hierarchy: &Hierarchy) -> f32 {
+        sums::scale(hierarchy, |leaf| self.element(hierarchy, leaf))
+    }
+
+    /// Bytes held.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        size_of_val(self.vertices.as_slice())
+            + size_of_val(self.centres.as_slice())
+            + size_of_val(self.shown.as_slice())
+            + self.offsets.memory_bytes()
+    }
+}

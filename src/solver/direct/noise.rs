@@ -1,0 +1,99 @@
+//! When the noise of shadow rays calls for more of them.
+
+use super::samples::{DirectLight, Tally};
+use crate::{hierarchy::luminance, solver::limits::Limits};
+
+/// Noise of a point, times the root of its share of the area, that is let be: this share of the tolerance. Larger leaves
+/// blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
+const NOISE_SHARE: f32 = 0.25;
+
+/// Shadow rays of a point at most, in multiples of the usual number.
+const MOST_SAMPLES: u32 = 16;
+
+impl Limits {
+    /// Shadow rays of a point at most.
+    pub(crate) fn most_samples(&self) -> u32 {
+        MOST_SAMPLES * self.shadow_samples
+    }
+
+    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root, by
+    /// what the rays of its neighbours found.
+    pub(crate) fn is_noisy(
+        &self,
+        light: &DirectLight,
+        neighbours: Tally,
+        weight: f32,
+        mean: f32,
+    ) -> bool {
+        let error = light.error_among(neighbours);
+        light.tried < self.most_samples()
+            && (error * weight > NOISE_SHARE * self.tolerance * mean
+                || self.is_grainy(light, error, weight, mean))
+    }
+
+    /// Whether the noise of the rays of a point can be seen, by its standard error.
+    pub(crate) fn is_grainy(
+        &self,
+        light: &DirectLight,
+        error: f32,
+        weight: f32,
+        mean: f32,
+    ) -> bool {
+        let beside = mean.max(luminance(light.irradiance()));
+        self.is_noise_seen(error, beside, weight)
+    }
+
+    /// Whether the rays of a point are too few where those of its neighbours had another outcome: though all of them
+    /// agree, others might not.
+    pub(crate) fn is_doubtful(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
+        let beside = mean.max(luminance(light.irradiance()));
+        light.tried < self.most_samples() && self.is_noise_seen(light.doubt(), beside, weight)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solver::{SolveSettings, limits::CONTRAST_TOLERANCE};
+
+    fn limits(tolerance: f32) -> Limits {
+        let settings = SolveSettings::default();
+        Limits {
+            tolerance,
+            contrast: CONTRAST_TOLERANCE * tolerance,
+            min_area: 0.0,
+            shadow_samples: settings.shadow_samples,
+            seed: settings.seed,
+            most_elements: u64::MAX,
+        }
+    }
+
+    #[test]
+    fn an_error_is_seen_the_sooner_the_larger_the_element_and_the_darker_its_surroundings() {
+        let limits = limits(1e-3);
+        let least_seen = |beside: f32, weight: f32| {
+            let errors = (0..4000).map(|step| step as f32 * 1e-3);
+            let mut seen = errors.filter(|&error| limits.is_seen(error, beside, weight));
+            seen.next().unwrap_or(f32::INFINITY)
+        };
+        for (small, large) in [(1e-3, 1e-2), (1e-2, 1e-1)] {
+            assert!(least_seen(1.0, large) < least_seen(1.0, small));
+            assert!(least_seen(1.0, small) < least_seen(4.0, small));
+            assert!(least_seen(0.1, large) > 0.0);
+        }
+    }
+
+    #[test]
+    fn noise_is_seen_before_a_bend_of_the_same_size_is() {
+        let limits = limits(1e-3);
+        assert!(!limits.is_seen(0.03, 1.0, 0.01));
+        assert!(limits.is_noise_seen(0.03, 1.0, 0.01));
+    }
+
+    #[test]
+    fn what_gets_no_light_has_no_noise_to_be_seen() {
+        let limits = limits(1e-3);
+        assert!(!limits.is_grainy(&DirectLight::default(), 0.0, 1.0, 1.0));
+        assert!(!limits.is_doubtful(&DirectLight::default(), 1.0, 1.0));
+    }
+}

@@ -1,0 +1,225 @@
+//! What shadow rays find at a point: which part of the light arrives, and how sure that is.
+
+use glam::Vec4;
+
+use crate::{geometry::SphericalTriangle, hierarchy::luminance};
+
+/// Shadow rays from a point to one target. How much unoccluded light comes from there is known, so of their weights only the
+/// ratios count: else a few rays that weigh much would speak for all targets.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bundle {
+    /// The emitter, where it fills a large angle.
+    pub(super) seen: Option<SphericalTriangle>,
+    /// Rays tried.
+    pub(super) rays: u32,
+    shot: u32,
+    visible: u32,
+    /// Weights of the rays shot.
+    weight: f32,
+    /// The same by colour, each with a luminance of 1.
+    sent: Vec4,
+    /// Of those that got through.
+    arrived: Vec4,
+}
+
+impl Bundle {
+    /// Before the first ray, to an emitter where it fills a large angle.
+    pub(super) fn towards(seen: Option<SphericalTriangle>) -> Self {
+        Self {
+            seen,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn count(&mut self, weight: f32, color: Vec4, is_visible: bool) {
+        self.weight += weight;
+        self.sent += color * weight;
+        self.shot += 1;
+        if is_visible {
+            self.arrived += color * weight;
+            self.visible += 1;
+        }
+    }
+}
+
+/// How many shadow rays of one or several points got through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    pub shot: u32,
+    pub visible: u32,
+}
+
+/// Standard errors by which rays of one point may differ from those of its neighbours. Smaller takes chance for a border,
+/// which biases the light where few rays get through; larger shoots more rays beside the borders of shadows.
+const LIKELY_DEVIATIONS: f32 = 3.0;
+
+impl Tally {
+    /// Whether some got through and others did not.
+    pub(crate) fn is_mixed(self) -> bool {
+        self.visible > 0 && self.visible < self.shot
+    }
+
+    /// The part that got through; 0 of none.
+    fn fraction(self) -> f32 {
+        self.visible as f32 / self.shot.max(1) as f32
+    }
+
+    /// Whether chance explains how these rays differ from others: by the part of the others, with half a hit and half a miss more.
+    pub(crate) fn is_like(self, others: Self) -> bool {
+        let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
+        let expected = (others.visible as f32 + 0.5) / count;
+        let variance = expected * (1.0 - expected) * (1.0 / own + 1.0 / count);
+        let gap = self.fraction() - expected;
+        self.shot == 0 || gap * gap <= LIKELY_DEVIATIONS * LIKELY_DEVIATIONS * variance
+    }
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.shot += other.shot;
+        self.visible += other.visible;
+    }
+}
+
+/// What the shadow rays of a point found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct DirectLight {
+    /// Irradiance without occlusion; before the first ray what is expected, 0 for nothing.
+    pub(super) exact: Vec4,
+    /// Weights of all rays by colour.
+    sent: Vec4,
+    /// Weights of the rays that got through by colour.
+    arrived: Vec4,
+    /// Rays tried: those that carry nothing are not shot.
+    pub tried: u32,
+    /// Rays shot.
+    pub shot: u32,
+    /// Rays that got through.
+    visible: u32,
+}
+
+impl DirectLight {
+    /// Before the first ray, where about this irradiance is expected without occlusion: the light of many emitters is then
+    /// evaluated no finer than that calls for, without asking first how much there is.
+    pub(crate) fn expected(exact: Vec4) -> Self {
+        Self {
+            exact,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn count(&mut self, bundle: &Bundle) {
+        self.shot += bundle.shot;
+        self.visible += bundle.visible;
+        if bundle.weight > 0.0 {
+            let by_ray = bundle.rays as f32 / bundle.weight;
+            self.sent += bundle.sent * by_ray;
+            self.arrived += bundle.arrived * by_ray;
+        }
+    }
+
+    /// The light of several parts of the emitters together, the colours of each multiplied by a factor. Of parts that
+    /// are switched off nothing remains but that rays were tried.
+    pub(crate) fn mixed(parts: impl Iterator<Item = (Self, Vec4)>) -> Self {
+        let mut mixed = Self::default();
+        for (part, factor) in parts {
+            let exact = part.exact * factor;
+            mixed.tried += part.tried;
+            if luminance(exact) <= 0.0 {
+                continue;
+            }
+            mixed.exact += exact;
+            // As rays of the new colours would have been counted: each with a luminance of about 1.
+            mixed.sent += exact;
+            mixed.arrived += exact * part.fraction();
+            mixed.shot += part.shot;
+            mixed.visible += part.visible;
+        }
+        let total = luminance(mixed.exact);
+        if total > 0.0 {
+            // Of what arrives whole without a ray only the ratio counts.
+            let by_ray = mixed.shot.max(1) as f32 / total;
+            mixed.sent *= by_ray;
+            mixed.arrived *= by_ray;
+        }
+        mixed
+    }
+
+    /// Nothing blocks: no ray is needed to know that everything arrives.
+    pub(super) fn arrive_whole(&mut self) {
+        (self.sent, self.arrived) = (Vec4::ONE, Vec4::ONE);
+    }
+
+    /// Direct irradiance.
+    pub(crate) fn irradiance(&self) -> Vec4 {
+        self.exact * self.fraction()
+    }
+
+    /// Unoccluded irradiance.
+    pub(crate) fn unoccluded(&self) -> Vec4 {
+        self.exact
+    }
+
+    /// The part of the unoccluded irradiance that arrives, by colour, 0…1.
+    pub(crate) fn fraction(&self) -> Vec4 {
+        let ratio = |arrived: f32, sent: f32| {
+            if sent > 0.0 {
+                (arrived / sent).clamp(0.0, 1.0)
+            } else {
+                0.0
+            }
+        };
+        Vec4::new(
+            ratio(self.arrived.x, self.sent.x),
+            ratio(self.arrived.y, self.sent.y),
+            ratio(self.arrived.z, self.sent.z),
+            0.0,
+        )
+    }
+
+    /// What its rays found.
+    pub(crate) fn tally(&self) -> Tally {
+        Tally {
+            shot: self.shot,
+            visible: self.visible,
+        }
+    }
+
+    /// Standard error of the luminance as the rays of its neighbours have it, unless its own are unlikely beside them. So
+    /// whether more rays are shot does not depend on what its own found, which would bias the light: where few get through, most
+    /// points would take their first rays for all, and the others would lose by more.
+    pub(crate) fn error_among(&self, neighbours: Tally) -> f32 {
+        let own = self.tally();
+        if neighbours.shot == 0 || !own.is_like(neighbours) {
+            return self.error();
+        }
+        let fraction = neighbours.fraction();
+        let variance = fraction * (1.0 - fraction) / self.shot.max(1) as f32;
+        luminance(self.exact) * variance.sqrt()
+    }
+
+    /// Square of the standard error of the fraction, as if the rays were independent: 0 where all agree.
+    pub(crate) fn fraction_variance(&self) -> f32 {
+        let shot = self.shot.max(1) as f32;
+        let fraction = self.visible as f32 / shot;
+        fraction * (1.0 - fraction) / shot
+    }
+
+    /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
+    /// above 0 where all agree.
+    pub(crate) fn fraction_doubt(&self) -> f32 {
+        let shot = self.shot as f32 + 1.0;
+        let fraction = (self.visible as f32 + 0.5) / shot;
+        (fraction * (1.0 - fraction) / shot).sqrt()
+    }
+
+    /// As [`Self::fraction_doubt`] for the luminance.
+    pub(crate) fn doubt(&self) -> f32 {
+        luminance(self.exact) * self.fraction_doubt()
+    }
+
+    /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.
+    pub(crate) fn error(&self) -> f32 {
+        luminance(self.exact) * self.fraction_variance().sqrt()
+    }
+}

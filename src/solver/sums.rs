@@ -1,0 +1,56 @@
+//! Sums in an order that does not depend on the number of threads, and means over the area of the scene.
+
+use glam::{DVec3, Vec4};
+use rayon::prelude::*;
+
+use crate::hierarchy::{Hierarchy, luminance};
+
+/// Values that one task sums. It sets the order of sums, so it must not depend on the number of threads.
+const CHUNK: usize = 4096;
+
+/// A sum over indices whose order does not depend on the number of threads.
+pub(crate) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> DVec3 {
+    let parts: Vec<DVec3> = (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let end = ((chunk + 1) * CHUNK).min(count);
+            (chunk * CHUNK..end).map(&of).sum()
+        })
+        .collect();
+    parts.into_iter().sum()
+}
+
+/// Sum over leaves of area times a colour, in fixed order and in double precision.
+pub(crate) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> DVec3 {
+    let elements = &hierarchy.mesh.elements;
+    ordered_sum(elements.len(), |index| {
+        if !elements[index].is_leaf() {
+            return DVec3::ZERO;
+        }
+        let area = f64::from(elements[index].area_vector.length());
+        of(index).truncate().as_dvec3() * area
+    })
+}
+
+/// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
+pub(crate) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
+    let importance = &hierarchy.importance;
+    let elements = &hierarchy.mesh.elements;
+    let measured = |leaf: usize| of(leaf) * importance.measure(elements[leaf].patch as usize);
+    let sum = area_sum(hierarchy, measured) / importance.area.max(f64::MIN_POSITIVE);
+    sum.as_vec3().extend(0.0)
+}
+
+/// Part of the scene that is taken to be lit at least: light on less of it is measured by its root mean square and not by
+/// its mean, which would tell of the dark.
+const LEAST_LIT: f32 = 1.0 / 9.0;
+
+/// The luminance by which errors of a quantity are measured: its mean over the scene, or, where it is concentrated on a
+/// small part, what the mean would be if that part were [`LEAST_LIT`] of the scene.
+pub(crate) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
+    let moments = mean(hierarchy, |leaf| {
+        let value = luminance(of(leaf));
+        Vec4::new(value, value * value, 0.0, 0.0)
+    });
+    moments.x.max((moments.y * LEAST_LIT).sqrt())
+}
