@@ -3,7 +3,10 @@
 //! Room is asked for before links are made and elements divided, so that the limit holds at every moment and what was
 //! computed before stays whole.
 
-use super::{Solver, direct::DirectField};
+use super::{
+    direct::{DirectField, Surfaces},
+    iteration::{LinkedLight, iteration_bytes},
+};
 use crate::transport::Link;
 
 /// Bytes for each new link: it is collected in lists that may double, then sorted into the store.
@@ -17,49 +20,48 @@ const ELEMENT_BYTES: u64 = 900;
 /// Part of the free room that new elements may take; the rest is for their links.
 const ELEMENT_PART: u64 = 2;
 
-impl Solver {
-    /// Bytes held.
-    pub(super) fn memory_bytes(&self) -> u64 {
-        let own = self.hierarchy.memory_bytes()
-            + self.rays.memory_bytes()
-            + self.power.memory_bytes()
-            + self.links.memory_bytes()
-            + self.closures.memory_bytes()
-            + size_of_val(self.linked.as_slice())
-            + size_of_val(self.sending.as_slice())
-            + size_of_val(self.leaves.as_slice())
-            + size_of_val(self.gathered.as_slice())
-            + self.direct.as_ref().map_or(0, DirectField::memory_bytes)
-            + self.relighting.memory_bytes()
-            + self.snapshot.memory_bytes();
-        own as u64
+/// The memory limit, and what is held whatever becomes of the mesh and its light.
+#[derive(Clone, Copy)]
+pub(super) struct Budget {
+    /// Bytes that may be held; `None` for any number.
+    pub limit: Option<u64>,
+    /// Bytes held beside the mesh and its light.
+    pub others: u64,
+}
+
+impl Budget {
+    /// Bytes held in all.
+    pub(super) fn held_bytes(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
+        let own = surfaces.hierarchy.memory_bytes()
+            + surfaces.direct.map_or(0, DirectField::memory_bytes)
+            + linked.memory_bytes();
+        self.others + own as u64
     }
 
     /// Bytes that may still be taken, beside what an iteration needs.
-    fn free_bytes(&self) -> u64 {
-        let Some(limit) = self.memory_limit else {
+    fn free_bytes(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
+        let Some(limit) = self.limit else {
             return u64::MAX;
         };
-        let iteration = Self::iteration_bytes(self.hierarchy.mesh.elements.len()) as u64;
-        limit.saturating_sub(self.memory_bytes() + iteration)
+        let iteration = iteration_bytes(surfaces.hierarchy.mesh.elements.len()) as u64;
+        limit.saturating_sub(self.held_bytes(surfaces, linked) + iteration)
     }
 
     /// Links that a refinement may have while the present ones are kept.
-    pub(super) fn most_links(&self) -> u64 {
-        self.free_bytes() / LINK_BYTES
+    pub(super) fn most_links(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
+        self.free_bytes(surfaces, linked) / LINK_BYTES
     }
 
     /// Elements that there may be.
-    pub(super) fn most_elements(&self) -> u64 {
-        let present = self.hierarchy.mesh.elements.len() as u64;
-        present.saturating_add(self.free_bytes() / ELEMENT_PART / ELEMENT_BYTES)
+    pub(super) fn most_elements(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
+        let present = surfaces.hierarchy.mesh.elements.len() as u64;
+        let free = self.free_bytes(surfaces, linked);
+        present.saturating_add(free / ELEMENT_PART / ELEMENT_BYTES)
     }
 
-    /// Whether the memory limit is reached.
-    pub(super) fn is_out_of_memory(&self) -> bool {
-        self.is_full
-            || self
-                .memory_limit
-                .is_some_and(|limit| self.memory_bytes() > limit)
+    /// Whether the limit is exceeded.
+    pub(super) fn is_exceeded(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> bool {
+        self.limit
+            .is_some_and(|limit| self.held_bytes(surfaces, linked) > limit)
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{omission::Keep, schedule::THRESHOLD_FACTOR};
+use crate::hierarchy::Reading;
 
 /// How a cluster's directional power and area are represented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -19,6 +20,19 @@ pub enum Method {
     Exact,
     /// A quarter of the area in every direction (Sillion 1995).
     Isotropic,
+}
+
+impl Method {
+    /// How moments of clusters are read; `None` sums over their patches.
+    pub(super) fn reading(self) -> Option<Reading> {
+        match self {
+            Self::Bounded => Some(Reading::Bounded),
+            Self::SixFace => Some(Reading::SixFace),
+            Self::Single => Some(Reading::Single),
+            Self::Isotropic => Some(Reading::Isotropic),
+            Self::Exact => None,
+        }
+    }
 }
 
 /// How the error of a link is judged.

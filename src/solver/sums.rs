@@ -32,6 +32,11 @@ pub(crate) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync)
     })
 }
 
+/// As [`area_sum`], of all colours together.
+pub(super) fn area_total(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
+    area_sum(hierarchy, of).element_sum()
+}
+
 /// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
 pub(crate) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
     let importance = &hierarchy.importance;

@@ -6,13 +6,13 @@
 //! summed over all elements, as those of independent ones, and the largest are divided until the sum is small. So a
 //! fine pattern is left alone, whose light leaves evenly, and so is what sends little.
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Solver, limits::min_area};
-use crate::{hierarchy::Hierarchy, scene::Appearance, transport::luminance};
+use crate::{
+    hierarchy::{Hierarchy, luminance},
+    scene::{Appearance, Scene},
+};
 
 /// Error of the light that leaves, relative to all of it. Larger shows lamps in wrong places, smaller divides more finely
 /// than links tell apart.
@@ -58,50 +58,45 @@ impl Sent {
     }
 }
 
-impl Solver {
-    /// Divide elements by their textures until the light that leaves is right to [`TOLERANCE`].
-    pub(super) fn divide_by_textures(&mut self) {
-        let most = self.hierarchy.mesh.elements.len() + MOST_MADE;
-        let most_elements = self.most_elements().min(most as u64);
+/// How the textures of a scene look at present.
+#[derive(Clone, Copy)]
+pub(super) struct Painted<'a> {
+    /// What is lit.
+    pub scene: &'a Scene,
+    /// How materials look, by material.
+    pub appearances: &'a [Appearance],
+}
+
+impl Painted<'_> {
+    /// Divide elements by their textures until the light that leaves is right to [`TOLERANCE`]. Children are not smaller
+    /// than `min_area` (frame units), and there are no more than `most_elements` after.
+    pub(super) fn divide(self, hierarchy: &mut Hierarchy, min_area: f32, most_elements: u64) {
+        let most = hierarchy.mesh.elements.len() + MOST_MADE;
+        let most_elements = most_elements.min(most as u64);
         loop {
-            let leaves = self.textured_leaves();
-            let mut wanted = self.misplaced(&leaves);
-            while !self.hierarchy.mesh.fits(&wanted, most_elements) {
+            let leaves = self.textured_leaves(hierarchy, min_area);
+            let mut wanted = self.misplaced(hierarchy, &leaves);
+            while !hierarchy.mesh.fits(&wanted, most_elements) {
                 // The first ones err most.
                 wanted.truncate(wanted.len() / 2);
             }
-            if wanted.is_empty() || !self.hierarchy.mesh.divide(&wanted) {
+            if wanted.is_empty() || !hierarchy.mesh.divide(&wanted) {
                 return;
             }
-            self.extend_to_new_elements();
+            hierarchy.color_new_elements(self.scene, self.appearances);
         }
     }
 
-    /// By how much the radiosity of a leaf varies over it since its textures do (luminance).
-    pub(super) fn texture_spread(&self, leaf: usize) -> f32 {
-        let Some(deviation) = self.deviation_of(leaf) else {
-            return 0.0;
-        };
-        let irradiance = self.linked[leaf] + self.direct_of(leaf);
-        let reflected = deviation.reflectance * irradiance.truncate();
-        let emitted = match self.is_sampled(leaf) {
-            true => Vec3::ZERO,
-            false => deviation.emission * PI,
-        };
-        luminance((reflected + emitted).extend(0.0))
-    }
-
     /// Mean deviation of reflectance and emission within an element, as far as it is known.
-    fn deviation_of(&self, element: usize) -> Option<Appearance> {
-        let deviation = self.hierarchy.texture_deviation_of(element)?;
-        let triangle = self.hierarchy.patch_of(element).triangle;
+    pub(super) fn deviation(self, hierarchy: &Hierarchy, element: usize) -> Option<Appearance> {
+        let deviation = hierarchy.texture_deviation_of(element)?;
+        let triangle = hierarchy.patch_of(element).triangle;
         let material = self.scene.triangles[triangle.index()].material;
-        Some(deviation.times(&self.appearances()[material.index()], 1.0))
+        Some(deviation.times(&self.appearances[material.index()], 1.0))
     }
 
     /// Leaves that textures may divide.
-    fn textured_leaves(&self) -> Vec<usize> {
-        let (hierarchy, min_area) = (&self.hierarchy, min_area(&self.settings, &self.hierarchy));
+    fn textured_leaves(self, hierarchy: &Hierarchy, min_area: f32) -> Vec<usize> {
         if self.scene.texcoords.is_empty() {
             return Vec::new();
         }
@@ -113,27 +108,28 @@ impl Solver {
     }
 
     /// Those of some textured leaves that must be divided, the one that errs most first.
-    fn misplaced(&mut self, leaves: &[usize]) -> Vec<u32> {
+    fn misplaced(self, hierarchy: &mut Hierarchy, leaves: &[usize]) -> Vec<u32> {
         if leaves.is_empty() {
             return Vec::new();
         }
-        let sent = sent(&self.hierarchy);
+        // Look at the textures of those that may err.
+        let sent = sent(hierarchy);
         let unseen = UNSEEN_SHARE * TOLERANCE / (leaves.len() as f32).sqrt();
         // No deviation is larger than twice the mean.
         let may_err = |&leaf: &usize| {
-            let most = shown_by(&self.hierarchy, leaf).map(|mean| 2.0 * mean);
-            self.hierarchy.texture_deviation_of(leaf).is_none()
-                && error_of(&self.hierarchy, sent, leaf, most) > unseen
+            let most = shown_by(hierarchy, leaf).map(|mean| 2.0 * mean);
+            hierarchy.texture_deviation_of(leaf).is_none()
+                && error_of(hierarchy, sent, leaf, most) > unseen
         };
         let unknown: Vec<usize> = leaves.iter().copied().filter(may_err).collect();
-        self.hierarchy
-            .look_at_textures(&self.scene, &self.relighting.appearances, &unknown);
+        hierarchy.look_at_textures(self.scene, self.appearances, &unknown);
+        // Take the largest errors until the rest is small.
         let mut errors: Vec<(f32, usize)> = leaves
             .par_iter()
             .filter_map(|&leaf| {
-                let deviation = self.deviation_of(leaf)?;
+                let deviation = self.deviation(hierarchy, leaf)?;
                 let deviations = [deviation.reflectance, deviation.emission];
-                let of_leaf = error_of(&self.hierarchy, sent, leaf, deviations);
+                let of_leaf = error_of(hierarchy, sent, leaf, deviations);
                 (of_leaf > 0.0).then_some((of_leaf, leaf))
             })
             .collect();
@@ -193,7 +189,7 @@ mod tests {
         scene::{
             Face, Material, MaterialId, SceneBuilder, SceneOptions, Sides, Texture, TextureId,
         },
-        solver::{Cancel, SolveSettings},
+        solver::{Cancel, SolveSettings, Solver, limits::min_area},
     };
 
     const SIDE: usize = 64;
@@ -243,6 +239,17 @@ mod tests {
         Solver::new(scene, settings, None, &Cancel::default()).expect("nobody cancels")
     }
 
+    /// Whether nothing need be divided any more.
+    fn is_right(solver: &mut Solver) -> bool {
+        let min_area = min_area(&solver.settings, &solver.hierarchy);
+        let painted = Painted {
+            scene: &solver.scene,
+            appearances: &solver.scene.appearances(),
+        };
+        let leaves = painted.textured_leaves(&solver.hierarchy, min_area);
+        painted.misplaced(&mut solver.hierarchy, &leaves).is_empty()
+    }
+
     /// Area and power of what shines, relative to a lamp that is white all over, and the number of its parts.
     fn shining(solver: &Solver) -> (f32, f32, usize) {
         let hierarchy = &solver.hierarchy;
@@ -269,8 +276,7 @@ mod tests {
             _ => 0.0,
         });
         solver.hierarchy.validate().expect("it is valid");
-        let leaves = solver.textured_leaves();
-        assert!(solver.misplaced(&leaves).is_empty(), "all are right");
+        assert!(is_right(&mut solver));
         let (area, power, count) = shining(&solver);
         assert!((power - 1.0 / 16.0).abs() < 1e-3, "{power}");
         // With the rim over which the picture is blurred.
@@ -293,8 +299,7 @@ mod tests {
             ("picture", lamp(rough)),
         ] {
             solver.hierarchy.validate().expect("it is valid");
-            let leaves = solver.textured_leaves();
-            assert!(solver.misplaced(&leaves).is_empty(), "{name}");
+            assert!(is_right(&mut solver), "{name}");
             let (area, _, count) = shining(&solver);
             assert!(
                 area > 0.99 && (4..200).contains(&count),

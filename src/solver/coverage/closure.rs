@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::{
     hierarchy::{Hierarchy, Moments, Tables},
-    solver::Solver,
+    solver::plan::Plan,
     transport::luminance,
 };
 
@@ -155,8 +155,22 @@ impl Closures {
     }
 
     /// The same closure of all patches.
-    pub(crate) fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
+    fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
         Self::new(hierarchy, vec![closure; hierarchy.patches.len()], false)
+    }
+
+    /// Those that need no rays: 1 on closed surfaces, and none where all form factors are exact. Elsewhere they must be
+    /// probed: where walls are white, a leak that is seen by one ray in a thousand decides.
+    pub(crate) fn without_rays(plan: &Plan, hierarchy: &Hierarchy) -> Option<Self> {
+        if !plan.is_clear {
+            return None;
+        }
+        let closure = match (plan.is_closed, plan.is_by_patch) {
+            (true, _) => Closure::CLOSED,
+            (false, true) => Closure::UNKNOWN,
+            (false, false) => return None,
+        };
+        Some(Self::even(hierarchy, closure))
     }
 
     /// Elements that there were when they were looked at, the cells among them; 0 where none was yet.
@@ -188,12 +202,18 @@ impl Closures {
     }
 }
 
-impl Solver {
+impl Closures {
     /// Scale the colours of all leaves so that their form factors add to the closure, and no leaf's to more than 1 where
     /// `bounds_rows`.
-    pub(crate) fn scale_to_closure(&self, irradiance: &mut [Vec4], bounds_rows: bool) {
-        let elements = &self.hierarchy.mesh.elements;
-        let factors = self.closure_factors(irradiance);
+    pub(crate) fn scale(
+        &self,
+        hierarchy: &Hierarchy,
+        power: &Tables,
+        irradiance: &mut [Vec4],
+        bounds_rows: bool,
+    ) {
+        let elements = &hierarchy.mesh.elements;
+        let factors = self.factors(hierarchy, irradiance);
         irradiance
             .par_iter_mut()
             .zip(elements.par_iter().zip(factors))
@@ -205,16 +225,16 @@ impl Solver {
                 } else {
                     f32::INFINITY
                 };
-                let nearby = self.closures.nearby(&self.power, element.patch as usize);
+                let nearby = self.nearby(power, element.patch as usize);
                 *value = multiplied(*value, factor.min(most), nearby);
             });
     }
 
     /// What irradiance of each leaf must be multiplied by, given the sums of form factors in `w`; `None` for other elements.
-    pub(crate) fn closure_factors(&self, irradiance: &[Vec4]) -> Vec<Option<f32>> {
-        let elements = &self.hierarchy.mesh.elements;
-        let cell_count = self.closures.of.len();
-        let cell = |index| self.closures.cell(&self.hierarchy, index);
+    pub(crate) fn factors(&self, hierarchy: &Hierarchy, irradiance: &[Vec4]) -> Vec<Option<f32>> {
+        let elements = &hierarchy.mesh.elements;
+        let cell_count = self.of.len();
+        let cell = |index| self.cell(hierarchy, index);
         // Area and sum of form factors times area, by cell.
         let part = |index: usize| {
             let (area, row) = (elements[index].area_vector.length(), irradiance[index].w);
@@ -235,7 +255,7 @@ impl Solver {
             .with_min_len(1024)
             .map(|index| {
                 let cell = cell(index);
-                let closure = self.closures.of(cell);
+                let closure = self.of(cell);
                 let is_leaf = elements[index].is_leaf();
                 is_leaf.then(|| closure.factor_for(irradiance[index].w, sums[cell]))
             })

@@ -137,6 +137,9 @@ pub(crate) fn closures(
     seed: u64,
     cancel: &Cancel,
 ) -> Option<Probed> {
+    // In the clear a tree is needed for this alone.
+    let own_tree = rays.is_clear().then(|| RayTree::new(scene));
+    let rays = own_tree.as_ref().unwrap_or(rays);
     let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
     let prober = Prober {
         scene,
@@ -344,7 +347,7 @@ mod tests {
     use super::*;
     use crate::{
         scene::{SceneOptions, builtin::find_builtin},
-        solver::{SolveSettings, Solver, is_coarse},
+        solver::{SolveSettings, Solver, schedule::is_coarse},
     };
 
     #[test]
@@ -357,7 +360,9 @@ mod tests {
         let mut probed = Vec::new();
         for threshold_scale in [16.0, 8.0, 4.0, 2.0, 1.0] {
             let before = solver.ray_count;
-            solver.probe_closures(threshold_scale, &cancel).unwrap();
+            solver
+                .probe_closures(is_coarse(threshold_scale), &cancel)
+                .unwrap();
             assert!(solver.closures.serve(is_coarse(threshold_scale)));
             assert_eq!(solver.closures.count(), cells);
             probed.push(solver.ray_count - before);

@@ -87,16 +87,16 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
 }
 
 impl DirectField {
-    /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot.
+    /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot, and whether there
+    /// was room for all elements; `None` when cancelled.
     pub(crate) fn adapt(
         &mut self,
         rays: &RayTree,
         hierarchy: &mut Hierarchy,
         limits: Limits,
         cancel: &Cancel,
-    ) -> Option<u64> {
+    ) -> Option<(u64, bool)> {
         let mut ray_count = 0;
-        self.is_full = false;
         // Elements from here on were not looked at yet in this step.
         let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
@@ -110,12 +110,12 @@ impl DirectField {
             let leaves: Vec<usize> = hierarchy.mesh.leaves_among(elements).collect();
             ray_count += self.probe_centres(rays, hierarchy, &leaves, limits, mean, cancel)?;
             let wanted = self.bent(hierarchy, &leaves, limits, mean);
-            self.is_full = !hierarchy.mesh.fits(&wanted, limits.most_elements);
-            if self.is_full || !hierarchy.mesh.divide(&wanted) {
-                break;
+            let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
+            if !fits || !hierarchy.mesh.divide(&wanted) {
+                return Some((ray_count, fits));
             }
         }
-        Some(ray_count)
+        Some((ray_count, true))
     }
 
     /// Sample all vertices, until their noise is small enough. Returns the rays shot and the mean luminance.

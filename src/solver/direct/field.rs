@@ -24,10 +24,6 @@ pub(crate) struct DirectField {
     pub(crate) samples: u32,
     /// Vertices behind walls.
     pub(crate) offsets: OffsetPlaces,
-    /// Irradiance to show by vertex; shorter than the vertices where some are new.
-    shown: Vec<Vec4>,
-    /// Whether the number of elements kept the last adaptation from being finer.
-    pub(crate) is_full: bool,
 }
 
 impl DirectField {
@@ -40,8 +36,6 @@ impl DirectField {
             covered: 0,
             samples: 0,
             offsets: OffsetPlaces::default(),
-            shown: Vec::new(),
-            is_full: false,
         }
     }
 
@@ -64,42 +58,45 @@ impl DirectField {
         }
     }
 
-    /// Bring what is shown at vertices up to date with the samples.
-    pub(crate) fn smooth(&mut self, hierarchy: &Hierarchy) {
+    /// Direct irradiance to show at each vertex of the mesh, smoothed, and its standard error (luminance). A vertex that only
+    /// closes an edge takes the mean of its ends.
+    pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Vec<(Vec4, f32)> {
+        let smoothed = self.smoothed(hierarchy);
+        let mut shown: Vec<(Vec4, f32)> = Vec::with_capacity(hierarchy.mesh.vertices.len());
+        for (index, vertex) in hierarchy.mesh.vertices.iter().enumerate() {
+            let sampled = self.vertices.get(index).copied().flatten();
+            shown.push(match (sampled, vertex.ends) {
+                (Some(light), _) => (smoothed[index], light.error()),
+                // Ends were made before the vertices between them.
+                (None, Some([a, b])) => {
+                    let ((a, a_error), (b, b_error)) = (shown[a as usize], shown[b as usize]);
+                    ((a + b) * 0.5, (a_error + b_error) * 0.5)
+                }
+                (None, None) => (Vec4::ZERO, 0.0),
+            });
+        }
+        shown
+    }
+
+    /// Irradiance at the vertices that were sampled, as far as noise explains how neighbours differ.
+    fn smoothed(&self, hierarchy: &Hierarchy) -> Vec<Vec4> {
         let fractions = smooth::fractions(hierarchy, &self.vertices);
         let known = self.vertices.iter().zip(fractions);
-        self.shown = known
+        let mut shown: Vec<Vec4> = known
             .map(|(light, fraction)| {
                 let unoccluded = light.map_or(Vec4::ZERO, |light| light.unoccluded());
                 self.lights.bounded(unoccluded * fraction)
             })
             .collect();
         let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        carry_over(&hierarchy.mesh, tells, &mut self.shown);
+        carry_over(&hierarchy.mesh, tells, &mut shown);
         let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
         let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
             let centre = self.centres.get(leaf).copied().flatten()?;
             Some((leaf, self.lights.bounded(centre.irradiance())))
         });
-        project(hierarchy, &mut self.shown, centres);
-    }
-
-    /// Direct irradiance to show at a vertex and its standard error (luminance). A vertex that only closes an edge takes the
-    /// mean of its ends.
-    pub(crate) fn vertex(&self, hierarchy: &Hierarchy, vertex: u32) -> (Vec4, f32) {
-        if let Some(light) = self.vertices.get(vertex as usize).copied().flatten() {
-            let shown = self.shown.get(vertex as usize).copied();
-            let shown = shown.unwrap_or_else(|| self.lights.bounded(light.irradiance()));
-            return (shown, light.error());
-        }
-        match hierarchy.mesh.vertices[vertex as usize].ends {
-            // Ends were made before the vertices between them, so this descends.
-            Some(ends) => {
-                let [(a, a_error), (b, b_error)] = ends.map(|end| self.vertex(hierarchy, end));
-                ((a + b) * 0.5, (a_error + b_error) * 0.5)
-            }
-            None => (Vec4::ZERO, 0.0),
-        }
+        project(hierarchy, &mut shown, centres);
+        shown
     }
 
     /// Direct irradiance at a corner of a leaf.
@@ -126,7 +123,6 @@ impl DirectField {
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
-            + size_of_val(self.shown.as_slice())
             + self.offsets.memory_bytes()
     }
 }

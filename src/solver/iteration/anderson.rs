@@ -55,19 +55,20 @@ impl Anderson {
     pub(crate) fn next(&mut self, weights: &[f32], at: &[Vec4], image: &[Vec4]) -> Vec<Vec4> {
         let residual = map(image, at, |image, at| (image - at).truncate());
         let image_colors: Vec<Vec3> = image.par_iter().map(|image| image.truncate()).collect();
-        if let Some((last_residual, last_image)) = self.last.take()
+        if let Some((last_residual, last_image)) = &self.last
             && self.depth > 0
         {
             if self.changes.len() == self.depth {
                 self.changes.pop_front();
             }
             self.changes.push_back(Change {
-                residual: map(&residual, &last_residual, |new, old| new - old),
-                image: map(&image_colors, &last_image, |new, old| new - old),
+                residual: map(&residual, last_residual, |new, old| new - old),
+                image: map(&image_colors, last_image, |new, old| new - old),
             });
         }
         let shares = self.shares(weights, &residual);
-        let next = image
+        self.last = Some((residual, image_colors));
+        image
             .par_iter()
             .enumerate()
             .map(|(index, image)| {
@@ -82,9 +83,7 @@ impl Anderson {
                 };
                 color.extend(image.w)
             })
-            .collect();
-        self.last = Some((residual, image_colors));
-        next
+            .collect()
     }
 
     /// Ratio of the last two images' distance to that of the iterates: below 1 where the iteration contracts. Nothing

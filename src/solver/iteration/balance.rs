@@ -17,8 +17,11 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::gather::{self, Holders};
-use crate::solver::{Cancel, Solver};
+use super::{
+    gather::{self, Holders},
+    light::LinkedLight,
+};
+use crate::solver::{Cancel, SolveSettings, coverage::Closures, direct::Surfaces};
 
 /// A sender's factor is at most this, and at least its inverse. Larger, and what coarse links get wrong by more is mirrored as
 /// though it were reciprocal (first step of `cornell`: 6.7 % with 1.1, 7.0 % with 1.2, 18 % without a bound); smaller, and less
@@ -29,38 +32,44 @@ const MOST_FACTOR: f32 = 1.1;
 /// that degree over 1…2); with 2 it is 1/17. Factors of one step are a start for the next.
 const SWEEPS: u32 = 3;
 
-impl Solver {
-    /// Find by what leaves' radiosity is multiplied before links carry it, for the links that there are; source tables are up to
-    /// date before and after.
-    pub(crate) fn balance(&mut self, cancel: &Cancel) -> Option<()> {
-        let holders = Holders::new(&self.hierarchy, &self.links);
-        for sweep in 0..SWEEPS {
-            let push = self.settings.push;
-            let sums = gather::gather(self.kernel(), &self.links, &holders, push, cancel)?;
-            let relaxation = relaxation(sweep);
-            let next = |sending: &f32, factor: f32| {
-                let next = sending.powf(1.0 - relaxation) * factor.powf(relaxation);
-                next.clamp(1.0 / MOST_FACTOR, MOST_FACTOR)
-            };
-            let factors = self.closure_factors(&sums);
-            let emits = |leaf: usize| {
-                !self.is_sampled(leaf) && self.hierarchy.emission_of(leaf) != Vec3::ZERO
-            };
-            self.sending = self
-                .sending
-                .iter()
-                .zip(factors)
-                .enumerate()
-                .map(|(leaf, (sending, factor))| match factor {
-                    Some(factor) if !emits(leaf) => next(sending, factor),
-                    _ => *sending,
-                })
-                .collect();
-            self.pull();
-            cancel.proceed()?;
-        }
-        Some(())
+/// Find by what leaves' radiosity is multiplied before links carry it, for the links that there are; source tables are up to
+/// date before and after. `None` when cancelled.
+pub(crate) fn balance(
+    linked: &mut LinkedLight,
+    surfaces: Surfaces<'_>,
+    closures: &Closures,
+    settings: &SolveSettings,
+    cancel: &Cancel,
+) -> Option<()> {
+    let hierarchy = surfaces.hierarchy;
+    let holders = Holders::new(hierarchy, &linked.links);
+    let emits =
+        |leaf: usize| !surfaces.is_sampled(leaf) && hierarchy.emission_of(leaf) != Vec3::ZERO;
+    for sweep in 0..SWEEPS {
+        // The sums of form factors under the present factors.
+        let kernel = linked.kernel(hierarchy, settings.method.reading());
+        let sums = gather::gather(kernel, &linked.links, &holders, settings.push, cancel)?;
+        // Move the factors towards what would make these sums right.
+        let relaxation = relaxation(sweep);
+        let next = |sending: &f32, factor: f32| {
+            let next = sending.powf(1.0 - relaxation) * factor.powf(relaxation);
+            next.clamp(1.0 / MOST_FACTOR, MOST_FACTOR)
+        };
+        let factors = closures.factors(hierarchy, &sums);
+        linked.sending = linked
+            .sending
+            .iter()
+            .zip(factors)
+            .enumerate()
+            .map(|(leaf, (sending, factor))| match factor {
+                Some(factor) if !emits(leaf) => next(sending, factor),
+                _ => *sending,
+            })
+            .collect();
+        linked.pull(surfaces);
+        cancel.proceed()?;
     }
+    Some(())
 }
 
 /// How far the logarithm of a factor moves in a sweep towards what would make its row right, were all others right: an

@@ -15,18 +15,17 @@
 //! sweeps even at 0.5: its directions have both signs, and bounded tables do not answer those linearly. Anderson's
 //! combinations stay near light that can be.
 
-use std::f32::consts::PI;
-
 use glam::Vec4;
 use rayon::prelude::*;
 
 use super::{
     anderson::Anderson,
     gather::{self, Holders},
+    light::LinkedLight,
 };
-use crate::solver::{
-    Cancel, Solver, StepReport,
-    sums::{area_sum, ordered_sum},
+use crate::{
+    hierarchy::Hierarchy,
+    solver::{Cancel, SolveSettings, coverage::Closures, direct::Surfaces, sums::area_total},
 };
 
 /// Iterates that acceleration remembers: 24 bytes each for every element. See above; below 3 white rooms take many
@@ -52,6 +51,34 @@ const GROWING_SWEEPS: u32 = 5;
 
 /// Factor by which all light may exceed what emitters can keep up, for the noise of direct light.
 pub(crate) const CEILING_SLACK: f64 = 1.1;
+
+/// What an iteration needs beside the light.
+#[derive(Clone, Copy)]
+pub(crate) struct Iteration<'a> {
+    /// What exchanges light.
+    pub surfaces: Surfaces<'a>,
+    /// What form factors are scaled to.
+    pub closures: &'a Closures,
+    /// How tables are read and irradiance is pushed.
+    pub settings: &'a SolveSettings,
+    /// To which part of the power the light must settle, as the tolerance of the settings is.
+    pub tolerance: f32,
+    /// Stops it.
+    pub cancel: &'a Cancel,
+}
+
+/// How an iteration went.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Convergence {
+    /// Sweeps that it took.
+    pub sweeps: u32,
+    /// What the last sweep changed, relative to the power that arrived.
+    pub residual: f32,
+    /// Largest ratio by which a sweep changed the distance of two lights; 0 where nothing tells it.
+    pub contraction: f32,
+    /// What had to be done to keep it stable, one sentence each.
+    pub notes: Vec<String>,
+}
 
 /// What one sweep did to the light.
 struct Sweep {
@@ -79,200 +106,164 @@ enum Ending {
     Growing,
 }
 
-impl Solver {
-    /// Gather, push and pull until the light settles to a tolerance, as that of the settings is. Where it grows instead, rows are bounded, and light gets through as
-    /// area does; where even that does not help, the light from before stays.
-    pub(crate) fn iterate(
-        &mut self,
-        report: &mut StepReport,
-        tolerance: f32,
-        cancel: &Cancel,
-    ) -> Option<()> {
-        let before = self.linked.clone();
-        for bounds_rows in [false, true] {
-            match self.settle(report, tolerance, bounds_rows, cancel)? {
-                Ending::Settled => return Some(()),
-                Ending::Unsettled => {
-                    report.notes.push(format!(
-                        "the iteration has not converged after {} sweeps: the residual is {:.1e}",
-                        report.sweeps, report.residual
-                    ));
-                    return Some(());
-                }
-                Ending::Growing => {
-                    self.linked.clone_from(&before);
-                    self.pull();
-                    self.links.level(&self.hierarchy);
-                    report.notes.push(if bounds_rows {
-                        "the light still grows: that of the last step stays".to_owned()
-                    } else {
-                        "the light grows from sweep to sweep: form factors of each element are bounded by 1"
-                            .to_owned()
-                    });
-                }
+/// Gather, push and pull until the light settles. Where it grows instead, rows are bounded, and light gets through as area
+/// does; where even that does not help, the light from before stays. `None` when cancelled.
+pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Option<Convergence> {
+    let before = linked.irradiance.clone();
+    let mut convergence = Convergence::default();
+    for bounds_rows in [false, true] {
+        match settle(linked, iteration, bounds_rows, &mut convergence)? {
+            Ending::Settled => break,
+            Ending::Unsettled => {
+                convergence.notes.push(format!(
+                    "the iteration has not converged after {} sweeps: the residual is {:.1e}",
+                    convergence.sweeps, convergence.residual
+                ));
+                break;
+            }
+            Ending::Growing => {
+                linked.irradiance.clone_from(&before);
+                linked.pull(iteration.surfaces);
+                linked.links.level(iteration.surfaces.hierarchy);
+                convergence.notes.push(if bounds_rows {
+                    "the light still grows: that of the last step stays".to_owned()
+                } else {
+                    "the light grows from sweep to sweep: form factors of each element are bounded by 1"
+                        .to_owned()
+                });
             }
         }
-        Some(())
     }
+    Some(convergence)
+}
 
-    /// One iteration, with or without a bound on the sums of form factors.
-    fn settle(
-        &mut self,
-        report: &mut StepReport,
-        tolerance: f32,
-        bounds_rows: bool,
-        cancel: &Cancel,
-    ) -> Option<Ending> {
-        let weights = self.leaf_shares();
-        let holders = Holders::new(&self.hierarchy, &self.links);
-        let direct = self.direct_of_leaves();
-        let ceiling = CEILING_SLACK * self.most_power();
-        let mut acceleration = Anderson::new(DEPTH);
-        let mut growing = 0;
-        for _ in 0..MOST_SWEEPS {
-            cancel.proceed()?;
-            let sweep = self.sweep(&holders, &direct, bounds_rows, cancel)?;
-            report.sweeps += 1;
-            cancel.proceed()?;
-            let next = acceleration.next(&weights, &self.linked, &sweep.image);
-            cancel.proceed()?;
-            let step = self.power_between(&next, &self.linked);
-            let relative = |power: f64| power / sweep.arrived.max(f64::MIN_POSITIVE);
-            let (residual, error) = (relative(sweep.change), relative(step));
-            report.residual = residual as f32;
-            if let Some(ratio) = acceleration.contraction(&weights) {
-                report.contraction = report.contraction.max(ratio);
-            }
-            growing = if sweep.returned > sweep.sent * (1.0 + GROWTH_SLACK) {
-                growing + 1
-            } else {
-                0
-            };
-            let is_bounded = sweep.sent <= ceiling && sweep.returned.is_finite();
-            // Where rows are bounded, no place can get more than the brightest sends: only in sum it may, for a while.
-            if (growing >= GROWING_SWEEPS && !bounds_rows) || !is_bounded {
-                return Some(Ending::Growing);
-            }
-            let is_settled = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
-            self.linked = if is_settled { sweep.image } else { next };
-            self.pull();
-            if is_settled {
-                note_unscaled_growth(report, sweep.returned_unscaled / sweep.sent);
-                return Some(Ending::Settled);
-            }
-        }
-        Some(Ending::Unsettled)
-    }
-
-    /// Gather once, and measure what came of it beside the direct light; `None` when cancelled.
-    fn sweep(
-        &self,
-        holders: &Holders,
-        direct: &[Vec4],
-        bounds_rows: bool,
-        cancel: &Cancel,
-    ) -> Option<Sweep> {
-        let push = self.settings.push;
-        let mut image = gather::gather(self.kernel(), &self.links, holders, push, cancel)?;
-        let returned = |image: &[Vec4]| {
-            self.leaf_sum(|leaf| {
-                self.hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])
-            })
-        };
-        let returned_unscaled = returned(&image);
-        self.scale_to_closure(&mut image, bounds_rows);
+/// One iteration, with or without a bound on the sums of form factors.
+fn settle(
+    linked: &mut LinkedLight,
+    iteration: Iteration<'_>,
+    bounds_rows: bool,
+    convergence: &mut Convergence,
+) -> Option<Ending> {
+    let Iteration {
+        surfaces,
+        tolerance,
+        cancel,
+        ..
+    } = iteration;
+    // What is the same in all sweeps.
+    let hierarchy = surfaces.hierarchy;
+    let weights = leaf_areas(hierarchy);
+    let holders = Holders::new(hierarchy, &linked.links);
+    let direct = surfaces.direct_of_leaves();
+    let ceiling = CEILING_SLACK * surfaces.most_power();
+    let mut acceleration = Anderson::new(DEPTH);
+    let mut growing = 0;
+    for _ in 0..MOST_SWEEPS {
+        // Gather, and let the acceleration propose the next light.
         cancel.proceed()?;
-        Some(Sweep {
-            sent: self.leaf_sum(|leaf| self.radiosity(leaf)) + self.sampled_power(),
-            returned: returned(&image),
-            returned_unscaled,
-            arrived: self.leaf_sum(|leaf| image[leaf] + direct[leaf]),
-            change: self.power_between(&image, &self.linked),
-            image,
-        })
-    }
-
-    fn power_between(&self, a: &[Vec4], b: &[Vec4]) -> f64 {
-        self.leaf_sum(|leaf| (a[leaf] - b[leaf]).abs())
-    }
-
-    pub(crate) fn leaf_sum(&self, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
-        area_sum(&self.hierarchy, of).element_sum()
-    }
-
-    /// Direct irradiance of the leaves, 0 for other elements: the same in every sweep.
-    fn direct_of_leaves(&self) -> Vec<Vec4> {
-        let elements = self.hierarchy.mesh.elements.par_iter().enumerate();
-        elements
-            .map(|(index, element)| {
-                if element.is_leaf() {
-                    self.direct_of(index)
-                } else {
-                    Vec4::ZERO
-                }
-            })
-            .collect()
-    }
-
-    /// Areas of the leaves, 0 for other elements.
-    fn leaf_shares(&self) -> Vec<f32> {
-        self.hierarchy
-            .mesh
-            .elements
-            .par_iter()
-            .map(|element| {
-                if element.is_leaf() {
-                    element.area_vector.length()
-                } else {
-                    0.0
-                }
-            })
-            .collect()
-    }
-
-    /// Power of the emitters that no link carries.
-    pub(crate) fn sampled_power(&self) -> f64 {
-        let Some(field) = &self.direct else {
-            return 0.0;
-        };
-        let of_patch = |index: usize| {
-            let patch = &self.hierarchy.patches[index];
-            f64::from((patch.emission * PI).element_sum()) * f64::from(patch.area)
-        };
-        field.lights.sampled_patches().map(of_patch).sum()
-    }
-
-    /// No more power than this can be under way: what is emitted, if everything reflected as the brightest surface does.
-    pub(crate) fn most_power(&self) -> f64 {
-        let patches = &self.hierarchy.patches;
-        let brightest = self.hierarchy.largest_reflectance();
-        let emitted = ordered_sum(patches.len(), |index| {
-            patches[index].emission.as_dvec3() * f64::from(patches[index].area)
-        });
-        let absorbed = 1.0 - f64::from(brightest);
-        if absorbed > 0.0 {
-            f64::from(PI) * emitted.element_sum() / absorbed
+        let sweep = sweep(linked, iteration, &holders, &direct, bounds_rows)?;
+        convergence.sweeps += 1;
+        cancel.proceed()?;
+        let next = acceleration.next(&weights, &linked.irradiance, &sweep.image);
+        cancel.proceed()?;
+        // How far the light is from the solution.
+        let step = power_between(hierarchy, &next, &linked.irradiance);
+        let relative = |power: f64| power / sweep.arrived.max(f64::MIN_POSITIVE);
+        let (residual, error) = (relative(sweep.change), relative(step));
+        convergence.residual = residual as f32;
+        if let Some(ratio) = acceleration.contraction(&weights) {
+            convergence.contraction = convergence.contraction.max(ratio);
+        }
+        // Give up where sweeps make light.
+        growing = if sweep.returned > sweep.sent * (1.0 + GROWTH_SLACK) {
+            growing + 1
         } else {
-            f64::INFINITY
+            0
+        };
+        let is_bounded = sweep.sent <= ceiling && sweep.returned.is_finite();
+        // Where rows are bounded, no place can get more than the brightest sends: only in sum it may, for a while.
+        if (growing >= GROWING_SWEEPS && !bounds_rows) || !is_bounded {
+            return Some(Ending::Growing);
+        }
+        // Go on from the proposed light, or end with what was gathered.
+        let is_settled = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
+        linked.irradiance = if is_settled { sweep.image } else { next };
+        linked.pull(surfaces);
+        if is_settled {
+            note_unscaled_growth(convergence, sweep.returned_unscaled / sweep.sent);
+            return Some(Ending::Settled);
         }
     }
+    Some(Ending::Unsettled)
+}
+
+/// Gather once, and measure what came of it beside the direct light of the leaves; `None` when cancelled.
+fn sweep(
+    linked: &LinkedLight,
+    iteration: Iteration<'_>,
+    holders: &Holders,
+    direct: &[Vec4],
+    bounds_rows: bool,
+) -> Option<Sweep> {
+    let Iteration {
+        surfaces,
+        closures,
+        settings,
+        tolerance: _,
+        cancel,
+    } = iteration;
+    let hierarchy = surfaces.hierarchy;
+    let kernel = linked.kernel(hierarchy, settings.method.reading());
+    let mut image = gather::gather(kernel, &linked.links, holders, settings.push, cancel)?;
+    let returned = |image: &[Vec4]| {
+        area_total(hierarchy, |leaf| {
+            hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])
+        })
+    };
+    let returned_unscaled = returned(&image);
+    closures.scale(hierarchy, &linked.power, &mut image, bounds_rows);
+    cancel.proceed()?;
+    Some(Sweep {
+        sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf))
+            + surfaces.sampled_power(),
+        returned: returned(&image),
+        returned_unscaled,
+        arrived: area_total(hierarchy, |leaf| image[leaf] + direct[leaf]),
+        change: power_between(hierarchy, &image, &linked.irradiance),
+        image,
+    })
+}
+
+fn power_between(hierarchy: &Hierarchy, a: &[Vec4], b: &[Vec4]) -> f64 {
+    area_total(hierarchy, |leaf| (a[leaf] - b[leaf]).abs())
+}
+
+/// Areas of the leaves, 0 for other elements.
+fn leaf_areas(hierarchy: &Hierarchy) -> Vec<f32> {
+    let elements = hierarchy.mesh.elements.par_iter();
+    elements
+        .map(|element| {
+            if element.is_leaf() {
+                element.area_vector.length()
+            } else {
+                0.0
+            }
+        })
+        .collect()
 }
 
 /// Say so where only the scaling to the closure keeps the light from growing.
-fn note_unscaled_growth(report: &mut StepReport, gain: f64) {
+fn note_unscaled_growth(convergence: &mut Convergence, gain: f64) {
     if gain > 1.0 + UNSCALED_SLACK {
-        report.notes.push(format!(
+        convergence.notes.push(format!(
             "the links are too coarse to keep energy: by themselves they would return {gain:.2} times the light that \
              is sent, sweep after sweep; scaled to the closure they do not"
         ));
     }
 }
 
-impl Solver {
-    /// Bytes that an iteration needs beside what the solver holds: its memory, the light before and after, and the direct
-    /// light.
-    pub(crate) const fn iteration_bytes(element_count: usize) -> usize {
-        const VECTORS: usize = 4;
-        Anderson::memory_bytes(DEPTH, element_count) + VECTORS * element_count * size_of::<Vec4>()
-    }
+/// Bytes that an iteration needs beside what a solve holds: its memory, the light before and after, and the direct light.
+pub(crate) const fn iteration_bytes(element_count: usize) -> usize {
+    const VECTORS: usize = 4;
+    Anderson::memory_bytes(DEPTH, element_count) + VECTORS * element_count * size_of::<Vec4>()
 }

@@ -4,6 +4,9 @@ mod anderson;
 mod balance;
 mod gather;
 mod iterate;
+mod light;
 
 pub(crate) use anderson::Anderson;
-pub(crate) use iterate::CEILING_SLACK;
+pub(crate) use balance::balance;
+pub(crate) use iterate::{CEILING_SLACK, Iteration, iterate, iteration_bytes};
+pub(crate) use light::LinkedLight;

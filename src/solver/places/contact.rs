@@ -11,7 +11,7 @@ use crate::{
     geometry::RayTree,
     hierarchy::{Element, Hierarchy},
     scene::{Scene, TriangleId},
-    solver::{Cancel, Solver},
+    solver::{Cancel, limits::Limits},
 };
 
 /// Elements that lie under an object in part are divided while the root of their share of the area is more than this
@@ -48,106 +48,127 @@ const LEAST_BACKS: usize = 2;
 /// Probes that may meet what may be lit.
 const MOST_LIT: usize = 1;
 
-impl Solver {
-    /// Divide elements that lie under an object in part.
-    pub(crate) fn divide_contacts(&mut self, cancel: &Cancel) -> Option<()> {
-        let limits = self.limits(1.0);
-        loop {
-            self.probe_contacts(cancel)?;
-            let least = self.least_contact();
-            let mesh = &mut self.hierarchy.mesh;
-            let is_wanted = |leaf: &usize| {
-                let element = &mesh.elements[*leaf];
-                element.is_contact() && element.area_vector.length() > least
-            };
-            let wanted: Vec<u32> = mesh
-                .active_leaves()
-                .filter(is_wanted)
-                .map(|leaf| leaf as u32)
-                .collect();
-            let fits = mesh.fits(&wanted, limits.most_elements);
-            self.is_full |= !fits;
-            if !fits || !mesh.divide(&wanted) {
-                return Some(());
-            }
-        }
-    }
-
-    /// Find out which leaves lie within solids. Of small ones it is only asked where what was divided did.
-    pub(crate) fn probe_contacts(&mut self, cancel: &Cancel) -> Option<()> {
-        let least = self.least_contact();
-        let elements = &self.hierarchy.mesh.elements;
-        let fresh: Vec<usize> = self
-            .hierarchy
-            .mesh
-            .active_leaves()
-            .filter(|&leaf| elements[leaf].inside_solid == Element::UNPROBED)
-            .collect();
-        let is_looked_at = |leaf: usize| {
-            let element = &elements[leaf];
-            let above = elements.get(element.parent as usize);
-            let whole = elements[element.patch as usize].area_vector.length();
-            element.area_vector.length() > LOOKED_AT * least
-                || above.is_some_and(|parent| match parent.inside_solid {
-                    Element::UNPROBED => whole > LOOKED_AT * least,
-                    covered => covered != 0,
-                })
+/// Divide elements that lie under an object in part; `limits` are those of the last step. Returns the rays shot, and whether
+/// all could be divided; `None` when cancelled.
+pub(crate) fn divide_contacts(
+    scene: &Scene,
+    hierarchy: &mut Hierarchy,
+    rays: &RayTree,
+    limits: Limits,
+    cancel: &Cancel,
+) -> Option<(u64, bool)> {
+    let mut ray_count = 0;
+    let least = least_contact(hierarchy, limits);
+    loop {
+        ray_count += probe_contacts(scene, hierarchy, rays, limits, cancel)?;
+        let mesh = &mut hierarchy.mesh;
+        let is_wanted = |leaf: &usize| {
+            let element = &mesh.elements[*leaf];
+            element.is_contact() && element.area_vector.length() > least
         };
-        let (wanted, spared): (Vec<usize>, Vec<usize>) =
-            fresh.into_iter().partition(|&leaf| is_looked_at(leaf));
-        self.probe_leaves(&wanted, cancel)?;
-        for leaf in spared {
-            self.hierarchy.mesh.elements[leaf].inside_solid = 0;
-        }
-        Some(())
-    }
-
-    /// Find out which of some leaves lie within solids.
-    fn probe_leaves(&mut self, leaves: &[usize], cancel: &Cancel) -> Option<()> {
-        let mut triangles = self.scene.triangles.iter();
-        let solids = triangles
-            .any(|triangle| triangle.bounds_solid)
-            .then_some(&*self.scene);
-        let probed: Vec<(u8, u64)> = leaves
-            .par_iter()
-            .map(|&leaf| match cancel.is_cancelled() {
-                true => (0, 0),
-                false => probe(solids, &self.rays, &self.hierarchy, leaf),
-            })
+        let wanted: Vec<u32> = mesh
+            .active_leaves()
+            .filter(is_wanted)
+            .map(|leaf| leaf as u32)
             .collect();
-        cancel.proceed()?;
-        for (&leaf, (covered, shot)) in leaves.iter().zip(probed) {
-            self.hierarchy.mesh.elements[leaf].inside_solid = covered;
-            self.ray_count += shot;
+        let fits = mesh.fits(&wanted, limits.most_elements);
+        if !fits || !mesh.divide(&wanted) {
+            return Some((ray_count, fits));
         }
-        Some(())
     }
+}
 
-    /// Look at some elements, however small, and at all that lies on them: rays from there told that they lie within a
-    /// solid.
-    pub(crate) fn probe_within(&mut self, elements: &[usize], cancel: &Cancel) -> Option<()> {
-        if elements.is_empty() || self.rays.is_clear() {
-            return Some(());
-        }
-        let mesh = &self.hierarchy.mesh;
-        let mut pending = elements.to_vec();
-        let mut leaves = Vec::new();
-        while let Some(element) = pending.pop() {
-            pending.extend(mesh.elements[element].children());
-            if mesh.elements[element].is_leaf() {
-                leaves.push(element);
-            }
-        }
-        self.probe_leaves(&leaves, cancel)
+/// Find out which leaves lie within solids; `limits` are those of the last step. Of small ones it is only asked where what
+/// was divided did. Returns the rays shot; `None` when cancelled.
+pub(crate) fn probe_contacts(
+    scene: &Scene,
+    hierarchy: &mut Hierarchy,
+    rays: &RayTree,
+    limits: Limits,
+    cancel: &Cancel,
+) -> Option<u64> {
+    let least = least_contact(hierarchy, limits);
+    let elements = &hierarchy.mesh.elements;
+    let fresh: Vec<usize> = hierarchy
+        .mesh
+        .active_leaves()
+        .filter(|&leaf| elements[leaf].inside_solid == Element::UNPROBED)
+        .collect();
+    let is_looked_at = |leaf: usize| {
+        let element = &elements[leaf];
+        let above = elements.get(element.parent as usize);
+        let whole = elements[element.patch as usize].area_vector.length();
+        element.area_vector.length() > LOOKED_AT * least
+            || above.is_some_and(|parent| match parent.inside_solid {
+                Element::UNPROBED => whole > LOOKED_AT * least,
+                covered => covered != 0,
+            })
+    };
+    let (wanted, spared): (Vec<usize>, Vec<usize>) =
+        fresh.into_iter().partition(|&leaf| is_looked_at(leaf));
+    let ray_count = probe_leaves(scene, hierarchy, rays, &wanted, cancel)?;
+    for leaf in spared {
+        hierarchy.mesh.elements[leaf].inside_solid = 0;
     }
+    Some(ray_count)
+}
 
-    /// Elements in contact that are no larger are not divided, frame units.
-    fn least_contact(&self) -> f32 {
-        // The same in all steps, whose tolerances fall.
-        let limits = self.limits(1.0);
-        let root = CONTACT_TOLERANCE * limits.tolerance;
-        (root * root * self.hierarchy.importance.area as f32).max(limits.min_area)
+/// Find out which of some leaves lie within solids. Returns the rays shot; `None` when cancelled.
+fn probe_leaves(
+    scene: &Scene,
+    hierarchy: &mut Hierarchy,
+    rays: &RayTree,
+    leaves: &[usize],
+    cancel: &Cancel,
+) -> Option<u64> {
+    let mut triangles = scene.triangles.iter();
+    let solids = triangles
+        .any(|triangle| triangle.bounds_solid)
+        .then_some(scene);
+    let probed: Vec<(u8, u64)> = leaves
+        .par_iter()
+        .map(|&leaf| match cancel.is_cancelled() {
+            true => (0, 0),
+            false => probe(solids, rays, hierarchy, leaf),
+        })
+        .collect();
+    cancel.proceed()?;
+    let mut ray_count = 0;
+    for (&leaf, (covered, shot)) in leaves.iter().zip(probed) {
+        hierarchy.mesh.elements[leaf].inside_solid = covered;
+        ray_count += shot;
     }
+    Some(ray_count)
+}
+
+/// Look at some elements, however small, and at all that lies on them: rays from there told that they lie within a solid.
+/// Returns the rays shot; `None` when cancelled.
+pub(crate) fn probe_within(
+    scene: &Scene,
+    hierarchy: &mut Hierarchy,
+    rays: &RayTree,
+    elements: &[usize],
+    cancel: &Cancel,
+) -> Option<u64> {
+    if elements.is_empty() || rays.is_clear() {
+        return Some(0);
+    }
+    let mesh = &hierarchy.mesh;
+    let mut pending = elements.to_vec();
+    let mut leaves = Vec::new();
+    while let Some(element) = pending.pop() {
+        pending.extend(mesh.elements[element].children());
+        if mesh.elements[element].is_leaf() {
+            leaves.push(element);
+        }
+    }
+    probe_leaves(scene, hierarchy, rays, &leaves, cancel)
+}
+
+/// Elements in contact that are no larger are not divided, frame units. The same in all steps, by the limits of the last.
+fn least_contact(hierarchy: &Hierarchy, limits: Limits) -> f32 {
+    let root = CONTACT_TOLERANCE * limits.tolerance;
+    (root * root * hierarchy.importance.area as f32).max(limits.min_area)
 }
 
 /// Which corners of an element, and whether its centroid, lie within a solid or behind a wall, as [`Element::inside_solid`] has

@@ -7,77 +7,94 @@ use glam::{Vec2, Vec3, Vec4};
 use super::seams::{Seams, repeat};
 use crate::{
     geometry::area_vector,
-    hierarchy::{Cluster, NodeId},
-    scene::TriangleId,
+    hierarchy::{Cluster, Hierarchy, NodeId},
+    scene::{Appearance, Scene, TriangleId},
     solver::{
-        Cancel, ClusterBox, DisplayMesh, Snapshot, Solver, VertexLight, vertices::VertexMeans,
+        Cancel, ClusterBox, DisplayMesh, LeftOut, Snapshot, VertexLight,
+        direct::Surfaces,
+        iteration::LinkedLight,
+        vertices::{LeafLight, VertexMeans},
     },
     transport::luminance,
 };
 
-impl Solver {
-    /// Renew the snapshot after a step. The mesh is kept where no element was divided. When cancelled the snapshot stays
-    /// as it was.
-    pub(crate) fn show(&mut self, cancel: &Cancel) -> Option<()> {
-        let held = &self.snapshot.mesh;
-        let has_changed = held.indices.is_empty()
-            || held.own_vertex_count() != self.hierarchy.mesh.vertices.len()
-            || self.hierarchy.mesh.leaves().count() != self.leaf_count_shown();
-        cancel.proceed()?;
-        let triangles = has_changed.then(|| self.hierarchy.mesh.closed_triangles());
-        cancel.proceed()?;
+/// A triangle of the mesh that is shown: its element and its vertices.
+pub(crate) type ClosedTriangle = (u32, [u32; 3]);
+
+/// The triangles of elements and of what closes their edges, where these have changed since a mesh was made.
+pub(crate) fn changed_triangles(
+    hierarchy: &mut Hierarchy,
+    held: &DisplayMesh,
+) -> Option<Vec<ClosedTriangle>> {
+    let has_changed = held.indices.is_empty()
+        || held.own_vertex_count() != hierarchy.mesh.vertices.len()
+        || hierarchy.mesh.leaves().count() != leaf_count(held);
+    has_changed.then(|| hierarchy.mesh.closed_triangles())
+}
+
+/// What a snapshot is made of.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    /// What is lit.
+    pub scene: &'a Scene,
+    /// How materials look, by material.
+    pub appearances: &'a [Appearance],
+    /// The elements, with their direct light.
+    pub surfaces: Surfaces<'a>,
+    /// Light over links.
+    pub linked: &'a LinkedLight,
+    /// What leaves found over links.
+    pub leaves: &'a [LeafLight],
+    /// By what linked light at each vertex is multiplied; empty for 1.
+    pub factors: &'a [Vec4],
+    /// What the plan left out.
+    pub left_out: &'a Arc<Vec<LeftOut>>,
+    /// The step that is shown.
+    pub step: u32,
+}
+
+impl View<'_> {
+    /// The snapshot after a step: with a new mesh of these triangles (see [`changed_triangles`]), or where there are none,
+    /// with that of the snapshot before. `None` when cancelled.
+    pub(crate) fn show(
+        &self,
+        triangles: Option<Vec<ClosedTriangle>>,
+        before: &Snapshot,
+        cancel: &Cancel,
+    ) -> Option<Snapshot> {
+        let hierarchy = self.surfaces.hierarchy;
         // None of these needs the others.
-        let mut direct = self.direct.take();
-        let ((mesh, means), ()) = rayon::join(
+        let ((mesh, means), direct) = rayon::join(
             || {
                 rayon::join(
                     || match triangles {
                         Some(triangles) => self.display_mesh(triangles, cancel).map(Arc::new),
-                        None => Some(self.snapshot.mesh.clone()),
+                        None => Some(before.mesh.clone()),
                     },
-                    || VertexMeans::new(&self.hierarchy, &self.leaves, &self.gathered),
+                    || VertexMeans::new(hierarchy, self.leaves, self.factors),
                 )
             },
-            || {
-                if let Some(field) = &mut direct {
-                    field.smooth(&self.hierarchy);
-                }
-            },
+            || self.surfaces.direct.map(|field| field.shown(hierarchy)),
         );
-        self.direct = direct;
         let mesh = mesh?;
         cancel.proceed()?;
         let (light, clusters) = rayon::join(
-            || self.vertex_light(&means, &mesh),
+            || self.vertex_light(&means, direct.as_deref(), &mesh),
             || self.cluster_boxes(cancel),
         );
-        let clusters = clusters?;
-        self.snapshot = Snapshot {
+        Some(Snapshot {
             step: self.step,
             mesh,
             light: Arc::new(light),
-            clusters: Arc::new(clusters),
-            left_out: self.plan.left_out.clone(),
-        };
-        Some(())
-    }
-
-    /// Number of leaves in the mesh that is shown: display triangles of one element follow each other.
-    fn leaf_count_shown(&self) -> usize {
-        self.snapshot
-            .mesh
-            .element_of
-            .chunk_by(|a, b| a == b)
-            .count()
+            clusters: Arc::new(clusters?),
+            left_out: self.left_out.clone(),
+        })
     }
 
     /// The mesh that is shown, from elements with the triangles that close their edges.
-    fn display_mesh(
-        &self,
-        triangles: Vec<(u32, [u32; 3])>,
-        cancel: &Cancel,
-    ) -> Option<DisplayMesh> {
-        let mesh = &self.hierarchy.mesh;
+    fn display_mesh(&self, triangles: Vec<ClosedTriangle>, cancel: &Cancel) -> Option<DisplayMesh> {
+        let hierarchy = self.surfaces.hierarchy;
+        let mesh = &hierarchy.mesh;
         let count = mesh.vertices.len();
         let mut seams = (!self.scene.texcoords.is_empty()).then(Seams::default);
         let mut display = DisplayMesh {
@@ -89,7 +106,7 @@ impl Solver {
             ..DisplayMesh::default()
         };
         for (element, vertices) in triangles {
-            let patch = self.hierarchy.patch_of(element as usize);
+            let patch = hierarchy.patch_of(element as usize);
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
             let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
             for vertex in vertices.map(|vertex| vertex as usize) {
@@ -108,7 +125,7 @@ impl Solver {
             display.is_back.push(patch.is_back);
             display
                 .element_of
-                .push(self.hierarchy.clusters.len() as u32 + element);
+                .push(hierarchy.clusters.len() as u32 + element);
         }
         cancel.proceed()?;
         for normal in &mut display.normals {
@@ -119,36 +136,8 @@ impl Solver {
         for uv in display.texcoords.iter_mut().filter(|uv| uv.is_nan()) {
             *uv = Vec2::ZERO;
         }
-        self.color(&mut display);
+        color(hierarchy, self.appearances, &mut display);
         Some(display)
-    }
-
-    /// Give the vertices of a display mesh the colours of the elements about them.
-    pub(crate) fn color(&self, display: &mut DisplayMesh) {
-        let count = display.positions.len();
-        let base = self.hierarchy.clusters.len() as u32;
-        let mut sums = vec![(Vec3::ZERO, Vec3::ZERO, 0.0f32); count];
-        for (vertices, element) in display.indices.iter().zip(&display.element_of) {
-            let element = (element - base) as usize;
-            let shown = [
-                self.hierarchy.reflectance_of(element),
-                self.hierarchy.emission_of(element),
-            ];
-            let corners = vertices.map(|vertex| display.positions[vertex as usize]);
-            let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
-            for &vertex in vertices {
-                let (reflectance, emission, weights) = &mut sums[display.own_vertex(vertex)];
-                *reflectance += shown[0] * weight;
-                *emission += shown[1] * weight;
-                *weights += weight;
-            }
-        }
-        repeat(&mut sums, display.own_vertex_count(), &display.repeated);
-        let mean = |sum: Vec3, weight: f32| if weight > 0.0 { sum / weight } else { sum };
-        let means = sums.iter();
-        display.appearances = self.appearances().to_vec();
-        display.reflectance = means.clone().map(|&(sum, _, by)| mean(sum, by)).collect();
-        display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
     }
 
     /// Texture coordinates of a point on a triangle, by its barycentric coordinates there.
@@ -165,17 +154,24 @@ impl Solver {
 
     /// Largest radiosity by channel: no irradiance can be larger.
     fn brightest(&self) -> Vec4 {
-        let sampled = |leaf: usize| match self.is_sampled(leaf) {
-            true => (self.hierarchy.emission_of(leaf) * PI).extend(0.0),
+        let (surfaces, hierarchy) = (self.surfaces, self.surfaces.hierarchy);
+        let sampled = |leaf: usize| match surfaces.is_sampled(leaf) {
+            true => (hierarchy.emission_of(leaf) * PI).extend(0.0),
             false => Vec4::ZERO,
         };
-        let mesh = &self.hierarchy.mesh;
-        mesh.leaves()
-            .map(|leaf| self.radiosity(leaf) + sampled(leaf))
+        let leaves = hierarchy.mesh.leaves();
+        leaves
+            .map(|leaf| self.linked.radiosity(surfaces, leaf) + sampled(leaf))
             .fold(Vec4::ZERO, Vec4::max)
     }
 
-    fn vertex_light(&self, means: &VertexMeans, mesh: &DisplayMesh) -> VertexLight {
+    /// Light at the vertices: from links as means of the leaves about them, and straight from emitters.
+    fn vertex_light(
+        &self,
+        means: &VertexMeans,
+        direct: Option<&[(Vec4, f32)]>,
+        mesh: &DisplayMesh,
+    ) -> VertexLight {
         let count = means.irradiance.len();
         let mut light = VertexLight {
             irradiance: Vec::with_capacity(count),
@@ -184,11 +180,7 @@ impl Solver {
         };
         let brightest = self.brightest();
         for (vertex, (&linked, &error)) in means.irradiance.iter().zip(&means.error).enumerate() {
-            let (direct, noise) = self
-                .direct
-                .as_ref()
-                .map(|field| field.vertex(&self.hierarchy, vertex as u32))
-                .unwrap_or_default();
+            let (direct, noise) = direct.map_or((Vec4::ZERO, 0.0), |direct| direct[vertex]);
             light
                 .irradiance
                 .push(displayable((linked + direct).min(brightest)));
@@ -205,8 +197,9 @@ impl Solver {
     }
 
     fn cluster_boxes(&self, cancel: &Cancel) -> Option<Vec<ClusterBox>> {
-        let mut boxes: Vec<ClusterBox> = Vec::with_capacity(self.hierarchy.clusters.len());
-        for (index, cluster) in self.hierarchy.clusters.iter().enumerate() {
+        let clusters = &self.surfaces.hierarchy.clusters;
+        let mut boxes: Vec<ClusterBox> = Vec::with_capacity(clusters.len());
+        for (index, cluster) in clusters.iter().enumerate() {
             let level = match cluster.parent {
                 u32::MAX => 0,
                 parent => boxes[parent as usize].level + 1,
@@ -214,7 +207,7 @@ impl Solver {
             boxes.push(self.cluster_box(index, cluster, level));
         }
         cancel.proceed()?;
-        for link in self.links.all() {
+        for link in self.linked.links.all() {
             if let Some(source) = boxes.get_mut(link.source.index()) {
                 source.source_count += 1;
             }
@@ -225,12 +218,13 @@ impl Solver {
 
     /// Add what tables leave out, since no link carries it: the emission of sampled emitters.
     fn add_sampled_emission(&self, boxes: &mut [ClusterBox]) {
-        let Some(field) = &self.direct else { return };
+        let Surfaces { hierarchy, direct } = self.surfaces;
+        let Some(field) = direct else { return };
         for index in field.lights.sampled_patches() {
-            let patch = &self.hierarchy.patches[index];
+            let patch = &hierarchy.patches[index];
             let radiosity = luminance((patch.emission * PI).extend(0.0));
             let vector = patch.area_vector * radiosity;
-            for cluster in self.hierarchy.clusters_over(index) {
+            for cluster in hierarchy.clusters_over(index) {
                 let shown = &mut boxes[cluster];
                 shown.power += vector.length();
                 for axis in 0..3 {
@@ -242,8 +236,8 @@ impl Solver {
     }
 
     fn cluster_box(&self, index: usize, cluster: &Cluster, level: u32) -> ClusterBox {
-        let links = self.links.of(NodeId(index as u32));
-        let moments = &self.power.clusters[index];
+        let links = self.linked.links.of(NodeId(index as u32));
+        let moments = &self.linked.power.clusters[index];
         let vector = Vec3::from_array(moments.linear.map(|along| along.w));
         let total = moments.total().w;
         ClusterBox {
@@ -265,6 +259,39 @@ impl Solver {
             face_power: moments.six_faces().map(luminance),
         }
     }
+}
+
+/// Number of leaves in a mesh: display triangles of one element follow each other.
+fn leaf_count(mesh: &DisplayMesh) -> usize {
+    mesh.element_of.chunk_by(|a, b| a == b).count()
+}
+
+/// Give the vertices of a display mesh the colours of the elements about them.
+pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: &mut DisplayMesh) {
+    let count = display.positions.len();
+    let base = hierarchy.clusters.len() as u32;
+    let mut sums = vec![(Vec3::ZERO, Vec3::ZERO, 0.0f32); count];
+    for (vertices, element) in display.indices.iter().zip(&display.element_of) {
+        let element = (element - base) as usize;
+        let shown = [
+            hierarchy.reflectance_of(element),
+            hierarchy.emission_of(element),
+        ];
+        let corners = vertices.map(|vertex| display.positions[vertex as usize]);
+        let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
+        for &vertex in vertices {
+            let (reflectance, emission, weights) = &mut sums[display.own_vertex(vertex)];
+            *reflectance += shown[0] * weight;
+            *emission += shown[1] * weight;
+            *weights += weight;
+        }
+    }
+    repeat(&mut sums, display.own_vertex_count(), &display.repeated);
+    let mean = |sum: Vec3, weight: f32| if weight > 0.0 { sum / weight } else { sum };
+    let means = sums.iter();
+    display.appearances = appearances.to_vec();
+    display.reflectance = means.clone().map(|&(sum, _, by)| mean(sum, by)).collect();
+    display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
 }
 
 /// A colour that is safe to show: finite and not negative.

@@ -11,16 +11,38 @@ use glam::{Vec3, Vec4};
 use crate::{
     hierarchy::{Hierarchy, Kind, NodeId, Reading},
     solver::{
-        InspectedLink, Inspection, PathNode, Place, Solver, Subject,
-        vertices::{link_irradiance, own_irradiance},
+        ClusterBox, InspectedLink, Inspection, PathNode, Place, Subject,
+        coverage::Closures,
+        direct::Surfaces,
+        iteration::LinkedLight,
+        vertices::{LeafLight, link_irradiance, own_irradiance},
     },
     transport::{Kernel, Link, luminance},
 };
 
-impl Solver {
-    /// What the solve knows of a node, or `None` where there is no such node.
-    pub fn inspect(&self, subject: &Subject) -> Option<Inspection> {
-        let hierarchy = &self.hierarchy;
+/// What is looked into.
+#[derive(Clone, Copy)]
+pub(crate) struct Inspector<'a> {
+    /// The nodes, and the light that falls on them straight from emitters.
+    pub surfaces: Surfaces<'a>,
+    /// Light over links.
+    pub linked: &'a LinkedLight,
+    /// How tables are read.
+    pub reading: Option<Reading>,
+    /// What form factors are scaled to.
+    pub closures: &'a Closures,
+    /// What leaves found when they gathered last.
+    pub leaves: &'a [LeafLight],
+    /// Boxes of the clusters after the last whole step.
+    pub boxes: &'a [ClusterBox],
+    /// That step.
+    pub step: u32,
+}
+
+impl<'a> Inspector<'a> {
+    /// What is known of a node, or `None` where there is no such node.
+    pub(crate) fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        let hierarchy = self.hierarchy();
         let node = match *subject {
             Subject::Cluster(node) => (node.index() < hierarchy.clusters.len()).then_some(node)?,
             Subject::Element { node, point } => self.leaf_at(node, point)?,
@@ -32,7 +54,7 @@ impl Solver {
             Kind::Element(leaf) => {
                 let light: Vec3 = links.iter().map(|link| link.irradiance).sum();
                 (
-                    self.direct_of(leaf).truncate(),
+                    self.surfaces.direct(leaf).truncate(),
                     self.closure_scale(leaf, light.extend(row_sum)),
                 )
             }
@@ -57,17 +79,25 @@ impl Solver {
         })
     }
 
+    fn hierarchy(&self) -> &'a Hierarchy {
+        self.surfaces.hierarchy
+    }
+
+    fn kernel(&self) -> Kernel<'a> {
+        self.linked.kernel(self.hierarchy(), self.reading)
+    }
+
     /// The leaf below an element that holds a point of it.
     fn leaf_at(&self, node: NodeId, point: Vec3) -> Option<NodeId> {
-        let base = self.hierarchy.clusters.len();
+        let base = self.hierarchy().clusters.len();
         let element = node.index().checked_sub(base)?;
-        let leaf = self.hierarchy.mesh.leaf_at(element, point)?;
+        let leaf = self.hierarchy().mesh.leaf_at(element, point)?;
         Some(NodeId((base + leaf) as u32))
     }
 
     /// From the root to a node.
     fn path_to(&self, node: NodeId) -> Vec<NodeId> {
-        let hierarchy = &self.hierarchy;
+        let hierarchy = self.hierarchy();
         let as_nodes = |clusters: Vec<usize>| clusters.into_iter().map(|at| NodeId(at as u32));
         match hierarchy.kind(node) {
             Kind::Cluster(index) => {
@@ -105,15 +135,15 @@ impl Solver {
         let mut found = Vec::new();
         for &receiver in path {
             let place = self.place(receiver);
-            for link in self.links.of(receiver) {
-                let share = match self.hierarchy.kind(node) {
+            for link in self.linked.links.of(receiver) {
+                let share = match self.hierarchy().kind(node) {
                     Kind::Cluster(index) => mean_irradiance(kernel, index, receiver, link),
                     Kind::Element(leaf) => {
                         if link.source == receiver {
                             own_irradiance(kernel, receiver.index(), link)
                         } else {
-                            let point = self.hierarchy.mesh.elements[leaf].centroid;
-                            let normal = self.hierarchy.patch_of(leaf).normal;
+                            let point = self.hierarchy().mesh.elements[leaf].centroid;
+                            let normal = self.hierarchy().patch_of(leaf).normal;
                             link_irradiance(kernel, link, point, normal)
                         }
                     }
@@ -136,8 +166,8 @@ impl Solver {
         if self.leaves.is_empty() {
             return Vec3::ONE;
         }
-        let elements = &self.hierarchy.mesh.elements;
-        let cell_of = |element| self.closures.cell(&self.hierarchy, element);
+        let elements = &self.hierarchy().mesh.elements;
+        let cell_of = |element| self.closures.cell(self.hierarchy(), element);
         let cell = cell_of(leaf);
         let sums = self
             .leaves
@@ -148,40 +178,40 @@ impl Solver {
                 (areas + area, rows + area * other.centre.w)
             });
         let patch = elements[leaf].patch as usize;
-        let nearby = self.closures.nearby(&self.power, patch);
+        let nearby = self.closures.nearby(&self.linked.power, patch);
         let scaled = self.closures.of(cell).scaled(light, sums, nearby);
         let ratio = (scaled / light).truncate();
         Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }
 
     fn place(&self, node: NodeId) -> Place {
-        let (min, max) = self.hierarchy.bounds(node);
+        let (min, max) = self.hierarchy().bounds(node);
         Place {
             node,
             min,
             max,
-            centre: self.hierarchy.centroid(node),
+            centre: self.hierarchy().centroid(node),
         }
     }
 
     fn path_node(&self, node: NodeId, level: u32) -> PathNode {
-        let (patch_count, main_direction) = match self.hierarchy.kind(node) {
+        let (patch_count, main_direction) = match self.hierarchy().kind(node) {
             Kind::Cluster(index) => {
-                let cluster = &self.hierarchy.clusters[index];
-                let linear = self.power.clusters[index].linear.map(luminance);
+                let cluster = &self.hierarchy().clusters[index];
+                let linear = self.linked.power.clusters[index].linear.map(luminance);
                 (
                     Some(cluster.end - cluster.start),
                     Vec3::from_array(linear).try_normalize().unwrap_or(Vec3::Z),
                 )
             }
-            Kind::Element(index) => (None, self.hierarchy.patch_of(index).normal),
+            Kind::Element(index) => (None, self.hierarchy().patch_of(index).normal),
         };
-        let links = self.links.of(node);
+        let links = self.linked.links.of(node);
         PathNode {
             place: self.place(node),
             level,
             patch_count,
-            area: self.hierarchy.node_area(node),
+            area: self.hierarchy().node_area(node),
             power: self.power_of(node),
             main_direction,
             power_bounds: self.power_bounds(node, main_direction),
@@ -192,26 +222,26 @@ impl Solver {
 
     /// Luminance of the power that leaves a node, sampled emission included.
     fn power_of(&self, node: NodeId) -> f32 {
-        match self.hierarchy.kind(node) {
+        match self.hierarchy().kind(node) {
             // Boxes are renewed with each whole step.
-            Kind::Cluster(index) => self.snapshot.clusters[index].power,
+            Kind::Cluster(index) => self.boxes[index].power,
             Kind::Element(index) => {
-                let emission = if self.is_sampled(index) {
-                    self.hierarchy.emission_of(index) * PI
+                let emission = if self.surfaces.is_sampled(index) {
+                    self.hierarchy().emission_of(index) * PI
                 } else {
                     Vec3::ZERO
                 };
-                let radiosity = self.power.elements[index] + emission.extend(0.0);
-                luminance(radiosity) * self.hierarchy.node_area(node)
+                let radiosity = self.linked.power.elements[index] + emission.extend(0.0);
+                luminance(radiosity) * self.hierarchy().node_area(node)
             }
         }
     }
 
     /// Bounds of the linked power along a direction; those of an element are one.
     fn power_bounds(&self, node: NodeId, direction: Vec3) -> [f32; 2] {
-        match self.hierarchy.kind(node) {
+        match self.hierarchy().kind(node) {
             Kind::Cluster(index) => {
-                let (least, most) = self.power.clusters[index].bounds(direction);
+                let (least, most) = self.linked.power.clusters[index].bounds(direction);
                 [luminance(least), luminance(most)]
             }
             Kind::Element(_) => [luminance(self.kernel().projected_power(node, direction)); 2],
@@ -251,7 +281,7 @@ mod tests {
     use super::*;
     use crate::{
         scene::{SceneOptions, Sides, builtin},
-        solver::{Cancel, SolveSettings},
+        solver::{Cancel, SolveSettings, Solver},
     };
 
     fn solved(name: &str, settings: SolveSettings) -> Solver {
@@ -334,7 +364,8 @@ mod tests {
             let [least, most] = node.power_bounds;
             let value = luminance(
                 solver
-                    .kernel()
+                    .linked
+                    .kernel(&solver.hierarchy, Some(Reading::Bounded))
                     .projected_power(node.place.node, node.main_direction),
             );
             let slack = 1e-4 * most + 1e-9;
@@ -390,7 +421,7 @@ mod tests {
         let boxes = &solver.snapshot.clusters;
         let clusters = solver.hierarchy.clusters.len();
         let sent: u32 = boxes.iter().map(|shown| shown.source_count).sum();
-        let of_clusters = solver.links.all().iter();
+        let of_clusters = solver.linked.links.all().iter();
         let expected = of_clusters
             .filter(|link| link.source.index() < clusters)
             .count();
@@ -401,10 +432,10 @@ mod tests {
             .iter()
             .map(|patch| luminance((patch.emission * PI).extend(0.0)) * patch.area)
             .sum();
-        let reflected = luminance(solver.power.clusters[0].total());
+        let reflected = luminance(solver.linked.power.clusters[0].total());
         assert!((boxes[0].power - emitted - reflected).abs() <= 1e-3 * boxes[0].power);
         // The lamp looks down, and nothing emits upwards.
-        let linked = solver.power.clusters[0].six_faces().map(luminance);
+        let linked = solver.linked.power.clusters[0].six_faces().map(luminance);
         let added: Vec<f32> = boxes[0]
             .face_power
             .iter()

@@ -4,3 +4,7 @@ mod display;
 mod figures;
 mod inspect;
 mod seams;
+
+pub(crate) use display::{View, changed_triangles, color};
+pub(crate) use figures::fill;
+pub(crate) use inspect::Inspector;

@@ -13,13 +13,14 @@ use rayon::prelude::*;
 
 use super::{
     gathered::{Gathered, factors},
-    reconstruct::VertexMeans,
+    reconstruct::{LeafLight, VertexMeans},
 };
 use crate::{
-    geometry::{Random, barycentric, cosine_direction, low_discrepancy_2d},
+    geometry::{Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Element, Hierarchy},
     solver::{
-        Cancel, Solver,
+        Cancel,
+        direct::Surfaces,
         iteration::Anderson,
         limits::Limits,
         places::{OffsetPlaces, Receiver, carry_over, vertex_share_roots},
@@ -112,45 +113,76 @@ impl Look {
     }
 }
 
-impl Solver {
-    /// Find out by what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
-    pub(crate) fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
-        if self.rays.is_clear() {
-            return Some(());
-        }
-        if let Some(field) = &mut self.direct {
-            field.smooth(&self.hierarchy);
-        }
-        let linked = VertexMeans::new(&self.hierarchy, &self.leaves, &[]).irradiance;
-        let direct: Vec<Vec4> = (0..linked.len() as u32)
-            .into_par_iter()
-            .map(|vertex| self.direct_shown(vertex))
-            .collect();
+/// What a final gather needs.
+#[derive(Clone, Copy)]
+pub(crate) struct FinalGather<'a> {
+    /// What rays meet, with its direct light.
+    pub surfaces: Surfaces<'a>,
+    /// What leaves found over links.
+    pub leaves: &'a [LeafLight],
+    /// What blocks.
+    pub rays: &'a RayTree,
+    /// Which noise shows.
+    pub limits: Limits,
+    /// Change of irradiance (luminance) of a vertex below which rays are not asked again.
+    pub settled: f32,
+    /// Stops it.
+    pub cancel: &'a Cancel,
+}
+
+/// What a final gather finds.
+pub(crate) struct Gathering {
+    /// By vertex, what linked light is to be multiplied by.
+    pub factors: Vec<Vec4>,
+    /// Rays shot.
+    pub ray_count: u64,
+}
+
+/// Change of irradiance of a vertex that is too small to ask rays again, for a tolerance of sweeps and the mean irradiance.
+pub(crate) fn settled_change(tolerance: f32, mean_irradiance: f32) -> f32 {
+    SETTLED * tolerance * mean_irradiance
+}
+
+impl FinalGather<'_> {
+    /// Find by what linked light at vertices is to be multiplied; `None` when cancelled.
+    pub(crate) fn run(self) -> Option<Gathering> {
+        let hierarchy = self.surfaces.hierarchy;
+        // Light at vertices as links and shadow rays tell it.
+        let linked = VertexMeans::new(hierarchy, self.leaves, &[]).irradiance;
+        let direct: Vec<Vec4> = match self.surfaces.direct {
+            Some(field) => field
+                .shown(hierarchy)
+                .into_iter()
+                .map(|(light, _)| light)
+                .collect(),
+            None => vec![Vec4::ZERO; linked.len()],
+        };
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
+        // A few rays from each vertex.
         let mut looks = self.looks(&linked);
-        let limits = self.limits(threshold_scale);
         let looking = MOST_LOOKING / looks.len().max(1);
         let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
         let senders = self.senders();
-        self.shoot(&mut looks, |_| looking, cancel)?;
+        let mut ray_count = self.shoot(&mut looks, |_| looking)?;
         ask(&mut looks, &senders, &received);
         looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
-        let edges = edges(&self.hierarchy);
-        let is_corner = in_corners(&edges, self.hierarchy.mesh.vertices.len(), &looks, limits);
+        // Many where these differ from links.
+        let edges = edges(hierarchy);
+        let is_corner = in_corners(&edges, hierarchy.mesh.vertices.len(), &looks, self.limits);
         let mut most = looking;
         while most < GATHERING {
             most *= 2;
-            let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(limits) {
+            let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(self.limits) {
                 true => most,
                 false => look.found.rays,
             };
-            self.shoot(&mut looks, more, cancel)?;
+            ray_count += self.shoot(&mut looks, more)?;
             ask(&mut looks, &senders, &received);
         }
+        // What they mean for the light, until that agrees with itself.
         let light = [&linked, &direct].map(Vec::as_slice);
-        self.gathered =
-            self.settled_factors(&mut looks, &senders, &edges, light, threshold_scale, cancel)?;
-        Some(())
+        let factors = self.settled_factors(&mut looks, &senders, &edges, light)?;
+        Some(Gathering { factors, ray_count })
     }
 
     /// Correct linked and direct light at the vertices by what rays found, ask them again, and so on until nothing changes.
@@ -161,18 +193,15 @@ impl Solver {
         senders: &[Sender],
         edges: &[[usize; 2]],
         [linked, direct]: [&[Vec4]; 2],
-        threshold_scale: f32,
-        cancel: &Cancel,
     ) -> Option<Vec<Vec4>> {
-        let mesh = &self.hierarchy.mesh;
+        let mesh = &self.surfaces.hierarchy.mesh;
         let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        let most = SETTLED * threshold_scale * self.settings.tolerance * self.mean_irradiance;
         let areas = mesh.areas_about_vertices();
         let mut received: Vec<Vec4> = linked.iter().zip(direct).map(|(a, b)| a + b).collect();
         let mut acceleration = Anderson::new(DEPTH);
         let mut round = 0;
         loop {
-            cancel.proceed()?;
+            self.cancel.proceed()?;
             let mut ratios = vec![None; mesh.vertices.len()];
             for look in &*looks {
                 ratios[look.vertex] = Some(look.found.over(look.linked));
@@ -186,7 +215,7 @@ impl Solver {
                 .map(|(new, old)| luminance((new - old).abs()))
                 .fold(0.0, f32::max);
             round += 1;
-            if change <= most || round >= MOST_ROUNDS {
+            if change <= self.settled || round >= MOST_ROUNDS {
                 return Some(factors);
             }
             received = acceleration.next(&areas, &received, &corrected);
@@ -194,19 +223,14 @@ impl Solver {
         }
     }
 
-    /// Direct irradiance that is shown at a vertex.
-    fn direct_shown(&self, vertex: u32) -> Vec4 {
-        let field = self.direct.as_ref();
-        field.map_or(Vec4::ZERO, |field| field.vertex(&self.hierarchy, vertex).0)
-    }
-
     /// The vertices at which enough light is indirect, by linked irradiance.
     fn looks(&self, linked: &[Vec4]) -> Vec<Look> {
-        let mesh = &self.hierarchy.mesh;
-        let weights = vertex_share_roots(&self.hierarchy);
+        let Surfaces { hierarchy, direct } = self.surfaces;
+        let mesh = &hierarchy.mesh;
+        let weights = vertex_share_roots(hierarchy);
         let look = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
-            let direct = match &self.direct {
+            let direct = match direct {
                 Some(field) => field.corner(vertex),
                 None => Vec4::ZERO,
             };
@@ -224,40 +248,33 @@ impl Solver {
         let all = vec![true; mesh.vertices.len()];
         let elements = 0..mesh.elements.len();
         let none = OffsetPlaces::default();
-        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
-        let places = offsets.vertex_places(&self.hierarchy, elements, &all);
+        let offsets = direct.map_or(&none, |field| &field.offsets);
+        let places = offsets.vertex_places(hierarchy, elements, &all);
         places.into_iter().filter_map(look).collect()
     }
 
-    /// Shoot rays until each vertex has had as many as are wanted.
-    fn shoot(
-        &mut self,
-        looks: &mut [Look],
-        wanted: impl Fn(&Look) -> u32 + Sync,
-        cancel: &Cancel,
-    ) -> Option<()> {
-        let this = &*self;
+    /// Shoot rays until each vertex has had as many as are wanted. Returns the rays shot; `None` when cancelled.
+    fn shoot(&self, looks: &mut [Look], wanted: impl Fn(&Look) -> u32 + Sync) -> Option<u64> {
         let shot: Vec<u32> = looks
             .par_iter_mut()
             .with_min_len(16)
             .map(|look| {
-                if cancel.is_cancelled() {
+                if self.cancel.is_cancelled() {
                     return 0;
                 }
-                let mut random = Random::new(this.settings.seed, look.vertex as u64);
+                let mut random = Random::new(self.limits.seed, look.vertex as u64);
                 let shift = random.uniform_2d();
                 let (before, rays) = (look.met.len() as u32, wanted(look));
                 for index in before..rays {
                     let square = low_discrepancy_2d(index, shift);
                     let direction = cosine_direction(look.place.normal, square);
-                    look.met.push(this.meet(&look.place, direction));
+                    look.met.push(self.meet(&look.place, direction));
                 }
                 rays - before
             })
             .collect();
-        cancel.proceed()?;
-        self.ray_count += shot.into_iter().map(u64::from).sum::<u64>();
-        Some(())
+        self.cancel.proceed()?;
+        Some(shot.into_iter().map(u64::from).sum())
     }
 
     /// What a ray meets first.
@@ -268,7 +285,7 @@ impl Solver {
         let Some(hit) = hit else {
             return Met::Nothing;
         };
-        let hierarchy = &self.hierarchy;
+        let hierarchy = self.surfaces.hierarchy;
         let Some(patch) = hierarchy.side_met(hit.triangle, direction) else {
             return Met::Back;
         };
@@ -285,11 +302,12 @@ impl Solver {
 
     /// What each element sends over links if it is a leaf.
     fn senders(&self) -> Vec<Sender> {
-        let elements = &self.hierarchy.mesh.elements;
+        let hierarchy = self.surfaces.hierarchy;
+        let elements = &hierarchy.mesh.elements;
         let sender = |index: usize| Sender {
             vertices: elements[index].vertices,
-            reflectance: self.hierarchy.reflectance_of(index).extend(0.0),
-            emitted: self.radiosity_under(index, Vec4::ZERO).with_w(0.0),
+            reflectance: hierarchy.reflectance_of(index).extend(0.0),
+            emitted: self.surfaces.radiosity(index, Vec4::ZERO).with_w(0.0),
         };
         (0..elements.len())
             .into_par_iter()

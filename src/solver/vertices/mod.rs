@@ -4,5 +4,6 @@ mod final_gather;
 mod gathered;
 mod reconstruct;
 
+pub(crate) use final_gather::{FinalGather, settled_change};
 pub(crate) use reconstruct::{LeafLight, VertexMeans, link_irradiance, own_irradiance};
 pub(crate) use reconstruct::{bent_under, gather_leaves};

@@ -1,0 +1,98 @@
+//! The elements with the light that falls on them straight from emitters.
+
+use std::f32::consts::PI;
+
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::field::DirectField;
+use crate::{hierarchy::Hierarchy, solver::sums::ordered_sum};
+
+/// The elements with the light that falls on them straight from emitters: what stays as it is while light is exchanged over
+/// links.
+#[derive(Clone, Copy)]
+pub(crate) struct Surfaces<'a> {
+    /// The elements, with their reflectance and emission.
+    pub(crate) hierarchy: &'a Hierarchy,
+    /// `None` where no emitter is sampled.
+    pub(crate) direct: Option<&'a DirectField>,
+}
+
+impl<'a> Surfaces<'a> {
+    /// The elements of a hierarchy with a field of direct light, where there is one.
+    pub(crate) fn new(hierarchy: &'a Hierarchy, direct: &'a Option<DirectField>) -> Self {
+        Self {
+            hierarchy,
+            direct: direct.as_ref(),
+        }
+    }
+
+    /// Direct irradiance of a leaf, by samples.
+    pub(crate) fn direct(&self, element: usize) -> Vec4 {
+        self.direct
+            .map_or(Vec4::ZERO, |field| field.element(self.hierarchy, element))
+    }
+
+    /// The same of all leaves; 0 for other elements.
+    pub(crate) fn direct_of_leaves(&self) -> Vec<Vec4> {
+        let elements = self.hierarchy.mesh.elements.par_iter().enumerate();
+        elements
+            .map(|(index, element)| {
+                if element.is_leaf() {
+                    self.direct(index)
+                } else {
+                    Vec4::ZERO
+                }
+            })
+            .collect()
+    }
+
+    /// Whether the emission of an element is sampled, and so not sent over links.
+    pub(crate) fn is_sampled(&self, element: usize) -> bool {
+        let patch = self.hierarchy.mesh.elements[element].patch as usize;
+        self.direct
+            .is_some_and(|field| field.lights.is_sampled(patch))
+    }
+
+    /// Radiosity of a leaf under some irradiance, but for emission that is sampled, and in `w` 1: nothing where it lies
+    /// within a solid.
+    pub(crate) fn radiosity(&self, element: usize, irradiance: Vec4) -> Vec4 {
+        if self.hierarchy.mesh.elements[element].is_inside_solid() {
+            return Vec4::ZERO;
+        }
+        let reflected = self.hierarchy.reflectance_of(element) * irradiance.truncate();
+        let emitted = if self.is_sampled(element) {
+            Vec3::ZERO
+        } else {
+            self.hierarchy.emission_of(element) * PI
+        };
+        (reflected + emitted).extend(1.0)
+    }
+
+    /// Power of the emitters that no link carries, summed over the colours.
+    pub(crate) fn sampled_power(&self) -> f64 {
+        let Some(field) = self.direct else {
+            return 0.0;
+        };
+        let of_patch = |index: usize| {
+            let patch = &self.hierarchy.patches[index];
+            f64::from((patch.emission * PI).element_sum()) * f64::from(patch.area)
+        };
+        field.lights.sampled_patches().map(of_patch).sum()
+    }
+
+    /// No more power than this can be under way: what is emitted, if everything reflected as the brightest surface does.
+    pub(crate) fn most_power(&self) -> f64 {
+        let patches = &self.hierarchy.patches;
+        let brightest = self.hierarchy.largest_reflectance();
+        let emitted = ordered_sum(patches.len(), |index| {
+            patches[index].emission.as_dvec3() * f64::from(patches[index].area)
+        });
+        let absorbed = 1.0 - f64::from(brightest);
+        if absorbed > 0.0 {
+            f64::from(PI) * emitted.element_sum() / absorbed
+        } else {
+            f64::INFINITY
+        }
+    }
+}

@@ -1,0 +1,569 @@
+//! The state of a solve, and its steps.
+
+use std::sync::Arc;
+
+use glam::Vec4;
+
+use super::{
+    Cancel, Inspection, Snapshot, SolveSettings, StepReport, Subject,
+    budget::Budget,
+    coverage::{self, Closures},
+    direct::{self, DirectField, Lights, Surfaces},
+    iteration::{self, Iteration, LinkedLight},
+    limits::{Limits, shadow_samples},
+    places::{self, OffsetPlaces},
+    plan::Plan,
+    refine::Refining,
+    relighting::Relighting,
+    schedule::{is_coarse, threshold_scale},
+    shown::{self, Inspector, View},
+    textures::Painted,
+    vertices::{self, FinalGather, LeafLight},
+};
+use crate::{
+    geometry::RayTree,
+    hierarchy::{Hierarchy, SheetSides},
+    scene::{ActiveMaterials, Appearance, Scene},
+    transport::LinkStore,
+};
+
+/// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
+/// comes soon; the first step shoots the others.
+const FIRST_RAYS: usize = 1 << 20;
+
+/// A solve in progress.
+///
+/// Between two calls: `linked` and `direct` hold light for every element and every sampled vertex of `hierarchy`, source
+/// tables are those of that light, and `snapshot` shows the last whole step. A call that is cancelled leaves light that the
+/// next one brings up to date.
+pub struct Solver {
+    // What is solved, and how.
+    pub(super) scene: Arc<Scene>,
+    pub(super) settings: SolveSettings,
+    pub(super) plan: Plan,
+    memory_limit: Option<u64>,
+    /// Blocks nothing where the plan says so.
+    pub(super) rays: Arc<RayTree>,
+    // The mesh and its light.
+    pub(super) hierarchy: Hierarchy,
+    /// `None` where no emitter is sampled.
+    pub(super) direct: Option<DirectField>,
+    pub(super) linked: LinkedLight,
+    /// Part of the view of each piece of surface that lit surfaces fill.
+    pub(super) closures: Closures,
+    /// What leaves found over links when they gathered last.
+    pub(super) leaves: Vec<LeafLight>,
+    /// By what linked light at each vertex is multiplied; empty for 1.
+    vertex_factors: Vec<Vec4>,
+    /// Mean irradiance (luminance), to which the thresholds of the last step relate.
+    mean_irradiance: f32,
+    // How far the solve has come.
+    pub(super) step: u32,
+    pub(super) ray_count: u64,
+    /// Whether the memory limit kept the last step from being finer.
+    is_full: bool,
+    pub(super) relighting: Relighting,
+    pub(super) snapshot: Snapshot,
+}
+
+impl Solver {
+    /// Prepare a solve: plan, hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
+    /// Returns `None` when cancelled on the way.
+    pub fn new(
+        scene: Arc<Scene>,
+        settings: SolveSettings,
+        memory_limit: Option<u64>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
+        Self::with_rays(scene, None, settings, memory_limit, None, cancel)
+    }
+
+    /// As [`Self::new`], with the scene's ray tree where there is one already, and for materials that look so, where not as
+    /// the scene says. What one of both needs is not left out, so that what is switched off may be switched on.
+    pub fn with_rays(
+        scene: Arc<Scene>,
+        mut rays: Option<Arc<RayTree>>,
+        settings: SolveSettings,
+        memory_limit: Option<u64>,
+        wished: Option<&[Appearance]>,
+        cancel: &Cancel,
+    ) -> Option<Self> {
+        cancel.proceed()?;
+        let is_cancelled = || cancel.is_cancelled();
+        // What the scene does not need.
+        let active = wished.map_or_else(ActiveMaterials::default, |wished| {
+            scene.active_materials(&scene.allowed(wished))
+        });
+        let sheets = SheetSides::of(&scene, &mut rays);
+        cancel.proceed()?;
+        let (plan, tree) = Plan::make(&scene, sheets.as_ref(), &settings, active, &is_cancelled)?;
+        // Hierarchy and ray tree. Both take about as long, and neither keeps all processors busy.
+        let (hierarchy, rays) = rayon::join(
+            || Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &is_cancelled),
+            || match rays {
+                _ if plan.is_clear => Arc::new(RayTree::clear()),
+                Some(rays) => rays,
+                None => Arc::new(RayTree::new(&scene)),
+            },
+        );
+        let hierarchy = hierarchy?;
+        cancel.proceed()?;
+        let mut solver = Self {
+            direct: None,
+            linked: LinkedLight::default(),
+            closures: Closures::default(),
+            leaves: Vec::new(),
+            vertex_factors: Vec::new(),
+            mean_irradiance: 0.0,
+            step: 0,
+            ray_count: 0,
+            is_full: false,
+            relighting: Relighting::new(&scene),
+            snapshot: Snapshot::default(),
+            scene,
+            settings,
+            plan,
+            memory_limit,
+            rays,
+            hierarchy,
+        };
+        // Something to see before the first link.
+        solver.first_light(cancel)?;
+        solver.show(0, cancel)?;
+        if let Some(wished) = wished {
+            solver.relight(wished, cancel)?;
+        }
+        Some(solver)
+    }
+
+    /// The first mesh, with direct light by few rays.
+    fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
+        // Elements as textures and emitters need them.
+        self.linked.extend(&self.hierarchy);
+        let limits = self.limits(1.0);
+        let painted = Painted {
+            scene: &self.scene,
+            appearances: &self.relighting.appearances,
+        };
+        painted.divide(&mut self.hierarchy, limits.min_area, limits.most_elements);
+        self.linked.extend(&self.hierarchy);
+        let lights = Lights::new(&self.scene, &self.hierarchy, self.settings.direct);
+        self.direct = (!lights.is_empty()).then(|| DirectField::new(lights));
+        cancel.proceed()?;
+        // Elements that their corners tell of, and none that lies within a solid in part.
+        let limits = self.limits(1.0);
+        self.divide_coarse(limits);
+        let limits = self.limits(1.0);
+        let (scene, rays) = (&self.scene, &self.rays);
+        let (shot, fits) =
+            places::divide_contacts(scene, &mut self.hierarchy, rays, limits, cancel)?;
+        self.ray_count += shot;
+        self.is_full |= !fits;
+        // A few shadow rays from each vertex.
+        let most = (FIRST_RAYS / self.hierarchy.mesh.vertices.len().max(1)).max(1);
+        let count = shadow_samples(&self.settings, true).min(most as u32);
+        if let Some(field) = &mut self.direct {
+            self.ray_count += field.cover(rays, &self.hierarchy, count, limits.seed, cancel)?;
+        }
+        self.extend_to_new_elements();
+        self.pull();
+        Some(())
+    }
+
+    /// One progressive step: lower the threshold, refine, gather, push and pull.
+    /// Returns `None` when cancelled on the way; the light is then that of the last whole step.
+    pub fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        let step_count = self.settings.step_count();
+        let mut report = StepReport {
+            step: self.step + 1,
+            ..StepReport::default()
+        };
+        let threshold_scale = threshold_scale(report.step, step_count);
+        let is_coarse = is_coarse(threshold_scale);
+        self.is_full = false;
+        self.relighting.begin_step();
+        // Which part of its view lit surfaces fill, for each cell of the first mesh.
+        self.probe_closures(is_coarse, cancel)?;
+        // Divide elements where light bends between their corners: that of the last step, and direct light.
+        self.adapt_to_linked(threshold_scale);
+        self.adapt_to_direct(threshold_scale, cancel)?;
+        cancel.proceed()?;
+        // What everything sends now, and the mean that errors are relative to.
+        self.pull();
+        cancel.proceed()?;
+        self.mean_irradiance = self.linked.mean_irradiance(self.surfaces());
+        // Links whose errors are below the threshold.
+        report.epsilon = self.refine(threshold_scale, cancel)?;
+        self.probe_contacts(cancel)?;
+        // Factors by which what is sent adds up, as what is received does.
+        self.balance(cancel)?;
+        // Exchange light over the links until it settles. Coarse links err by more than light that has not quite settled.
+        self.iterate(
+            self.settings.tolerance * threshold_scale,
+            &mut report,
+            cancel,
+        )?;
+        // Light at the corners of each leaf, from its links.
+        self.gather_for_leaves(is_coarse, cancel)?;
+        cancel.proceed()?;
+        // In the last step, what rays from vertices find over what links tell.
+        let is_last = self.is_full || report.step >= step_count;
+        self.vertex_factors = match is_last {
+            true => self.final_gather(1.0, cancel)?,
+            false => Vec::new(),
+        };
+        // Figures and picture.
+        self.fill(&mut report);
+        self.show(report.step, cancel)?;
+        self.step = report.step;
+        report.is_final = report.is_full || self.step >= step_count;
+        self.relighting.end_step(&report);
+        Some(report)
+    }
+
+    /// Find the light at the vertices by the final gather, as the last step does, on the links that there are: where no further
+    /// step can end in time. The report is that of the last step once more. `None` when cancelled on the way; the light is then
+    /// that of the last step.
+    pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        let scale = threshold_scale(self.step, self.settings.step_count());
+        let found = self.final_gather(scale, cancel)?;
+        let before = std::mem::replace(&mut self.vertex_factors, found);
+        let mut report = self.relighting.last_report();
+        self.fill(&mut report);
+        if self.show(self.step, cancel).is_none() {
+            self.vertex_factors = before;
+            return None;
+        }
+        Some(report)
+    }
+
+    /// What the solve knows of a node, or `None` where there is no such node.
+    pub fn inspect(&self, subject: &Subject) -> Option<Inspection> {
+        let inspector = Inspector {
+            surfaces: self.surfaces(),
+            linked: &self.linked,
+            reading: self.settings.method.reading(),
+            closures: &self.closures,
+            leaves: &self.leaves,
+            boxes: &self.snapshot.clusters,
+            step: self.step,
+        };
+        inspector.inspect(subject)
+    }
+
+    /// The state as it stands. Cheap: parts are shared.
+    pub fn snapshot(&self) -> Snapshot {
+        self.snapshot.clone()
+    }
+
+    /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
+    /// threshold, the tolerances, the smallest area and the number of steps.
+    pub fn change_settings(&mut self, settings: SolveSettings) {
+        self.settings = settings;
+    }
+
+    /// The scene being lit.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// How materials look, by material: as the scene says, or as was last wished.
+    pub fn appearances(&self) -> &[Appearance] {
+        &self.relighting.appearances
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &SolveSettings {
+        &self.settings
+    }
+
+    /// The hierarchy, for tests and inspection.
+    pub fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
+    }
+
+    /// The links, for tests and inspection.
+    pub fn links(&self) -> &LinkStore {
+        &self.linked.links
+    }
+
+    fn surfaces(&self) -> Surfaces<'_> {
+        Surfaces::new(&self.hierarchy, &self.direct)
+    }
+
+    /// The memory limit, and what is held beside the mesh and its light.
+    fn budget(&self) -> Budget {
+        let others = self.rays.memory_bytes()
+            + self.closures.memory_bytes()
+            + size_of_val(self.leaves.as_slice())
+            + size_of_val(self.vertex_factors.as_slice())
+            + self.relighting.memory_bytes()
+            + self.snapshot.memory_bytes();
+        Budget {
+            limit: self.memory_limit,
+            others: others as u64,
+        }
+    }
+
+    fn limits(&self, threshold_scale: f32) -> Limits {
+        let most_elements = self.budget().most_elements(self.surfaces(), &self.linked);
+        Limits::new(
+            &self.settings,
+            &self.hierarchy,
+            threshold_scale,
+            most_elements,
+        )
+    }
+
+    fn pull(&mut self) {
+        let surfaces = Surfaces::new(&self.hierarchy, &self.direct);
+        self.linked.pull(surfaces);
+    }
+
+    /// New elements have colours of their own, and inherit the light of the one that was divided.
+    fn extend_to_new_elements(&mut self) {
+        self.hierarchy
+            .color_new_elements(&self.scene, &self.relighting.appearances);
+        self.linked.extend(&self.hierarchy);
+    }
+
+    /// Probe closures of the first mesh, unless those that are known are good enough.
+    pub(super) fn probe_closures(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
+        if self.closures.serve(is_coarse) {
+            return Some(());
+        }
+        if let Some(closures) = Closures::without_rays(&self.plan, &self.hierarchy) {
+            self.closures = closures;
+            return Some(());
+        }
+        let (scene, rays, seed) = (&self.scene, &self.rays, self.settings.seed);
+        let known = &self.closures;
+        let probed =
+            coverage::closures(scene, &self.hierarchy, rays, known, is_coarse, seed, cancel)?;
+        self.closures = probed.closures;
+        self.ray_count += probed.ray_count;
+        // What rays found to lie within solids.
+        let within = &probed.within;
+        self.ray_count += places::probe_within(scene, &mut self.hierarchy, rays, within, cancel)?;
+        Some(())
+    }
+
+    /// Where nothing else divides them, divide elements over which the light of the last step bends.
+    fn adapt_to_linked(&mut self, threshold_scale: f32) {
+        if !self.plan.follows_light {
+            return;
+        }
+        let (limits, mean) = (self.limits(threshold_scale), self.mean_irradiance);
+        let wanted = vertices::bent_under(&self.hierarchy, &self.leaves, limits, mean);
+        let fits = self.hierarchy.mesh.fits(&wanted, limits.most_elements);
+        self.is_full |= !fits;
+        if fits {
+            self.hierarchy.mesh.divide(&wanted);
+            self.extend_to_new_elements();
+        }
+    }
+
+    /// Make direct light known at all vertices, and divide elements where it bends.
+    fn adapt_to_direct(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
+        let limits = self.limits(threshold_scale);
+        self.is_full |= !self.divide_coarse(limits);
+        if let Some(field) = &mut self.direct {
+            let (shot, fits) = field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
+            self.ray_count += shot;
+            self.is_full |= !fits;
+        }
+        self.probe_contacts(cancel)?;
+        self.extend_to_new_elements();
+        Some(())
+    }
+
+    /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
+    fn divide_coarse(&mut self, limits: Limits) -> bool {
+        let lights = self.direct.as_ref().map(|field| &field.lights);
+        let is_clear = self.plan.follows_light;
+        direct::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
+    }
+
+    /// Find out which new elements lie within solids.
+    fn probe_contacts(&mut self, cancel: &Cancel) -> Option<()> {
+        let limits = self.limits(1.0);
+        let (scene, rays) = (&self.scene, &self.rays);
+        self.ray_count += places::probe_contacts(scene, &mut self.hierarchy, rays, limits, cancel)?;
+        Some(())
+    }
+
+    /// Bring the links to the threshold of a scale. Returns the threshold that they have.
+    fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
+        let refining = Refining {
+            settings: &self.settings,
+            plan: &self.plan,
+            limits: self.limits(threshold_scale),
+            rays: &self.rays,
+            painted: Painted {
+                scene: &self.scene,
+                appearances: &self.relighting.appearances,
+            },
+            leaves: &self.leaves,
+            mean_irradiance: self.mean_irradiance,
+            budget: self.budget(),
+            cancel,
+        };
+        let epsilon = self.settings.epsilon * threshold_scale;
+        let refined = refining.refine(
+            &mut self.hierarchy,
+            &mut self.direct,
+            &mut self.linked,
+            epsilon,
+        )?;
+        self.ray_count += refined.ray_count;
+        self.is_full |= refined.is_full;
+        Some(refined.epsilon)
+    }
+
+    fn balance(&mut self, cancel: &Cancel) -> Option<()> {
+        let surfaces = Surfaces::new(&self.hierarchy, &self.direct);
+        let (closures, settings) = (&self.closures, &self.settings);
+        iteration::balance(&mut self.linked, surfaces, closures, settings, cancel)
+    }
+
+    /// Exchange light until it settles to a tolerance, as that of the settings is.
+    pub(super) fn iterate(
+        &mut self,
+        tolerance: f32,
+        report: &mut StepReport,
+        cancel: &Cancel,
+    ) -> Option<()> {
+        let iteration = Iteration {
+            surfaces: Surfaces::new(&self.hierarchy, &self.direct),
+            closures: &self.closures,
+            settings: &self.settings,
+            tolerance,
+            cancel,
+        };
+        let convergence = iteration::iterate(&mut self.linked, iteration)?;
+        report.sweeps += convergence.sweeps;
+        report.residual = convergence.residual;
+        report.contraction = report.contraction.max(convergence.contraction);
+        report.notes.extend(convergence.notes);
+        Some(())
+    }
+
+    /// Let each leaf gather once more, for the vertices.
+    pub(super) fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
+        let reading = self.settings.method.reading();
+        let kernel = self.linked.kernel(&self.hierarchy, reading);
+        let none = OffsetPlaces::default();
+        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
+        let (links, closures) = (&self.linked.links, &self.closures);
+        self.leaves = vertices::gather_leaves(kernel, links, closures, offsets, is_coarse, cancel)?;
+        Some(())
+    }
+
+    /// By what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
+    fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<Vec<Vec4>> {
+        if self.rays.is_clear() {
+            return Some(Vec::new());
+        }
+        let tolerance = threshold_scale * self.settings.tolerance;
+        let gather = FinalGather {
+            surfaces: self.surfaces(),
+            leaves: &self.leaves,
+            rays: &self.rays,
+            limits: self.limits(threshold_scale),
+            settled: vertices::settled_change(tolerance, self.mean_irradiance),
+            cancel,
+        };
+        let found = gather.run()?;
+        self.ray_count += found.ray_count;
+        Some(found.factors)
+    }
+
+    /// Fill in what can be read off the state after a step.
+    pub(super) fn fill(&self, report: &mut StepReport) {
+        let (surfaces, budget) = (self.surfaces(), self.budget());
+        shown::fill(report, surfaces, &self.linked, &self.leaves);
+        report.shadow_rays = self.ray_count;
+        report.memory_bytes = budget.held_bytes(surfaces, &self.linked);
+        if self.is_full || budget.is_exceeded(surfaces, &self.linked) {
+            report.is_full = true;
+            report.notes.push(
+                "the memory limit is reached; refinement stops here with what fits".to_owned(),
+            );
+        }
+    }
+
+    /// Renew the snapshot after a step. When cancelled it stays as it was.
+    pub(super) fn show(&mut self, step: u32, cancel: &Cancel) -> Option<()> {
+        cancel.proceed()?;
+        let triangles = shown::changed_triangles(&mut self.hierarchy, &self.snapshot.mesh);
+        cancel.proceed()?;
+        let view = View {
+            scene: &self.scene,
+            appearances: &self.relighting.appearances,
+            surfaces: self.surfaces(),
+            linked: &self.linked,
+            leaves: &self.leaves,
+            factors: &self.vertex_factors,
+            left_out: &self.plan.left_out,
+            step,
+        };
+        self.snapshot = view.show(triangles, &self.snapshot, cancel)?;
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        hierarchy::NodeId,
+        scene::{
+            SceneOptions,
+            builtin::{empty_cornell, find_builtin},
+        },
+    };
+
+    /// Receivers and sources of all links, in order.
+    fn pairs(solver: &Solver) -> Vec<(u32, u32)> {
+        let receivers = 0..solver.hierarchy.node_count() as u32;
+        let of = |receiver: u32| {
+            let links = solver.linked.links.of(NodeId(receiver)).iter();
+            links.map(move |link| (receiver, link.source.0))
+        };
+        let mut pairs: Vec<(u32, u32)> = receivers.flat_map(of).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    #[test]
+    fn links_that_later_passes_leave_as_they_are_would_be_kept_if_they_were_judged_anew() {
+        let cornell = find_builtin("cornell").unwrap().builder();
+        for builder in [empty_cornell(), cornell] {
+            let scene = Arc::new(builder.finish(&SceneOptions::default()).unwrap());
+            let cancel = Cancel::default();
+            let mut solver = Solver::new(scene, SolveSettings::draft(), None, &cancel).unwrap();
+            solver.step(&cancel).unwrap();
+            solver.step(&cancel).unwrap();
+            // The links of another step, and what judging all of them anew by the same threshold makes of them.
+            let surfaces = Surfaces::new(&solver.hierarchy, &solver.direct);
+            solver.mean_irradiance = solver.linked.mean_irradiance(surfaces);
+            let elements = solver.hierarchy.mesh.elements.len();
+            solver.refine(1.0, &cancel);
+            assert!(
+                solver.hierarchy.mesh.elements.len() > elements,
+                "there was a second pass"
+            );
+            let found = pairs(&solver);
+            solver.refine(1.0, &cancel);
+            let anew = pairs(&solver);
+            let is_other = |pair: &&(u32, u32)| found.binary_search(pair).is_err();
+            let changed = anew.iter().filter(is_other).count();
+            assert!(
+                changed * 100 < found.len(),
+                "{}: {changed} of {}",
+                solver.scene.name,
+                found.len()
+            );
+        }
+    }
+}
