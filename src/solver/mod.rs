@@ -14,6 +14,7 @@ mod omission;
 mod output;
 mod places;
 mod plan;
+mod queries;
 mod refine;
 mod relight;
 mod relighting;

@@ -232,3 +232,62 @@ fn range(corners: [f32; 3]) -> f32 {
     let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
     most - least
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        hierarchy::NodeId,
+        scene::{
+            SceneOptions,
+            builtin::{empty_cornell, find_builtin},
+        },
+        solver::Solver,
+    };
+
+    /// Receivers and sources of all links, in order.
+    fn pairs(solver: &Solver) -> Vec<(u32, u32)> {
+        let receivers = 0..solver.hierarchy.node_count() as u32;
+        let of = |receiver: u32| {
+            let links = solver.linked.links.of(NodeId(receiver)).iter();
+            links.map(move |link| (receiver, link.source.0))
+        };
+        let mut pairs: Vec<(u32, u32)> = receivers.flat_map(of).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    #[test]
+    fn links_that_later_passes_leave_as_they_are_would_be_kept_if_they_were_judged_anew() {
+        let cornell = find_builtin("cornell").unwrap().builder();
+        for builder in [empty_cornell(), cornell] {
+            let scene = Arc::new(builder.finish(&SceneOptions::default()).unwrap());
+            let cancel = Cancel::default();
+            let mut solver = Solver::new(scene, SolveSettings::draft(), None, &cancel).unwrap();
+            solver.step(&cancel).unwrap();
+            solver.step(&cancel).unwrap();
+            // The links of another step, and what judging all of them anew by the same threshold makes of them.
+            let surfaces = Surfaces::new(&solver.hierarchy, &solver.direct);
+            solver.mean_irradiance = solver.linked.mean_irradiance(surfaces);
+            let elements = solver.hierarchy.mesh.elements.len();
+            solver.refine(1.0, &cancel);
+            assert!(
+                solver.hierarchy.mesh.elements.len() > elements,
+                "there was a second pass"
+            );
+            let found = pairs(&solver);
+            solver.refine(1.0, &cancel);
+            let anew = pairs(&solver);
+            let is_other = |pair: &&(u32, u32)| found.binary_search(pair).is_err();
+            let changed = anew.iter().filter(is_other).count();
+            assert!(
+                changed * 100 < found.len(),
+                "{}: {changed} of {}",
+                solver.scene.name,
+                found.len()
+            );
+        }
+    }
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Inspection, Snapshot, SolveSettings, StepReport, Subject,
+    Cancel, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, Closures},
     direct::{self, DirectField, Lights, Surfaces},
@@ -16,7 +16,7 @@ use super::{
     refine::Refining,
     relighting::Relighting,
     schedule::{is_coarse, threshold_scale},
-    shown::{self, Inspector, View},
+    shown::{self, View},
     textures::Painted,
     vertices::{self, FinalGather, LeafLight},
 };
@@ -24,7 +24,6 @@ use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, SheetSides},
     scene::{ActiveMaterials, Appearance, Scene},
-    transport::LinkStore,
 };
 
 /// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
@@ -56,7 +55,7 @@ pub struct Solver {
     /// By what linked light at each vertex is multiplied; empty for 1.
     vertex_factors: Vec<Vec4>,
     /// Mean irradiance (luminance), to which the thresholds of the last step relate.
-    mean_irradiance: f32,
+    pub(super) mean_irradiance: f32,
     // How far the solve has come.
     pub(super) step: u32,
     pub(super) ray_count: u64,
@@ -237,57 +236,13 @@ impl Solver {
         Some(report)
     }
 
-    /// What the solve knows of a node, or `None` where there is no such node.
-    pub fn inspect(&self, subject: &Subject) -> Option<Inspection> {
-        let inspector = Inspector {
-            surfaces: self.surfaces(),
-            linked: &self.linked,
-            reading: self.settings.method.reading(),
-            closures: &self.closures,
-            leaves: &self.leaves,
-            boxes: &self.snapshot.clusters,
-            step: self.step,
-        };
-        inspector.inspect(subject)
-    }
-
-    /// The state as it stands. Cheap: parts are shared.
-    pub fn snapshot(&self) -> Snapshot {
-        self.snapshot.clone()
-    }
-
     /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
     /// threshold, the tolerances, the smallest area and the number of steps.
     pub fn change_settings(&mut self, settings: SolveSettings) {
         self.settings = settings;
     }
 
-    /// The scene being lit.
-    pub fn scene(&self) -> &Arc<Scene> {
-        &self.scene
-    }
-
-    /// How materials look, by material: as the scene says, or as was last wished.
-    pub fn appearances(&self) -> &[Appearance] {
-        &self.relighting.appearances
-    }
-
-    /// The settings in force.
-    pub fn settings(&self) -> &SolveSettings {
-        &self.settings
-    }
-
-    /// The hierarchy, for tests and inspection.
-    pub fn hierarchy(&self) -> &Hierarchy {
-        &self.hierarchy
-    }
-
-    /// The links, for tests and inspection.
-    pub fn links(&self) -> &LinkStore {
-        &self.linked.links
-    }
-
-    fn surfaces(&self) -> Surfaces<'_> {
+    pub(super) fn surfaces(&self) -> Surfaces<'_> {
         Surfaces::new(&self.hierarchy, &self.direct)
     }
 
@@ -393,7 +348,7 @@ impl Solver {
     }
 
     /// Bring the links to the threshold of a scale. Returns the threshold that they have.
-    fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
+    pub(super) fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
         let refining = Refining {
             settings: &self.settings,
             plan: &self.plan,
@@ -509,61 +464,5 @@ impl Solver {
         };
         self.snapshot = view.show(triangles, &self.snapshot, cancel)?;
         Some(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        hierarchy::NodeId,
-        scene::{
-            SceneOptions,
-            builtin::{empty_cornell, find_builtin},
-        },
-    };
-
-    /// Receivers and sources of all links, in order.
-    fn pairs(solver: &Solver) -> Vec<(u32, u32)> {
-        let receivers = 0..solver.hierarchy.node_count() as u32;
-        let of = |receiver: u32| {
-            let links = solver.linked.links.of(NodeId(receiver)).iter();
-            links.map(move |link| (receiver, link.source.0))
-        };
-        let mut pairs: Vec<(u32, u32)> = receivers.flat_map(of).collect();
-        pairs.sort_unstable();
-        pairs
-    }
-
-    #[test]
-    fn links_that_later_passes_leave_as_they_are_would_be_kept_if_they_were_judged_anew() {
-        let cornell = find_builtin("cornell").unwrap().builder();
-        for builder in [empty_cornell(), cornell] {
-            let scene = Arc::new(builder.finish(&SceneOptions::default()).unwrap());
-            let cancel = Cancel::default();
-            let mut solver = Solver::new(scene, SolveSettings::draft(), None, &cancel).unwrap();
-            solver.step(&cancel).unwrap();
-            solver.step(&cancel).unwrap();
-            // The links of another step, and what judging all of them anew by the same threshold makes of them.
-            let surfaces = Surfaces::new(&solver.hierarchy, &solver.direct);
-            solver.mean_irradiance = solver.linked.mean_irradiance(surfaces);
-            let elements = solver.hierarchy.mesh.elements.len();
-            solver.refine(1.0, &cancel);
-            assert!(
-                solver.hierarchy.mesh.elements.len() > elements,
-                "there was a second pass"
-            );
-            let found = pairs(&solver);
-            solver.refine(1.0, &cancel);
-            let anew = pairs(&solver);
-            let is_other = |pair: &&(u32, u32)| found.binary_search(pair).is_err();
-            let changed = anew.iter().filter(is_other).count();
-            assert!(
-                changed * 100 < found.len(),
-                "{}: {changed} of {}",
-                solver.scene.name,
-                found.len()
-            );
-        }
     }
 }

@@ -8,19 +8,15 @@
 use glam::{Vec3, Vec4};
 
 use super::{
-    Link, PairSampler, element_form_factor, element_form_factors,
+    Link, element_form_factor, element_form_factors,
     kernel::inner_points,
     luminance,
-    refine::{Decision, Refinement, Refiner},
+    refiner::{Decision, Refinement, Refiner},
 };
 use crate::{
-    geometry::{Random, Vectors4, point_irradiances},
+    geometry::Vectors4,
     hierarchy::{ElementId, Hierarchy, Kind, NodeId},
 };
-
-/// Points of a receiver at which form factors of clusters are summed. One would miss how uneven they are near an edge; many
-/// cost time for links that later steps divide.
-const POINTS: usize = 4;
 
 /// Beyond this many radii of both, form factors are those of the centroids: they vary by less than half.
 const NEAR: f32 = 2.0;
@@ -168,30 +164,5 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
         let brightest = luminance(tables.brightest_in_elements[element]);
         (brightest - luminance(tables.elements[element])).max(0.0)
-    }
-}
-
-impl PairSampler<'_> {
-    /// Mean form factor from a receiver to a source where nothing blocks: the exact form factors of all patches of the
-    /// source from a few points.
-    pub(super) fn form_factor_in_clear(
-        &self,
-        source: NodeId,
-        receiver: NodeId,
-        random: &mut Random,
-    ) -> f32 {
-        let hierarchy = self.hierarchy;
-        let elements = match hierarchy.kind(source) {
-            Kind::Cluster(index) => hierarchy.clusters[index].patches(),
-            Kind::Element(index) => index..index + 1,
-        };
-        let samples = [(); POINTS].map(|()| self.point_on(receiver, random));
-        let (points, normals) = (
-            Vectors4::new(samples.map(|(point, _)| point)),
-            Vectors4::new(samples.map(|(_, normal)| normal)),
-        );
-        let seen = elements
-            .map(|element| point_irradiances(&points, &normals, hierarchy.mesh.corners(element)));
-        seen.sum::<Vec4>().min(Vec4::ONE).element_sum() / POINTS as f32
     }
 }

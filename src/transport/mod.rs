@@ -1,10 +1,13 @@
 //! Node pairs: what a source sends to a point, who sees whom, which pairs are good enough, and the links that stay.
 
 mod clear;
+mod decide;
 mod kernel;
 mod link;
 mod oracle;
+mod patch_sums;
 mod refine;
+mod refiner;
 mod sights;
 mod visibility;
 
@@ -12,8 +15,9 @@ pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_fact
 pub use link::{Link, LinkStore};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};
-pub use refine::{LinkBudget, Refinement, Refiner};
+pub use patch_sums::PatchSums;
+pub use refiner::{LinkBudget, Refinement, Refiner};
 pub use sights::Sights;
-pub use visibility::{PairSampler, PatchSums};
+pub use visibility::PairSampler;
 
 pub use crate::hierarchy::luminance;

@@ -7,11 +7,14 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
-use super::luminance;
+use super::{luminance, patch_sums::PatchSums};
 use crate::{
-    geometry::{Random, RayTree, barycentric_in_plane, cosine_direction, triangle_point},
+    geometry::{
+        Random, RayTree, Vectors4, barycentric_in_plane, cosine_direction, point_irradiances,
+        triangle_point,
+    },
     hierarchy::{Hierarchy, Kind, NodeId, Tables},
     scene::TriangleId,
 };
@@ -23,6 +26,10 @@ const CANDIDATES: u32 = 6;
 /// Share of the source's points that are chosen by power; the others by area. Few bright patches carry much of the light
 /// of many clusters, and what is bright is often what stands free: chosen by area, the light would seem blocked.
 const POWER_SHARE: f32 = 0.5;
+
+/// Points of a receiver at which form factors of clusters are summed. One would miss how uneven they are near an edge; many
+/// cost time for links that later steps divide.
+const POINTS: usize = 4;
 
 /// A point on a patch of a node.
 #[derive(Clone, Copy, Debug)]
@@ -75,52 +82,6 @@ struct Source {
     has_power: bool,
     /// Mean radiosity (luminance).
     mean: f32,
-}
-
-/// Running sums over the patches in tree order, to choose patches of a cluster in proportion to what is summed.
-/// One more than there are patches.
-#[derive(Clone, Debug)]
-pub struct PatchSums(Vec<f64>);
-
-impl PatchSums {
-    /// Of the areas of the patches, frame units, as far as they send anything.
-    pub fn of_area(hierarchy: &Hierarchy, tables: &Tables) -> Self {
-        Self::of(hierarchy, |patch, area| tables.elements[patch].w * area)
-    }
-
-    /// Of what the patches send (luminance of radiosity, times area).
-    pub fn of_power(hierarchy: &Hierarchy, tables: &Tables) -> Self {
-        Self::of(hierarchy, |patch, area| {
-            luminance(tables.elements[patch]).max(0.0) * area
-        })
-    }
-
-    fn of(hierarchy: &Hierarchy, value: impl Fn(usize, f32) -> f32) -> Self {
-        let mut sum = 0.0;
-        let values = hierarchy.patches.iter().enumerate().map(|(index, patch)| {
-            sum += f64::from(value(index, patch.area));
-            sum
-        });
-        Self(std::iter::once(0.0).chain(values).collect())
-    }
-
-    /// The sum over some patches.
-    fn total(&self, patches: &Range<usize>) -> f64 {
-        self.0[patches.end] - self.0[patches.start]
-    }
-
-    /// One of some patches; `at` is 0…1.
-    fn choose(&self, patches: &Range<usize>, at: f32) -> usize {
-        let sums = &self.0[patches.start..=patches.end];
-        let target = sums[0] + f64::from(at) * self.total(patches);
-        let above = sums.partition_point(|&sum| sum <= target);
-        patches.start + above.clamp(1, patches.len()) - 1
-    }
-
-    /// Bytes held.
-    pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
-    }
 }
 
 /// A point of a source that may be chosen.
@@ -392,6 +353,24 @@ impl PairSampler<'_> {
             }));
         }
         met as f32 / ray_count.max(1) as f32
+    }
+
+    /// Mean form factor from a receiver to a source where nothing blocks: the exact form factors of all patches of the
+    /// source from a few points.
+    fn form_factor_in_clear(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> f32 {
+        let hierarchy = self.hierarchy;
+        let elements = match hierarchy.kind(source) {
+            Kind::Cluster(index) => hierarchy.clusters[index].patches(),
+            Kind::Element(index) => index..index + 1,
+        };
+        let samples = [(); POINTS].map(|()| self.point_on(receiver, random));
+        let (points, normals) = (
+            Vectors4::new(samples.map(|(point, _)| point)),
+            Vectors4::new(samples.map(|(_, normal)| normal)),
+        );
+        let seen = elements
+            .map(|element| point_irradiances(&points, &normals, hierarchy.mesh.corners(element)));
+        seen.sum::<Vec4>().min(Vec4::ONE).element_sum() / POINTS as f32
     }
 
     /// Whether a point of a patch belongs to a node.

@@ -29,7 +29,74 @@ const ROOMS: [&str; 11] = [
 ];
 
 /// Modules whose children stand in an order: each imports only children that are named before it.
-const ORDERED_CHILDREN: [(&str, &[&str]); 1] = [("solver", &[])];
+const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
+    (
+        "transport",
+        &[
+            "kernel",
+            "sights",
+            "link",
+            "patch_sums",
+            "visibility",
+            "oracle",
+            "refiner",
+            "clear",
+            "decide",
+            "refine",
+        ],
+    ),
+    (
+        "solver",
+        &[
+            "cancel",
+            "sums",
+            "schedule",
+            "omission",
+            "settings",
+            "limits",
+            "textures",
+            "output",
+            "plan",
+            "places",
+            "coverage",
+            "direct",
+            "iteration",
+            "vertices",
+            "budget",
+            "refine",
+            "relighting",
+            "shown",
+            "state",
+            "queries",
+            "relight",
+        ],
+    ),
+    (
+        "solver::direct",
+        &[
+            "emitter",
+            "panel",
+            "multipole",
+            "light_tree",
+            "samples",
+            "lights",
+            "smooth",
+            "field",
+            "surfaces",
+            "noise",
+            "cover",
+            "border",
+            "bend",
+            "before_walls",
+            "adapt",
+            "light_parts",
+        ],
+    ),
+    (
+        "solver::iteration",
+        &["anderson", "light", "gather", "balance", "iterate"],
+    ),
+];
 
 /// Words that only some rooms may say.
 const CONFINED: [(&str, &[&str]); 7] = [
@@ -186,14 +253,16 @@ fn module_of(path: &Path) -> ModulePath {
     module
 }
 
-/// All files of the program, by their path below `src`.
+/// All files of the program but tests that have a file of their own, by their path below `src`.
 fn sources() -> BTreeMap<PathBuf, String> {
     fn collect(root: &Path, folder: &Path, found: &mut BTreeMap<PathBuf, String>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 collect(root, &path, found);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
+            } else if path.extension().is_some_and(|extension| extension == "rs")
+                && !path.ends_with("tests.rs")
+            {
                 let source = fs::read_to_string(&path).unwrap();
                 found.insert(path.strip_prefix(root).unwrap().to_owned(), source);
             }

@@ -1,0 +1,246 @@
+//! What becomes of a pair: it is dropped, kept as a link, or replaced by pairs with the children of one of its nodes.
+
+use glam::Vec3;
+
+use super::{
+    Judgement, Link, element_form_factor, element_form_factors,
+    kernel::inner_points,
+    refiner::{Decision, Refinement, Refiner},
+};
+use crate::{
+    geometry::Vectors4,
+    hierarchy::{Hierarchy, Kind, NodeId},
+};
+
+/// Rays of one link at least.
+const LEAST_RAYS: u32 = 2;
+
+/// Rays of one link at most.
+const MOST_RAYS: u32 = 8;
+
+/// Rays that find which part of a cluster's light falls on the cluster itself. These links are few and carry much.
+const SELF_RAYS: u32 = 16;
+
+/// Share of its brightest patch's light by which the exchange of a cluster within itself may be wrong. Larger, and links
+/// within convex objects are sought in vain; smaller, and bright corners are blurred.
+const SELF_SHARE: f32 = 0.2;
+
+/// Largest factor by which rays may raise what tables say of near nodes. Larger, and a few lucky rays make a firefly;
+/// smaller, and light is lost where tables see a source edge-on.
+const MOST_CORRECTION: f32 = 64.0;
+
+/// Rays of a link between near nodes, at least and at most.
+const NEAR_RAYS: std::ops::RangeInclusive<u32> = 4..=16;
+
+/// Share of a partly visible transfer that counts as error: shadows vary over the receiver, and neither node's
+/// table knows how.
+const PARTIAL_VISIBILITY: f32 = 0.5;
+
+/// Part of a transfer that may get through although no sampled ray did: a few rays prove little. Smaller, and pairs that
+/// were once found blocked stay so; larger, and refinement goes on behind walls.
+const DOUBT: f32 = 0.1;
+
+/// Of two nodes whose radii differ by less, the source is divided: rounding must not choose among equals.
+const TIE: f32 = 0.999;
+
+/// Normals agree when their vector sum is shorter than their total area by less than this.
+const SAME_DIRECTION: f32 = 1e-6;
+
+impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
+    /// What becomes of a pair; `known` is its link if it has one.
+    pub(super) fn decide(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        known: Option<&Link>,
+        out: &mut Refinement,
+    ) -> Decision {
+        let weight = self.weight(receiver);
+        if let Some(decision) = self.decide_by_plan(source, receiver, known, weight, out) {
+            return decision;
+        }
+        if source == receiver {
+            return self.decide_self(source, weight, known, out);
+        }
+        let mut random = self.random(source, receiver);
+        let (irradiance, error, bound) = match self.judge.judge(source, receiver, &mut random) {
+            Judgement::Nothing => return Decision::Drop,
+            Judgement::Transfer {
+                irradiance,
+                error,
+                bound,
+            } => (irradiance, error, bound),
+        };
+        let fits = |error: f32| error * weight <= self.threshold;
+        let divide = self.division(source, receiver);
+        if let (false, Some(decision)) = (fits(error), divide) {
+            return decision;
+        }
+        let link = match known {
+            Some(link) => *link,
+            None => {
+                let ray_count = self.ray_count(irradiance * weight, MOST_RAYS);
+                self.link(source, receiver, error, ray_count, out)
+            }
+        };
+        if self.judge.is_too_near_for_tables(source, receiver) {
+            // What few rays have seen must not decide: of pairs that see little, only those found blind would stay.
+            return Decision::Keep(Link {
+                error: bound,
+                ..link
+            });
+        }
+        let partial = 2.0 * (link.visibility * (1.0 - link.visibility)).max(0.0).sqrt();
+        let error = error * link.visibility.max(DOUBT) + PARTIAL_VISIBILITY * irradiance * partial;
+        if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
+            return decision;
+        }
+        // What gets through is known from a few rays: the bound of the transfer, and twice the deviation of a share that so
+        // many rays found.
+        let share =
+            (link.visibility.min(1.0) * LEAST_RAYS as f32 + 1.0) / (LEAST_RAYS as f32 + 2.0);
+        let deviation = (share * (1.0 - share) / LEAST_RAYS as f32).sqrt();
+        Decision::Keep(Link {
+            error: bound + 2.0 * deviation * irradiance,
+            ..link
+        })
+    }
+
+    fn decide_self(
+        &self,
+        cluster: NodeId,
+        weight: f32,
+        known: Option<&Link>,
+        out: &mut Refinement,
+    ) -> Decision {
+        let judged = self.judge.judged_brightest(cluster);
+        if judged <= 0.0 || self.faces_one_way(cluster) {
+            return Decision::Drop;
+        }
+        // What few rays have seen must not decide: of clusters that see little of themselves, only those found blind would
+        // stay.
+        if judged * SELF_SHARE * weight > self.threshold {
+            return Decision::DivideReceiver;
+        }
+        let fraction = match known {
+            Some(link) => link.visibility,
+            None => {
+                out.ray_count += u64::from(SELF_RAYS);
+                self.judge.sampler.seen_fraction(
+                    cluster,
+                    cluster,
+                    SELF_RAYS,
+                    &mut self.random(cluster, cluster),
+                )
+            }
+        };
+        Decision::Keep(Link {
+            source: cluster,
+            visibility: fraction,
+            error: self.judge.brightest(cluster),
+            form_factor: fraction,
+        })
+    }
+
+    /// Whether all faces of a cluster look the same way: then none sees another.
+    fn faces_one_way(&self, cluster: NodeId) -> bool {
+        let Kind::Cluster(index) = self.hierarchy().kind(cluster) else {
+            return true;
+        };
+        let moments = &self.judge.kernel.tables.clusters[index];
+        let vector = Vec3::from_array(moments.linear.map(|along| along.w));
+        vector.length() >= (1.0 - SAME_DIRECTION) * moments.total().w
+    }
+
+    /// Rays for a transfer, the more the more it matters.
+    fn ray_count(&self, weighted: f32, most: u32) -> u32 {
+        let importance = weighted / self.threshold.max(f32::MIN_POSITIVE);
+        (importance.min(64.0).ceil() as u32).clamp(LEAST_RAYS, most)
+    }
+
+    /// Which node to divide: the larger that can be.
+    fn division(&self, source: NodeId, receiver: NodeId) -> Option<Decision> {
+        let hierarchy = self.hierarchy();
+        let can_divide_source = !hierarchy.children(source).is_empty();
+        let can_divide_receiver = match hierarchy.kind(receiver) {
+            Kind::Cluster(_) => true,
+            Kind::Element(index) => {
+                let area = hierarchy.mesh.elements[index].area_vector.length();
+                !hierarchy.mesh.elements[index].is_leaf() || area * 0.25 >= self.min_area
+            }
+        };
+        let prefers_source = hierarchy.radius(source) >= TIE * hierarchy.radius(receiver);
+        match (can_divide_source, can_divide_receiver) {
+            (true, true) => Some(if prefers_source {
+                Decision::DivideSource
+            } else {
+                Decision::DivideReceiver
+            }),
+            (true, false) => Some(Decision::DivideSource),
+            (false, true) => Some(Decision::DivideReceiver),
+            (false, false) => None,
+        }
+    }
+
+    /// Root of the receiver's share of the area: error is summed in squares over area.
+    fn weight(&self, receiver: NodeId) -> f32 {
+        self.hierarchy().node_share_of_area(receiver).sqrt()
+    }
+
+    /// The link of a pair, with what rays say of it.
+    pub(super) fn link(
+        &self,
+        source: NodeId,
+        receiver: NodeId,
+        error: f32,
+        ray_count: u32,
+        out: &mut Refinement,
+    ) -> Link {
+        let mut random = self.random(source, receiver);
+        let hierarchy = self.hierarchy();
+        let sampler = self.judge.sampler;
+        let (visibility, of_area) = if self.judge.is_too_near_for_tables(source, receiver) {
+            let ray_count = (2 * ray_count).clamp(*NEAR_RAYS.start(), *NEAR_RAYS.end());
+            out.ray_count += u64::from(ray_count);
+            let seen = sampler.seen_fraction(source, receiver, ray_count, &mut random);
+            let expected = self.judge.kernel.mean_form_factor(source, receiver);
+            let correction = if expected > 0.0 {
+                (seen / expected).min(MOST_CORRECTION)
+            } else {
+                0.0
+            };
+            (correction, correction)
+        } else {
+            out.ray_count += u64::from(ray_count);
+            sampler.visibility(source, receiver, ray_count, &mut random)
+        };
+        let form_factor = match (hierarchy.kind(source), hierarchy.kind(receiver)) {
+            (Kind::Element(from), Kind::Element(to)) => {
+                visibility * area_form_factor(hierarchy, from, to)
+            }
+            _ => of_area,
+        };
+        Link {
+            source,
+            visibility,
+            error,
+            form_factor,
+        }
+    }
+}
+
+/// Form factor from one element to another, unoccluded, averaged over the receiver where they are near.
+fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f32 {
+    let (from, to) = (
+        &hierarchy.mesh.elements[source],
+        &hierarchy.mesh.elements[receiver],
+    );
+    let normal = hierarchy.patch_of(receiver).normal;
+    let distance = from.centroid.distance(to.centroid);
+    if distance > 2.0 * (from.radius + to.radius) {
+        return element_form_factor(hierarchy, source, to.centroid, normal);
+    }
+    let points = inner_points(hierarchy.mesh.corners(receiver));
+    let normals = Vectors4::splat(normal);
+    element_form_factors(hierarchy, source, &points, &normals).element_sum() * 0.25
+}

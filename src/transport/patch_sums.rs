@@ -1,0 +1,52 @@
+//! Sums over patches, to choose among them.
+
+use std::ops::Range;
+
+use super::luminance;
+use crate::hierarchy::{Hierarchy, Tables};
+
+/// Running sums over the patches in tree order, to choose patches of a cluster in proportion to what is summed.
+/// One more than there are patches.
+#[derive(Clone, Debug)]
+pub struct PatchSums(Vec<f64>);
+
+impl PatchSums {
+    /// Of the areas of the patches, frame units, as far as they send anything.
+    pub fn of_area(hierarchy: &Hierarchy, tables: &Tables) -> Self {
+        Self::of(hierarchy, |patch, area| tables.elements[patch].w * area)
+    }
+
+    /// Of what the patches send (luminance of radiosity, times area).
+    pub fn of_power(hierarchy: &Hierarchy, tables: &Tables) -> Self {
+        Self::of(hierarchy, |patch, area| {
+            luminance(tables.elements[patch]).max(0.0) * area
+        })
+    }
+
+    fn of(hierarchy: &Hierarchy, value: impl Fn(usize, f32) -> f32) -> Self {
+        let mut sum = 0.0;
+        let values = hierarchy.patches.iter().enumerate().map(|(index, patch)| {
+            sum += f64::from(value(index, patch.area));
+            sum
+        });
+        Self(std::iter::once(0.0).chain(values).collect())
+    }
+
+    /// The sum over some patches.
+    pub(super) fn total(&self, patches: &Range<usize>) -> f64 {
+        self.0[patches.end] - self.0[patches.start]
+    }
+
+    /// One of some patches; `at` is 0…1.
+    pub(super) fn choose(&self, patches: &Range<usize>, at: f32) -> usize {
+        let sums = &self.0[patches.start..=patches.end];
+        let target = sums[0] + f64::from(at) * self.total(patches);
+        let above = sums.partition_point(|&sum| sum <= target);
+        patches.start + above.clamp(1, patches.len()) - 1
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+}
