@@ -71,6 +71,7 @@ impl SceneBuilder {
             objects: object_ranges(&self.objects, self.faces.len()),
             warnings: self.warnings,
             omitted_textures: self.omitted_textures,
+            doubled_faces: self.doubled_faces,
             max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
             radiance_unit,

@@ -64,6 +64,8 @@ pub struct SceneBuilder {
     pub warnings: Vec<Warning>,
     /// Textures that were not even read.
     pub omitted_textures: OmittedTextures,
+    /// Faces omitted since each lies on another one that looks the same way.
+    pub(super) doubled_faces: usize,
 }
 
 /// Why there is no scene.

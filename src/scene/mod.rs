@@ -57,7 +57,6 @@ pub use frame::Frame;
 pub use means::TextureMeans;
 pub use obj::{read_obj, read_obj_with_progress};
 pub use options::{SceneOptions, Sides};
-pub use overlay::DOUBLED;
 pub use progress::ReadProgress;
 pub use read_error::ReadError;
 pub use relight::ActiveMaterials;
@@ -204,6 +203,8 @@ pub struct Scene {
     pub warnings: Vec<Warning>,
     /// Textures that were omitted on the way in.
     pub omitted_textures: OmittedTextures,
+    /// Faces that were omitted since each lies on another one that looks the same way.
+    pub doubled_faces: usize,
     /// Reflectance is at most this, see [`SceneOptions::max_reflectance`].
     pub max_reflectance: f32,
     /// The textures, ready for means.

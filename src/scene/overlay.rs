@@ -13,7 +13,7 @@ use super::shells::ShelledTriangles;
 use super::{Face, Frame, SceneBuilder, Triangle};
 
 /// Why a face is skipped that lies on earlier ones.
-pub const DOUBLED: &str = "it lies on another one that looks the same way";
+pub(super) const DOUBLED: &str = "it lies on another one that looks the same way";
 
 /// Why a part of a face is skipped.
 const PARTLY_DOUBLED: &str = "it lay on another face that looks the same way, and was cut off";
@@ -133,6 +133,7 @@ impl SceneBuilder {
         self.faces = made.faces;
         triangles.list = made.list;
         triangles.shells.of_triangle = made.of_triangle;
+        self.doubled_faces += dropped.len();
         self.warn_of_lines("a face", DOUBLED, &dropped);
         self.warn_of_lines("a part of a face", PARTLY_DOUBLED, &cut);
     }

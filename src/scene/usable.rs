@@ -54,10 +54,11 @@ impl SceneBuilder {
             if repeated.is_empty() {
                 return overlaps;
             }
-            self.drop_faces(|index, _| {
+            let skipped = self.drop_faces(|index, _| {
                 let is_repeated = repeated.binary_search(&(index as u32)).is_ok();
                 is_repeated.then_some(DOUBLED)
             });
+            self.doubled_faces += skipped.iter().map(|skipped| skipped.count).sum::<usize>();
         }
     }
 

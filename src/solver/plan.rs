@@ -31,7 +31,7 @@ use std::sync::Arc;
 use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::LeftOut};
 use crate::{
     hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
-    scene::{ActiveMaterials, Scene, WarningKind},
+    scene::{ActiveMaterials, Scene},
 };
 
 /// Patches of a scene that is solved patch by patch, at most: their pairs are fewer than the links of usual scenes.
@@ -227,19 +227,13 @@ impl Plan {
 
 /// What the reader of the scene left out already.
 fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
+    // Count it.
     let backs = scene
         .triangles
         .iter()
         .filter(|face| !face.two_sided)
         .count();
-    let skipped = scene
-        .warnings
-        .iter()
-        .filter(|warning| warning.kind == WarningKind::FaceSkipped);
-    let doubles: usize = skipped
-        .filter(|warning| warning.message.ends_with(crate::scene::DOUBLED))
-        .map(|warning| warning.count)
-        .sum();
+    // What it is called and why it is not needed.
     let entries = [
         (
             "backs",
@@ -250,7 +244,7 @@ fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
         ),
         (
             "doubles",
-            doubles,
+            scene.doubled_faces,
             "triangles",
             "each lies on another one that looks the same way",
             "light would be there twice",
