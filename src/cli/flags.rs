@@ -189,7 +189,12 @@ impl SettingFlags {
             max_steps: self.max_steps.unwrap_or(preset.max_steps),
             seed: self.seed.unwrap_or(preset.seed),
             keep: self.kept(),
-            ..preset
+            // Those without a flag.
+            push: preset.push,
+            shadow_samples: preset.shadow_samples,
+            mesh_tolerance: preset.mesh_tolerance,
+            crease_degrees: preset.crease_degrees,
+            tolerance: preset.tolerance,
         }
     }
 
@@ -202,17 +207,30 @@ impl SettingFlags {
 
     /// Whether any of them is given.
     pub fn are_given(&self) -> bool {
-        self.preset.is_some()
-            || self.method.is_some()
-            || self.oracle.is_some()
-            || self.direct.is_some()
-            || self.epsilon.is_some()
-            || self.samples.is_some()
-            || self.min_area.is_some()
-            || self.max_steps.is_some()
-            || self.seed.is_some()
-            || !self.keep.is_empty()
-            || self.keep_all
+        let Self {
+            preset,
+            method,
+            oracle,
+            direct,
+            epsilon,
+            samples,
+            min_area,
+            max_steps,
+            seed,
+            keep,
+            keep_all,
+        } = self;
+        preset.is_some()
+            || method.is_some()
+            || oracle.is_some()
+            || direct.is_some()
+            || epsilon.is_some()
+            || samples.is_some()
+            || min_area.is_some()
+            || max_steps.is_some()
+            || seed.is_some()
+            || !keep.is_empty()
+            || *keep_all
     }
 }
 

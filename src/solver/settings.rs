@@ -184,28 +184,45 @@ impl SolveSettings {
         let sentence = |name: &str, value: &dyn std::fmt::Display, range: &str| {
             Err(format!("{name} is {value}, but must be {range}"))
         };
+        // Any value of these will do.
+        let Self {
+            method: _,
+            oracle: _,
+            direct: _,
+            push: _,
+            seed: _,
+            keep: _,
+            epsilon,
+            samples,
+            shadow_samples,
+            min_area,
+            mesh_tolerance,
+            crease_degrees,
+            max_steps,
+            tolerance,
+        } = self;
         // Written so that a NaN is out of every range.
-        for (name, value) in [("epsilon", self.epsilon), ("min_area", self.min_area)] {
+        for (name, value) in [("epsilon", *epsilon), ("min_area", *min_area)] {
             if !(0.0..=f32::MAX).contains(&value) {
                 return sentence(name, &value, "a number of at least 0");
             }
         }
         for (name, value) in [
-            ("mesh_tolerance", self.mesh_tolerance),
-            ("tolerance", self.tolerance),
+            ("mesh_tolerance", *mesh_tolerance),
+            ("tolerance", *tolerance),
         ] {
             if !(f32::MIN_POSITIVE..=f32::MAX).contains(&value) {
                 return sentence(name, &value, "a number above 0");
             }
         }
-        if !(0.0..=180.0).contains(&self.crease_degrees) {
+        if !(0.0..=180.0).contains(crease_degrees) {
             let range = "within 0 and 180";
-            return sentence("crease_degrees", &self.crease_degrees, range);
+            return sentence("crease_degrees", crease_degrees, range);
         }
         for (name, value, most) in [
-            ("samples", self.samples, 4096),
-            ("shadow_samples", self.shadow_samples, 1024),
-            ("max_steps", self.max_steps, u32::MAX),
+            ("samples", *samples, 4096),
+            ("shadow_samples", *shadow_samples, 1024),
+            ("max_steps", *max_steps, u32::MAX),
         ] {
             if !(1..=most).contains(&value) {
                 return sentence(name, &value, &format!("within 1 and {most}"));

@@ -26,20 +26,37 @@ pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
     if old == new {
         return Effect::Nothing;
     }
-    let restarts = old.method != new.method
-        || old.oracle != new.oracle
-        || old.direct != new.direct
-        || old.push != new.push
-        || old.shadow_samples != new.shadow_samples
-        || old.crease_degrees != new.crease_degrees
-        || old.seed != new.seed
-        || old.keep != new.keep
-        || (old.samples != new.samples && new.oracle == Oracle::Samples);
-    let refines = new.epsilon < old.epsilon
-        || new.min_area < old.min_area
-        || new.mesh_tolerance < old.mesh_tolerance
-        || new.tolerance < old.tolerance
-        || new.max_steps > old.max_steps;
+    // Taken apart, so that no field can be forgotten.
+    let SolveSettings {
+        method,
+        oracle,
+        direct,
+        push,
+        epsilon,
+        samples,
+        shadow_samples,
+        min_area,
+        mesh_tolerance,
+        crease_degrees,
+        max_steps,
+        tolerance,
+        seed,
+        keep,
+    } = new;
+    let restarts = old.method != *method
+        || old.oracle != *oracle
+        || old.direct != *direct
+        || old.push != *push
+        || old.shadow_samples != *shadow_samples
+        || old.crease_degrees != *crease_degrees
+        || old.seed != *seed
+        || old.keep != *keep
+        || (old.samples != *samples && *oracle == Oracle::Samples);
+    let refines = *epsilon < old.epsilon
+        || *min_area < old.min_area
+        || *mesh_tolerance < old.mesh_tolerance
+        || *tolerance < old.tolerance
+        || *max_steps > old.max_steps;
     if restarts {
         Effect::Restarts
     } else if refines {

@@ -72,7 +72,13 @@ fn with_quality_of(preset: &SolveSettings, settings: &SolveSettings) -> SolveSet
         crease_degrees: settings.crease_degrees,
         seed: settings.seed,
         keep: settings.keep,
-        ..preset.clone()
+        epsilon: preset.epsilon,
+        samples: preset.samples,
+        shadow_samples: preset.shadow_samples,
+        min_area: preset.min_area,
+        mesh_tolerance: preset.mesh_tolerance,
+        max_steps: preset.max_steps,
+        tolerance: preset.tolerance,
     }
 }
 
