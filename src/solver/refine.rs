@@ -140,12 +140,15 @@ impl Refining<'_> {
         epsilon: f32,
     ) -> Refinement {
         let (hierarchy, settings) = (surfaces.hierarchy, self.settings);
+        // How uneven sources are, where elements are divided for that.
         let spreads = match self.plan.follows_light {
             true => self.radiosity_spreads(surfaces, linked),
             false => Vec::new(),
         };
+        // What points of clusters are chosen by.
         let areas = PatchSums::of_area(hierarchy, &linked.power);
         let powers = PatchSums::of_power(hierarchy, &linked.power);
+        // The judge of pairs, and the walk over all of them.
         let refiner = Refiner {
             judge: Judge {
                 kernel: linked.kernel(hierarchy, settings.method.reading()),

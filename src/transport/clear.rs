@@ -125,6 +125,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let [source_node, receiver_node] =
             [from, to].map(|element| hierarchy.element_node(ElementId(element as u32)));
         let (source, receiver) = (&hierarchy.mesh.elements[from], &hierarchy.mesh.elements[to]);
+        // Form factors, and errors by how uneven the source is and by how they vary over the receiver.
         let seen = match known {
             // What a leaf receives stays as it is, and only the source may have become uneven.
             Some(link) if receiver.is_leaf() => InView::known(link.form_factor),
@@ -134,6 +135,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mean = luminance(self.judge.kernel.tables.elements[from]);
         let of_source = self.unevenness(from) * (seen.mean + seen.change);
         let of_receiver = reflected * mean * seen.change;
+        // Divide where an error exceeds the threshold: now, or after this pass.
         let exceeds = |error: f32| error * weight > ESTIMATE_SHARE * self.threshold;
         if !source.is_leaf() && exceeds(of_source) {
             return Decision::DivideSource;

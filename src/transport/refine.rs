@@ -101,6 +101,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         out: &mut Refinement,
         down: &mut Vec<NodeId>,
     ) {
+        // Judge the links that there are.
         let before = out.links.len();
         let mut is_wanted = false;
         let mut pending: Vec<NodeId> = Vec::new();
@@ -121,6 +122,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 &mut is_wanted,
             );
         }
+        // Judge sources from above, and the children of those that were divided.
         pending.extend(sources.iter().rev());
         while let Some(source) = pending.pop() {
             let made = (out.links.len() - before) as u64;
@@ -139,6 +141,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 &mut is_wanted,
             );
         }
+        // Close the run of this receiver.
         let count = (out.links.len() - before) as u32;
         self.budget.count(u64::from(count));
         if count > 0 {

@@ -149,6 +149,7 @@ pub(crate) fn closures(
         cancel,
         share: if is_coarse { ROUGH_SHARE } else { 1.0 } / cost,
     };
+    // The cells, in groups of neighbours.
     let count = match known.count() {
         0 => hierarchy.mesh.elements.len(),
         count => count,
@@ -159,9 +160,11 @@ pub(crate) fn closures(
         .map(|group| cells(hierarchy, group, count))
         .filter(|cells| !cells.is_empty())
         .collect();
+    // Rays from groups, and from each cell of those that are open.
     let (open, looked) = prober.open_groups(&groups);
     let (found, probed) = prober.probe_groups(&open);
     cancel.proceed()?;
+    // All others are closed, or lie within solids.
     let elements = &hierarchy.mesh.elements[..count];
     let untold = |element: &Element| match element.is_inside_solid() {
         true => Closure::BURIED,
@@ -241,6 +244,7 @@ impl Prober<'_> {
     /// The closures of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
     /// them. Where there are many cells, neighbours share their rays.
     fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(Closure, bool)>>, usize) {
+        // How many cells share their rays, and how many rays a part of a group gets.
         let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
         let cells = || groups.iter().copied().flatten();
         let (cell_count, whole): (usize, f32) = (cells().count(), cells().map(area).sum());
@@ -256,6 +260,7 @@ impl Prober<'_> {
             let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
             (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
         };
+        // What the rays of a part meet.
         let look = |part: &[usize]| match part {
             [cell] => self.probe(*cell, count(part) as u32, 0),
             _ => {
@@ -265,6 +270,7 @@ impl Prober<'_> {
                 met.fold(Met::default(), Met::and)
             }
         };
+        // By group, from the parts: halved for as long as it pays, then the same for all cells of a part.
         let found = groups.par_iter().map(|group| {
             if self.cancel.is_cancelled() {
                 return Vec::new();

@@ -99,6 +99,7 @@ pub(crate) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
         DisjointSets::new(emitters.len()),
         vec![[false; 3]; emitters.len()],
     );
+    // Join emitters that continue each other across an edge.
     let edges = half_edges(emitters.iter().map(|emitter| emitter.vertices));
     let emitter_of = |edge: &HalfEdge| &emitters[edge.triangle as usize];
     for same in edges.chunk_by(|a, b| a.ends == b.ends) {
@@ -118,10 +119,12 @@ pub(crate) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
             }
         }
     }
+    // Sort them by panel.
     let mut order: Vec<(u32, usize)> = (0..emitters.len())
         .map(|emitter| (sets.root(emitter as u32), emitter))
         .collect();
     order.sort_unstable();
+    // The panels, with the edges that no two emitters share.
     let mut panels = Vec::new();
     let mut start = 0;
     for members in order.chunk_by(|a, b| a.0 == b.0) {

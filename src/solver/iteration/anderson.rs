@@ -161,6 +161,7 @@ fn solve(
     let order: Vec<usize> = (0..count).rev().collect();
     let scale: Vec<f64> = order.iter().map(|&i| entry(i, i).max(0.0).sqrt()).collect();
     let scaled = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
+    // The matrix with the right side beside it.
     let mut rows: Vec<Vec<f64>> = (0..count)
         .map(|i| {
             (0..count)
@@ -169,6 +170,7 @@ fn solve(
                 .collect()
         })
         .collect();
+    // Eliminate what is below the diagonal.
     let mut used = vec![false; count];
     for pivot in 0..count {
         used[pivot] = rows[pivot][pivot] > LEAST_NEW;
@@ -183,6 +185,7 @@ fn solve(
             }
         }
     }
+    // Solve from the last row up.
     let mut solution = vec![0.0; count];
     for pivot in (0..count).rev().filter(|&pivot| used[pivot]) {
         let known: f64 = (pivot + 1..count)
@@ -190,6 +193,7 @@ fn solve(
             .sum();
         solution[pivot] = (rows[pivot][count] - known) / rows[pivot][pivot];
     }
+    // Back in the order and the scale that they came in.
     let mut shares = vec![0.0; count];
     for (position, &index) in order.iter().enumerate() {
         shares[index] = scaled(solution[position], scale[position]);

@@ -128,6 +128,7 @@ fn push_moments(
 ) -> Option<Vec<Vec4>> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
+    // What each cluster receives over its own links.
     let mut incident: Vec<Moments<Vec4>> = holders
         .clusters
         .par_iter()
@@ -147,6 +148,7 @@ fn push_moments(
             incident[place].merge(&above);
         }
     }
+    // The share that each patch takes by its normal.
     let active = hierarchy.active_patches();
     let project = |patch: usize| {
         let holder = incident.get(holders.of_patch[patch] as usize);

@@ -19,6 +19,7 @@ pub(crate) fn carry_over(
     if contacts.is_empty() {
         return;
     }
+    // Vertices that some leaf tells of.
     let mut told = vec![false; values.len()];
     for leaf in mesh.active_leaves() {
         let element = &mesh.elements[leaf];
@@ -26,6 +27,7 @@ pub(crate) fn carry_over(
             told[vertex as usize] |= tells(element, side);
         }
     }
+    // Means over the elements in contact, from vertices that are told to those that are not.
     for _ in 0..CARRIED {
         let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
         for &leaf in &contacts {

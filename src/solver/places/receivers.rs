@@ -54,6 +54,7 @@ pub(crate) fn vertex_places(
     is_wanted: &[bool],
 ) -> Vec<(u32, Receiver)> {
     let mesh = &hierarchy.mesh;
+    // The leaves about the vertices, and mean normals there.
     let about_wanted: Vec<usize> = mesh
         .leaves_among(elements)
         .filter(|&leaf| {
@@ -67,6 +68,7 @@ pub(crate) fn vertex_places(
             normals[vertex as usize] += mesh.elements[leaf].area_vector;
         }
     }
+    // By vertex, the leaf that fits best.
     /// How fit a leaf is, and which one it is.
     type Choice = ((bool, f32), u32);
     let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
@@ -84,6 +86,7 @@ pub(crate) fn vertex_places(
             }
         }
     }
+    // A little inside the leaf that was chosen.
     let receiver = |(vertex, choice): (usize, Option<Choice>)| {
         let (_, leaf) = choice?;
         let patch = hierarchy.patch_of(leaf as usize);

@@ -105,6 +105,7 @@ impl View<'_> {
             texcoords: vec![Vec2::NAN; if seams.is_some() { count } else { 0 }],
             ..DisplayMesh::default()
         };
+        // Triangles, with vertices of their own where texture coordinates differ.
         for (element, vertices) in triangles {
             let patch = hierarchy.patch_of(element as usize);
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
@@ -128,6 +129,7 @@ impl View<'_> {
                 .push(hierarchy.clusters.len() as u32 + element);
         }
         cancel.proceed()?;
+        // Values of the vertices.
         for normal in &mut display.normals {
             *normal = normal.normalize_or_zero();
         }

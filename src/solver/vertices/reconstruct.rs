@@ -328,6 +328,7 @@ impl VertexMeans {
         let count = hierarchy.mesh.vertices.len();
         let (mut irradiance, mut error) = (vec![Vec4::ZERO; count], vec![0.0f32; count]);
         let mut weight = vec![0.0f32; count];
+        // Sums over the leaves about each vertex.
         for leaf in leaves {
             let element = &hierarchy.mesh.elements[leaf.element as usize];
             let trust = if element.is_outside_solids() {
@@ -352,6 +353,7 @@ impl VertexMeans {
             irradiance[index] /= weight[index];
             error[index] /= weight[index];
         }
+        // Vertices that only elements in contact tell of, and what the elements receive in the mean.
         carry_over(
             &hierarchy.mesh,
             |element, _| element.is_outside_solids(),
@@ -362,6 +364,7 @@ impl VertexMeans {
             .map(|leaf| (leaf.element as usize, leaf.centre))
             .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
         project(hierarchy, &mut irradiance, centres);
+        // What rays found over this.
         for (value, factor) in irradiance.iter_mut().zip(factors) {
             *value *= *factor;
         }
