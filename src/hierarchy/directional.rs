@@ -16,6 +16,8 @@
 
 use glam::{Vec3, Vec4};
 
+use super::Channels;
+
 /// How the moments are read. The method of the settings, without `exact`, which does not read moments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
@@ -241,6 +243,13 @@ impl<Q: Quantity> Moments<Q> {
             .lower_of(self.absolute_part(unit));
         let half = |even: Q| ((even + linear) * 0.5).upper_of(Q::default());
         (half(least), half(most.upper_of(least)))
+    }
+}
+
+impl Moments<Vec4> {
+    /// The sum of the area vectors of what sends, square frame units.
+    pub fn area_vector(&self) -> Vec3 {
+        Vec3::from_array(self.linear.map(Channels::area))
     }
 }
 

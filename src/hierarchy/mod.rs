@@ -6,6 +6,7 @@
 //! strews flat clusters over whole walls.
 
 mod build;
+mod channels;
 mod colors;
 mod directional;
 mod edge_leaves;
@@ -18,12 +19,13 @@ mod tables;
 mod validate;
 
 pub use build::PatchTree;
+pub use channels::{Channels, luminance};
 pub use directional::{Moments, Quantity, Reading};
 pub use importance::{Importance, longest_edge_squared};
 pub use mesh::{Element, Mesh, Vertex};
 pub use sheets::SheetSides;
 pub use subtrees::Subtrees;
-pub use tables::{Tables, luminance};
+pub use tables::Tables;
 
 use glam::Vec3;
 

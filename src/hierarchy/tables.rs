@@ -1,14 +1,11 @@
 //! Every node as a source: directional moments of clusters, radiosity of elements.
 //!
-//! Four channels travel together: red, green, blue, and in `w` what a radiosity of 1 everywhere would give. As a source
-//! `w` holds projected area, as irradiance the sum of form factors, which must be 1 in a closed scene.
+//! Quantities have four channels (see [`Channels`](super::Channels)).
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Subtrees};
-
-use crate::scene::LUMINANCE;
+use super::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Subtrees, luminance};
 
 /// Source tables of all nodes.
 #[derive(Clone, Debug, Default)]
@@ -219,9 +216,4 @@ impl Slices<'_> {
             cluster.centroid
         };
     }
-}
-
-/// Luminance of linear RGB (Rec. 709), by which errors of colours are weighed; `w` does not count.
-pub fn luminance(color: Vec4) -> f32 {
-    color.dot(LUMINANCE.extend(0.0))
 }

@@ -20,7 +20,7 @@ use super::{
     vertices::LeafLight,
 };
 use crate::{
-    hierarchy::{Hierarchy, luminance},
+    hierarchy::{Channels as _, Hierarchy, luminance},
     scene::{Appearance, Scene},
 };
 
@@ -224,8 +224,8 @@ impl Solved {
                     let varied = (light * ratio).min(now * MOST_AT_CORNERS);
                     let is_told = before.cmpgt(Vec4::ZERO);
                     Vec4::select(is_told, varied, now)
-                        .truncate()
-                        .extend(light.w)
+                        .color()
+                        .extend(light.form_factor_sum())
                 };
                 LeafLight {
                     corners: leaf.corners.map(under),

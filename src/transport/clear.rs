@@ -128,7 +128,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         // Form factors, and errors by how uneven the source is and by how they vary over the receiver.
         let seen = match known {
             // What a leaf receives stays as it is, and only the source may have become uneven.
-            Some(link) if receiver.is_leaf() => InView::known(link.form_factor),
+            Some(link) if receiver.is_leaf() => InView::known(link.form_factor()),
             _ => InView::between(hierarchy, from, to),
         };
         let reflected = luminance(hierarchy.reflectance_of(to).extend(0.0));
@@ -146,16 +146,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if exceeds(of_source) && source.area_vector.length() * 0.25 >= self.min_area {
             out.wanted.push(from as u32);
         }
-        Decision::Keep(Link {
-            source: source_node,
-            visibility: 1.0,
-            // What is seen at a few points tells more than bounds that hold for all.
-            error: self
-                .judge
-                .bound(source_node, receiver_node)
-                .min(of_source + mean * seen.change),
-            form_factor: seen.mean,
-        })
+        // What is seen at a few points tells more than bounds that hold for all.
+        let error = self
+            .judge
+            .bound(source_node, receiver_node)
+            .min(of_source + mean * seen.change);
+        Decision::Keep(Link::between_elements(source_node, 1.0, seen.mean, error))
     }
 
     /// By how much the radiosity of an element is above its mean somewhere.

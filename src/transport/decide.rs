@@ -1,7 +1,5 @@
 //! What becomes of a pair: it is dropped, kept as a link, or replaced by pairs with the children of one of its nodes.
 
-use glam::Vec3;
-
 use super::{
     Judgement, Link, element_form_factor, element_form_factors,
     kernel::inner_points,
@@ -9,7 +7,7 @@ use super::{
 };
 use crate::{
     geometry::Vectors4,
-    hierarchy::{Hierarchy, Kind, NodeId},
+    hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
 };
 
 /// Rays of one link at least.
@@ -85,25 +83,19 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         };
         if self.judge.is_too_near_for_tables(source, receiver) {
             // What few rays have seen must not decide: of pairs that see little, only those found blind would stay.
-            return Decision::Keep(Link {
-                error: bound,
-                ..link
-            });
+            return Decision::Keep(link.with_error(bound));
         }
-        let partial = 2.0 * (link.visibility * (1.0 - link.visibility)).max(0.0).sqrt();
-        let error = error * link.visibility.max(DOUBT) + PARTIAL_VISIBILITY * irradiance * partial;
+        let visibility = link.light_factor();
+        let partial = 2.0 * (visibility * (1.0 - visibility)).max(0.0).sqrt();
+        let error = error * visibility.max(DOUBT) + PARTIAL_VISIBILITY * irradiance * partial;
         if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
             return decision;
         }
         // What gets through is known from a few rays: the bound of the transfer, and twice the deviation of a share that so
         // many rays found.
-        let share =
-            (link.visibility.min(1.0) * LEAST_RAYS as f32 + 1.0) / (LEAST_RAYS as f32 + 2.0);
+        let share = (visibility.min(1.0) * LEAST_RAYS as f32 + 1.0) / (LEAST_RAYS as f32 + 2.0);
         let deviation = (share * (1.0 - share) / LEAST_RAYS as f32).sqrt();
-        Decision::Keep(Link {
-            error: bound + 2.0 * deviation * irradiance,
-            ..link
-        })
+        Decision::Keep(link.with_error(bound + 2.0 * deviation * irradiance))
     }
 
     fn decide_self(
@@ -123,7 +115,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             return Decision::DivideReceiver;
         }
         let fraction = match known {
-            Some(link) => link.visibility,
+            Some(link) => link.light_factor(),
             None => {
                 out.ray_count += u64::from(SELF_RAYS);
                 self.judge.sampler.seen_fraction(
@@ -134,12 +126,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 )
             }
         };
-        Decision::Keep(Link {
-            source: cluster,
-            visibility: fraction,
-            error: self.judge.brightest(cluster),
-            form_factor: fraction,
-        })
+        Decision::Keep(Link::over_tables(
+            cluster,
+            fraction,
+            fraction,
+            self.judge.brightest(cluster),
+        ))
     }
 
     /// Whether all faces of a cluster look the same way: then none sees another.
@@ -148,8 +140,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             return true;
         };
         let moments = &self.judge.kernel.tables.clusters[index];
-        let vector = Vec3::from_array(moments.linear.map(|along| along.w));
-        vector.length() >= (1.0 - SAME_DIRECTION) * moments.total().w
+        let vector = moments.area_vector();
+        vector.length() >= (1.0 - SAME_DIRECTION) * moments.total().area()
     }
 
     /// Rays for a transfer, the more the more it matters.
@@ -214,17 +206,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             out.ray_count += u64::from(ray_count);
             sampler.visibility(source, receiver, ray_count, &mut random)
         };
-        let form_factor = match (hierarchy.kind(source), hierarchy.kind(receiver)) {
+        match (hierarchy.kind(source), hierarchy.kind(receiver)) {
             (Kind::Element(from), Kind::Element(to)) => {
-                visibility * area_form_factor(hierarchy, from, to)
+                let form_factor = visibility * area_form_factor(hierarchy, from, to);
+                Link::between_elements(source, visibility, form_factor, error)
             }
-            _ => of_area,
-        };
-        Link {
-            source,
-            visibility,
-            error,
-            form_factor,
+            _ => Link::over_tables(source, visibility, of_area, error),
         }
     }
 }

@@ -9,7 +9,7 @@ use glam::{Vec3, Vec4};
 
 use crate::{
     geometry::{Vectors4, centroid, irradiance_vector, point_irradiance, point_irradiances},
-    hierarchy::{Hierarchy, Kind, Moments, NodeId, Quantity as _, Reading, Tables},
+    hierarchy::{Channels as _, Hierarchy, Kind, Moments, NodeId, Quantity as _, Reading, Tables},
 };
 
 /// Where on the way to its corners a receiver is looked at, beside its centroid.
@@ -197,18 +197,18 @@ impl Kernel<'_> {
         match self.hierarchy.kind(receiver) {
             Kind::Element(index) => {
                 let normal = self.hierarchy.patch_of(index).normal;
-                self.irradiance(source, point, normal).w
+                self.irradiance(source, point, normal).form_factor_sum()
             }
             Kind::Cluster(index) => {
                 let incident = self.vector_irradiance(source, point);
                 let moments = &self.tables.clusters[index];
-                let area = moments.total().w;
-                let vector = Vec3::from_array(moments.linear.map(|along| along.w));
-                let facing = self.cluster_power(index, incident.towards_source).w;
+                let area = moments.total().area();
+                let vector = moments.area_vector();
+                let facing = self.cluster_power(index, incident.towards_source).area();
                 let cosine = vector.dot(incident.towards_source);
                 let about = 0.5 * (area + cosine);
                 if area > 0.0 {
-                    incident.strength.w
+                    incident.strength.form_factor_sum()
                         * (facing * (1.0 - incident.spread) + about * incident.spread)
                         / area
                 } else {

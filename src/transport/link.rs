@@ -9,22 +9,62 @@ use crate::hierarchy::{Hierarchy, NodeId};
 pub struct Link {
     /// Where the light comes from. Equal to the receiver for the light that a cluster exchanges within itself.
     pub source: NodeId,
-    /// Unoccluded fraction of the light that is transferred, 0…1.5 as few rays tell it without bias; more where near nodes
-    /// exchange more than tables say.
-    pub visibility: f32,
     /// Bound of the error of the irradiance that a face gets over this link (luminance): guaranteed but for visibility,
     /// which adds twice its standard error.
     pub error: f32,
-    /// Between elements, where it is a constant, the form factor including visibility. Else the visibility of the
-    /// source's area: what is bright often stands free, so its light may get through where its area does not.
-    pub form_factor: f32,
+    /// See [`Self::light_factor`].
+    light_factor: f32,
+    /// The form factor between elements, else the factor of the area: what a sweep needs, so that a link takes 16 bytes. Read
+    /// by [`Self::form_factor`] and [`Self::area_factor`].
+    form_or_area_factor: f32,
 }
 
 impl Link {
-    /// What each channel of an unoccluded irradiance is multiplied by where not both ends are elements: colours by the
-    /// visibility of the light, `w` (the form factor) by that of the area.
+    /// Between two elements, whose form factor, visibility included, is a constant. `visibility` is that of the light and of
+    /// the area alike.
+    pub fn between_elements(source: NodeId, visibility: f32, form_factor: f32, error: f32) -> Self {
+        Self {
+            source,
+            error,
+            light_factor: visibility,
+            form_or_area_factor: form_factor,
+        }
+    }
+
+    /// With a cluster at one end at least. What is bright often stands free, so light may get through where area does not.
+    pub fn over_tables(source: NodeId, light_factor: f32, area_factor: f32, error: f32) -> Self {
+        Self {
+            source,
+            error,
+            light_factor,
+            form_or_area_factor: area_factor,
+        }
+    }
+
+    /// By what unoccluded light is multiplied: the part of it that gets through, 0…1.5 as few rays tell it without bias; more
+    /// where near nodes exchange more than tables say.
+    pub fn light_factor(&self) -> f32 {
+        self.light_factor
+    }
+
+    /// The same for the area of the source, and so for form factors. Where one end at least is a cluster.
+    pub fn area_factor(&self) -> f32 {
+        self.form_or_area_factor
+    }
+
+    /// The form factor, visibility included. Between elements.
+    pub fn form_factor(&self) -> f32 {
+        self.form_or_area_factor
+    }
+
+    /// What each channel of an unoccluded irradiance is multiplied by where not both ends are elements.
     pub fn transmission(&self) -> Vec4 {
-        Vec3::splat(self.visibility).extend(self.form_factor)
+        Vec3::splat(self.light_factor).extend(self.area_factor())
+    }
+
+    /// The same link with another bound of its error.
+    pub fn with_error(self, error: f32) -> Self {
+        Self { error, ..self }
     }
 }
 
@@ -46,12 +86,7 @@ impl LinkStore {
         for index in 0..node_count {
             offsets[index + 1] += offsets[index];
         }
-        let empty = Link {
-            source: NodeId(0),
-            visibility: 0.0,
-            error: 0.0,
-            form_factor: 0.0,
-        };
+        let empty = Link::over_tables(NodeId(0), 0.0, 0.0, 0.0);
         let mut sorted = vec![empty; links.len()];
         let mut start = 0;
         for &(node, count) in runs {
@@ -86,7 +121,7 @@ impl LinkStore {
         for (receiver, range) in self.offsets.windows(2).enumerate() {
             for link in &mut self.links[range[0] as usize..range[1] as usize] {
                 if receiver.min(link.source.index()) < first_element {
-                    link.visibility = link.form_factor;
+                    link.light_factor = link.area_factor();
                 }
             }
         }

@@ -11,7 +11,7 @@ use glam::{Vec3, Vec4};
 use super::{Kernel, PairSampler, luminance};
 use crate::{
     geometry::Random,
-    hierarchy::{Hierarchy, Kind, NodeId, Tables},
+    hierarchy::{Channels, Hierarchy, Kind, NodeId, Tables},
 };
 
 /// How errors are estimated.
@@ -99,7 +99,7 @@ impl Judge<'_> {
 
     /// Luminance of a quantity of light as it is judged.
     fn judged(&self, light: Vec4) -> f32 {
-        luminance(light) + self.ambient * light.w
+        luminance(light) + self.ambient * light.unit_response()
     }
 
     /// Luminance of the brightest patch of a node, as it is judged.
@@ -143,7 +143,9 @@ impl Judge<'_> {
                 let cluster = &hierarchy.clusters[index];
                 let (min, max) = hierarchy.bounds(to);
                 let (least, most) = (min - cluster.max, max - cluster.min);
-                let faces = self.tables().clusters[index].six_faces().map(|face| face.w);
+                let faces = self.tables().clusters[index]
+                    .six_faces()
+                    .map(Channels::area);
                 let slack = IN_PLANE * cluster.area;
                 (0..3).any(|axis| {
                     (most[axis] > 0.0 && faces[2 * axis] > slack)
@@ -252,7 +254,7 @@ impl Judge<'_> {
             return f32::INFINITY;
         }
         let power = self.judged(self.kernel.projected_power(source, unit));
-        power * self.kernel.projected_power(receiver, -unit).w / (PI * squared * area)
+        power * self.kernel.projected_power(receiver, -unit).area() / (PI * squared * area)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::luminance;
-use crate::hierarchy::{Hierarchy, Tables};
+use crate::hierarchy::{Channels as _, Hierarchy, Tables};
 
 /// Running sums over the patches in tree order, to choose patches of a cluster in proportion to what is summed.
 /// One more than there are patches.
@@ -13,7 +13,9 @@ pub struct PatchSums(Vec<f64>);
 impl PatchSums {
     /// Of the areas of the patches, frame units, as far as they send anything.
     pub fn of_area(hierarchy: &Hierarchy, tables: &Tables) -> Self {
-        Self::of(hierarchy, |patch, area| tables.elements[patch].w * area)
+        Self::of(hierarchy, |patch, area| {
+            tables.elements[patch].active_share() * area
+        })
     }
 
     /// Of what the patches send (luminance of radiosity, times area).

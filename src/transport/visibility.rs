@@ -15,7 +15,7 @@ use crate::{
         Random, RayTree, Vectors4, barycentric_in_plane, cosine_direction, point_irradiances,
         triangle_point,
     },
-    hierarchy::{Hierarchy, Kind, NodeId, Tables},
+    hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Tables},
     scene::TriangleId,
 };
 
@@ -170,7 +170,7 @@ impl PairSampler<'_> {
 
     /// Whether all of an element counts, or none, or its parts are not known.
     fn is_whole(&self, element: usize) -> bool {
-        let part = self.tables.elements[element].w;
+        let part = self.tables.elements[element].active_share();
         part >= 1.0 || part <= 0.0 || self.hierarchy.mesh.elements[element].is_leaf()
     }
 
@@ -197,7 +197,7 @@ impl PairSampler<'_> {
                 let element = &self.hierarchy.mesh.elements[index];
                 let (area, sent) = (element.area_vector.length(), self.tables.elements[index]);
                 let leaf = element.is_leaf().then(|| self.facet(index));
-                (leaf, area * sent.w, luminance(sent) * area)
+                (leaf, area * sent.active_share(), luminance(sent) * area)
             }
             Kind::Cluster(index) => {
                 let patches = self.hierarchy.clusters[index].patches();
@@ -258,7 +258,7 @@ impl PairSampler<'_> {
             if by_power {
                 luminance(self.tables.elements[child]).max(0.0)
             } else {
-                self.tables.elements[child].w
+                self.tables.elements[child].active_share()
             }
         };
         let target = at * children.clone().map(weight).sum::<f32>();

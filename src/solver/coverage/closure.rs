@@ -13,7 +13,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::{
-    hierarchy::{Hierarchy, Moments, Tables},
+    hierarchy::{Channels as _, Hierarchy, Moments, Tables},
     solver::plan::Plan,
     transport::luminance,
 };
@@ -90,10 +90,14 @@ impl Closure {
         if row > 0.0 { target / row } else { 1.0 }
     }
 
-    /// Light of a leaf, with the sum of its form factors in `w`, as it is if they add to the closure. Over the whole cell,
+    /// Light of a leaf, with the sum of its form factors, as it is if they add to the closure. Over the whole cell,
     /// `sums` are the area and the sum times area; `nearby` is the mean radiosity of the neighbourhood.
     pub(crate) fn scaled(&self, light: Vec4, sums: (f32, f32), nearby: Vec3) -> Vec4 {
-        multiplied(light, self.factor_for(light.w, sums), nearby)
+        multiplied(
+            light,
+            self.factor_for(light.form_factor_sum(), sums),
+            nearby,
+        )
     }
 
     /// The factor for one leaf, from the sum of its form factors. An estimate stands for the cell as a whole only: its
@@ -107,18 +111,18 @@ impl Closure {
     }
 }
 
-/// Light with its form factors, in `w` and left as they are, times a factor; what it lacks comes from `nearby` if that is
+/// Light with its form factors, in the fourth channel and left as they are, times a factor; what it lacks comes from `nearby` if that is
 /// darker.
 fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
-    let color = light.truncate();
-    if factor <= SLIGHT || light.w <= 0.0 {
-        return (color * factor).extend(light.w);
+    let (color, row) = (light.color(), light.form_factor_sum());
+    if factor <= SLIGHT || row <= 0.0 {
+        return (color * factor).extend(row);
     }
-    let seen = color / light.w;
+    let seen = color / row;
     let is_darker = luminance(nearby.extend(0.0)) < luminance(seen.extend(0.0));
     let missing = if is_darker { nearby } else { seen };
-    let whole = color + missing * ((factor - 1.0) * light.w);
-    whole.max(Vec3::ZERO).extend(light.w)
+    let whole = color + missing * ((factor - 1.0) * row);
+    whole.max(Vec3::ZERO).extend(row)
 }
 
 /// Closures of the cells of a mesh: of its leaves as they were before light was known.
@@ -188,7 +192,7 @@ impl Closures {
         // Where nothing is lit there is no cluster.
         let cluster = tables.clusters.get(self.near[patch] as usize);
         let total = cluster.map_or(Vec4::ZERO, Moments::total);
-        total.truncate() / total.w.max(f32::MIN_POSITIVE)
+        total.color() / total.area().max(f32::MIN_POSITIVE)
     }
 
     /// The closure of a cell.
@@ -220,8 +224,8 @@ impl Closures {
             .with_min_len(1024)
             .for_each(|(value, (element, factor))| {
                 let Some(factor) = factor else { return };
-                let most = if bounds_rows && value.w > 0.0 {
-                    1.0 / value.w
+                let most = if bounds_rows && value.form_factor_sum() > 0.0 {
+                    1.0 / value.form_factor_sum()
                 } else {
                     f32::INFINITY
                 };
@@ -230,14 +234,17 @@ impl Closures {
             });
     }
 
-    /// What irradiance of each leaf must be multiplied by, given the sums of form factors in `w`; `None` for other elements.
+    /// What irradiance of each leaf must be multiplied by, given the sums of their form factors; `None` for other elements.
     pub(crate) fn factors(&self, hierarchy: &Hierarchy, irradiance: &[Vec4]) -> Vec<Option<f32>> {
         let elements = &hierarchy.mesh.elements;
         let cell_count = self.of.len();
         let cell = |index| self.cell(hierarchy, index);
         // Area and sum of form factors times area, by cell.
         let part = |index: usize| {
-            let (area, row) = (elements[index].area_vector.length(), irradiance[index].w);
+            let (area, row) = (
+                elements[index].area_vector.length(),
+                irradiance[index].form_factor_sum(),
+            );
             if elements[index].is_leaf() {
                 (area, area * row)
             } else {
@@ -257,7 +264,7 @@ impl Closures {
                 let cell = cell(index);
                 let closure = self.of(cell);
                 let is_leaf = elements[index].is_leaf();
-                is_leaf.then(|| closure.factor_for(irradiance[index].w, sums[cell]))
+                is_leaf.then(|| closure.factor_for(irradiance[index].form_factor_sum(), sums[cell]))
             })
             .collect()
     }
@@ -283,7 +290,7 @@ mod tests {
             let scaled = closure.scaled(light, (1.0, row), radiosity);
             let expected = radiosity * row * closure.factor(row);
             assert!((scaled.truncate() - expected).abs().max_element() < 1e-5);
-            assert_eq!(scaled.w, row);
+            assert_eq!(scaled.form_factor_sum(), row);
         }
     }
 

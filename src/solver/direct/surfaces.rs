@@ -54,7 +54,7 @@ impl<'a> Surfaces<'a> {
             .is_some_and(|field| field.lights.is_sampled(patch))
     }
 
-    /// Radiosity of a leaf under some irradiance, but for emission that is sampled, and in `w` 1: nothing where it lies
+    /// Radiosity of a leaf under some irradiance, but for emission that is sampled, and with an active share of 1: nothing where it lies
     /// within a solid.
     pub(crate) fn radiosity(&self, element: usize, irradiance: Vec4) -> Vec4 {
         if self.hierarchy.mesh.elements[element].is_inside_solid() {

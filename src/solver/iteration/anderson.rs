@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-use crate::solver::sums::ordered_sum;
+use crate::{hierarchy::Channels as _, solver::sums::ordered_sum};
 
 /// Values that one task combines.
 const CHUNK: usize = 4096;
@@ -81,7 +81,7 @@ impl Anderson {
                 } else {
                     image.truncate()
                 };
-                color.extend(image.w)
+                color.extend(image.unit_response())
             })
             .collect()
     }

@@ -107,7 +107,7 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
             );
             for link in links {
                 sum += match hierarchy.kind(link.source) {
-                    Kind::Element(source) => kernel.tables.elements[source] * link.form_factor,
+                    Kind::Element(source) => kernel.tables.elements[source] * link.form_factor(),
                     Kind::Cluster(_) => {
                         kernel.irradiance(link.source, point, normal) * link.transmission()
                     }

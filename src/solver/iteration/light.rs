@@ -13,7 +13,7 @@ use crate::{
 pub(crate) struct LinkedLight {
     /// Over which pairs of nodes light travels.
     pub(crate) links: LinkStore,
-    /// Irradiance of every element over links, scaled so that form factors add to the closure; `w` is their raw sum.
+    /// Irradiance of every element over links, scaled so that form factors add to the closure; the fourth channel is their raw sum.
     pub(crate) irradiance: Vec<Vec4>,
     /// By element, what its radiosity is multiplied by before links carry it (see `balance`); 1 without links.
     pub(crate) sending: Vec<f32>,
@@ -39,7 +39,7 @@ impl LinkedLight {
         self.irradiance[leaf] + surfaces.direct(leaf)
     }
 
-    /// Radiosity of a leaf but for emission that is sampled, and in `w` 1: nothing where it lies within a solid.
+    /// Radiosity of a leaf but for emission that is sampled, with an active share of 1: nothing where it lies within a solid.
     pub(crate) fn radiosity(&self, surfaces: Surfaces<'_>, leaf: usize) -> Vec4 {
         surfaces.radiosity(leaf, self.total(surfaces, leaf))
     }

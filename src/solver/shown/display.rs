@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3, Vec4};
 use super::seams::{Seams, repeat};
 use crate::{
     geometry::area_vector,
-    hierarchy::{Cluster, Hierarchy, NodeId},
+    hierarchy::{Channels as _, Cluster, Hierarchy, NodeId},
     scene::{Appearance, Scene, TriangleId},
     solver::{
         Cancel, ClusterBox, DisplayMesh, LeftOut, Snapshot, VertexLight,
@@ -240,8 +240,8 @@ impl View<'_> {
     fn cluster_box(&self, index: usize, cluster: &Cluster, level: u32) -> ClusterBox {
         let links = self.linked.links.of(NodeId(index as u32));
         let moments = &self.linked.power.clusters[index];
-        let vector = Vec3::from_array(moments.linear.map(|along| along.w));
-        let total = moments.total().w;
+        let vector = moments.area_vector();
+        let total = moments.total().area();
         ClusterBox {
             min: cluster.min,
             max: cluster.max,

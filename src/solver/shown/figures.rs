@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use crate::{
-    hierarchy::{Hierarchy, luminance},
+    hierarchy::{Channels as _, Hierarchy, luminance},
     solver::{
         StepReport,
         direct::Surfaces,
@@ -71,7 +71,7 @@ fn fill_row_sums(report: &mut StepReport, hierarchy: &Hierarchy, linked: &Linked
     let elements = &hierarchy.mesh.elements;
     let seen = |leaf: &usize| !elements[*leaf].is_inside_solid();
     for leaf in hierarchy.mesh.active_leaves().filter(seen) {
-        let row = linked.irradiance[leaf].w;
+        let row = linked.irradiance[leaf].form_factor_sum();
         least = least.min(row);
         most = most.max(row);
         let area = f64::from(elements[leaf].area_vector.length());

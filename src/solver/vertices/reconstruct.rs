@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::{
     geometry::Vectors4,
-    hierarchy::{Hierarchy, Kind, NodeId},
+    hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
     solver::{
         Cancel,
         coverage::{Closure, Closures},
@@ -96,7 +96,7 @@ fn scale_to_closure(
         let area = hierarchy.mesh.elements[leaf.element as usize]
             .area_vector
             .length();
-        (areas + area, rows + area * leaf.centre.w)
+        (areas + area, rows + area * leaf.centre.form_factor_sum())
     });
     for leaf in leaves {
         for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
@@ -309,7 +309,7 @@ pub(crate) fn link_irradiance(kernel: Kernel<'_>, link: &Link, point: Vec3, norm
 fn transmission(kernel: Kernel<'_>, link: &Link) -> Vec4 {
     match kernel.hierarchy.kind(link.source) {
         Kind::Cluster(_) => link.transmission(),
-        Kind::Element(_) => Vec4::splat(link.visibility),
+        Kind::Element(_) => Vec4::splat(link.light_factor()),
     }
 }
 

@@ -12,7 +12,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, Vec4};
 
 use crate::{
-    hierarchy::{Hierarchy, Kind, NodeId, Reading},
+    hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Reading},
     solver::{
         ClusterBox, InspectedLink, Inspection, PathNode, Place, Subject,
         coverage::Closures,
@@ -154,9 +154,9 @@ impl<'a> Inspector<'a> {
                 found.push(InspectedLink {
                     source: self.place(link.source),
                     receiver: place,
-                    visibility: link.visibility,
+                    visibility: link.light_factor(),
                     irradiance: share.truncate(),
-                    form_factor: share.w,
+                    form_factor: share.form_factor_sum(),
                     error: link.error,
                 });
             }
@@ -164,7 +164,7 @@ impl<'a> Inspector<'a> {
         found
     }
 
-    /// By what the light of a leaf, with its form factors in `w`, is scaled in all so that they add to the closure.
+    /// By what the light of a leaf, with the sum of its form factors, is scaled in all so that they add to the closure.
     fn closure_scale(&self, leaf: usize, light: Vec4) -> Vec3 {
         if self.leaves.is_empty() {
             return Vec3::ONE;
@@ -178,7 +178,7 @@ impl<'a> Inspector<'a> {
             .filter(|other| cell_of(other.element as usize) == cell)
             .fold((0.0, 0.0), |(areas, rows), other| {
                 let area = elements[other.element as usize].area_vector.length();
-                (areas + area, rows + area * other.centre.w)
+                (areas + area, rows + area * other.centre.form_factor_sum())
             });
         let patch = elements[leaf].patch as usize;
         let nearby = self.closures.nearby(&self.linked.power, patch);
@@ -266,8 +266,8 @@ fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Li
     // The shares that faces take by `Incident::on_face`, in the mean.
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
     let towards = incident.towards_source;
-    let facing = moments.project(towards, reading).w / area;
-    let cosine = Vec3::from_array(moments.linear.map(|along| along.w)).dot(towards) / area;
+    let facing = moments.project(towards, reading).area() / area;
+    let cosine = moments.area_vector().dot(towards) / area;
     let share = facing * (1.0 - incident.spread) + 0.5 * (1.0 + cosine) * incident.spread;
     incident.strength * (link.transmission() * share)
 }

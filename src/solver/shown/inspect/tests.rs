@@ -50,7 +50,7 @@ fn links_of_a_leaf_add_to_the_light_that_is_shown() {
             light.element,
             inspection.linked
         );
-        assert!((inspection.row_sum - light.centre.w).abs() <= 1e-3);
+        assert!((inspection.row_sum - light.centre.form_factor_sum()).abs() <= 1e-3);
         let ordered = inspection
             .links
             .is_sorted_by(|a, b| strength(a) >= strength(b));
