@@ -5,7 +5,7 @@ use crate::hierarchy::Hierarchy;
 
 /// Tolerated contrast, in multiples of the tolerance of the mesh, of an error on an element whose share of the area has
 /// a fourth root of 1. Smaller costs elements and rays in all penumbrae; larger draws their borders as saw teeth.
-pub(crate) const CONTRAST_TOLERANCE: f32 = 4.0;
+pub(super) const CONTRAST_TOLERANCE: f32 = 4.0;
 
 /// Contrast that noise of a point may have, as a share of what a border may have. Larger leaves blotches in penumbrae;
 /// smaller costs rays, as one over its square.
@@ -13,7 +13,7 @@ const NOISE_SHARE: f32 = 0.5;
 
 /// When to divide.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Limits {
+pub(super) struct Limits {
     /// Error of interpolation, times the root of the element's share of the area, relative to the mean.
     pub tolerance: f32,
     /// Contrast of an error, times the fourth root of the element's share of the area; infinite where it does not count.
@@ -53,12 +53,12 @@ impl Limits {
 
     /// Whether an error of luminance (of which the part above noise counts) is seen on an element, or about a point, of
     /// which `weight` is the root of the share of the area, beside light of luminance `beside`.
-    pub(crate) fn is_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
+    pub(super) fn is_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
         error * weight.sqrt() > self.contrast * beside
     }
 
     /// As [`Self::is_seen`] for noise of a point, by its standard error.
-    pub(crate) fn is_noise_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
+    pub(super) fn is_noise_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
         self.is_seen(error / NOISE_SHARE, beside, weight)
     }
 }

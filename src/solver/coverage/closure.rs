@@ -47,25 +47,25 @@ pub(crate) struct Closure {
 
 impl Closure {
     /// Surrounded by lit surfaces.
-    pub(crate) const CLOSED: Self = Self {
+    pub(super) const CLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
     };
 
     /// Anything between nothing and all: form factors are left as they are.
-    pub(crate) const UNKNOWN: Self = Self {
+    pub(super) const UNKNOWN: Self = Self {
         share: 0.0,
         deviation: f32::INFINITY,
     };
 
     /// Within a solid, where nothing is seen.
-    pub(crate) const BURIED: Self = Self {
+    pub(super) const BURIED: Self = Self {
         share: 0.0,
         deviation: 0.0,
     };
 
     /// This part, known up to a standard error.
-    pub(crate) fn estimated(share: f32, deviation: f32) -> Self {
+    pub(super) fn estimated(share: f32, deviation: f32) -> Self {
         Self { share, deviation }
     }
 
@@ -178,7 +178,7 @@ impl Closures {
     }
 
     /// Elements that there were when they were looked at, the cells among them; 0 where none was yet.
-    pub(crate) fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.of.len()
     }
 

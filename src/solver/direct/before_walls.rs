@@ -29,7 +29,7 @@ const DARK_SHARE: f32 = 0.1;
 impl DirectField {
     /// Find places before the wall for vertices that lie beyond one, and sample there. A vertex is looked at once at each
     /// element, where it is dark and the element is not. Returns the rays shot.
-    pub(crate) fn move_before_walls(
+    pub(super) fn move_before_walls(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,

@@ -17,7 +17,7 @@ const NOISE_DEVIATIONS: f32 = 0.5;
 
 impl DirectField {
     /// Whether what lies between the corners of an element may show: how far they differ, beyond noise, is seen.
-    pub(crate) fn may_show(
+    pub(super) fn may_show(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -32,7 +32,7 @@ impl DirectField {
     }
 
     /// Whether the bend between the corners of an element and its centroid shows.
-    pub(crate) fn shows(
+    pub(super) fn shows(
         &self,
         hierarchy: &Hierarchy,
         element: usize,

@@ -79,7 +79,7 @@ impl DirectField {
     }
 
     /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
-    pub(crate) fn settle(
+    pub(super) fn settle(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -119,7 +119,7 @@ impl DirectField {
     }
 
     /// Double the rays of points for as long as they are too noisy.
-    pub(crate) fn double(
+    pub(super) fn double(
         &self,
         rays: &RayTree,
         receivers: &[Receiver],
@@ -169,7 +169,7 @@ impl DirectField {
     }
 
     /// Have some vertices sampled anew.
-    pub(crate) fn forget(&mut self, receivers: &[(u32, Receiver)]) {
+    pub(super) fn forget(&mut self, receivers: &[(u32, Receiver)]) {
         for &(vertex, _) in receivers {
             self.vertices[vertex as usize] = None;
         }
@@ -177,14 +177,14 @@ impl DirectField {
     }
 
     /// Rays shot from some vertices.
-    pub(crate) fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
+    pub(super) fn shot(&self, receivers: &[(u32, Receiver)]) -> u64 {
         let shot = |&(vertex, _): &(u32, Receiver)| {
             self.vertices[vertex as usize].map_or(0, |light| u64::from(light.shot))
         };
         receivers.iter().map(shot).sum()
     }
 
-    pub(crate) fn shoot(
+    pub(super) fn shoot(
         &mut self,
         rays: &RayTree,
         receivers: &[(u32, Receiver)],
@@ -220,7 +220,7 @@ impl DirectField {
     }
 
     /// What the rays of the corners of an element found.
-    pub(crate) fn tally_of_corners(&self, hierarchy: &Hierarchy, element: usize) -> Tally {
+    pub(super) fn tally_of_corners(&self, hierarchy: &Hierarchy, element: usize) -> Tally {
         let mut sum = Tally::default();
         for vertex in hierarchy.mesh.elements[element].vertices {
             sum += self.tally(vertex);
@@ -237,7 +237,7 @@ impl DirectField {
     }
 
     /// As [`crate::solver::places::OffsetPlaces::vertex_places`] has it, by what is known of each vertex.
-    pub(crate) fn receivers(
+    pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,
         elements: Range<usize>,

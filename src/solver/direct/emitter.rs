@@ -13,7 +13,7 @@ use crate::{
 
 /// An emitting patch, or a part of one whose texture varies.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Emitter {
+pub(super) struct Emitter {
     /// Indices into the points of the mesh, as the side that emits is wound.
     pub vertices: [u32; 3],
     pub corners: [Vec3; 3],
@@ -48,7 +48,7 @@ impl Emitter {
 
     /// A point of the emitter for a point of the unit square, and the light that it stands for at a receiver, up to a
     /// factor. Of an emitter that is `seen` under a large angle all directions are as likely; elsewhere all points are.
-    pub(crate) fn aim(
+    pub(super) fn aim(
         &self,
         receiver: &Receiver,
         seen: Option<&SphericalTriangle>,

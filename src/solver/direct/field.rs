@@ -15,11 +15,11 @@ use crate::{
 pub(crate) struct DirectField {
     pub(crate) lights: Lights,
     /// By vertex, where it was sampled; shorter than the vertices where some are new.
-    pub(crate) vertices: Vec<Option<DirectLight>>,
+    pub(super) vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
-    pub(crate) centres: Vec<Option<DirectLight>>,
+    pub(super) centres: Vec<Option<DirectLight>>,
     /// Elements whose corners are all sampled: those that come after are new.
-    pub(crate) covered: usize,
+    pub(super) covered: usize,
     /// Shadow rays that these corners have where it takes all.
     pub(crate) samples: u32,
     /// Vertices behind walls.
@@ -41,7 +41,7 @@ impl DirectField {
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
     /// solid in part, that of its open part.
-    pub(crate) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
+    pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
         let leaf = &hierarchy.mesh.elements[element];
         if leaf.is_contact() {
             let open = (0..3).filter(|&side| !leaf.is_inside_solid_at(side));
@@ -109,7 +109,7 @@ impl DirectField {
     }
 
     /// Irradiance at a vertex without occlusion; 0 where it was not sampled.
-    pub(crate) fn unoccluded(&self, vertex: u32) -> Vec4 {
+    pub(super) fn unoccluded(&self, vertex: u32) -> Vec4 {
         let light = self.vertices[vertex as usize].unwrap_or_default();
         light.unoccluded()
     }

@@ -65,7 +65,7 @@ impl Lights {
     }
 
     /// The emitters whose materials `emission` knows, with that emitted radiance times their texture.
-    pub(crate) fn repainted(&self, emission: impl Fn(MaterialId) -> Option<Vec3>) -> Self {
+    pub(super) fn repainted(&self, emission: impl Fn(MaterialId) -> Option<Vec3>) -> Self {
         let emitters: Vec<Emitter> = self
             .tree
             .emitters
@@ -84,12 +84,12 @@ impl Lights {
 
     /// Irradiance no larger than any surroundings can give. Of many emitters behind each other, few rays tell badly how
     /// much is seen.
-    pub(crate) fn bounded(&self, irradiance: Vec4) -> Vec4 {
+    pub(super) fn bounded(&self, irradiance: Vec4) -> Vec4 {
         irradiance.min(self.brightest)
     }
 
     /// Largest radiosity of an emitter by channel.
-    pub(crate) fn brightest(&self) -> Vec4 {
+    pub(super) fn brightest(&self) -> Vec4 {
         self.brightest
     }
 
@@ -104,19 +104,19 @@ impl Lights {
     }
 
     /// The triangles of the emitters.
-    pub(crate) fn triangles(&self) -> impl Iterator<Item = TriangleId> + '_ {
+    pub(super) fn triangles(&self) -> impl Iterator<Item = TriangleId> + '_ {
         self.tree.emitters.iter().map(|emitter| emitter.triangle)
     }
 
     /// Whether all emission that light is computed from is sampled.
-    pub(crate) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
+    pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
         let mut held = hierarchy.active_patches();
         held.all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
     }
 
     /// Luminance of the power of the emitters per area of the scene: the mean irradiance if all of it arrives, where that is
     /// no more than can.
-    pub(crate) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
+    pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
         let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
         let sum: f64 = self.tree.emitters.iter().map(power).sum();
         let mean = (sum / hierarchy.importance.area.max(f64::MIN_POSITIVE)) as f32;
@@ -130,7 +130,7 @@ impl Lights {
 
     /// Shoot shadow rays from many points until each has had `wanted` of them, and add what they find to what is known of
     /// each. When cancelled, some points are left out and all must be asked again.
-    pub(crate) fn shoot(
+    pub(super) fn shoot(
         &self,
         rays: &RayTree,
         receivers: &[Receiver],
@@ -225,7 +225,7 @@ impl Lights {
     }
 
     /// As [`LightTree::unoccluded`].
-    pub(crate) fn unoccluded(
+    pub(super) fn unoccluded(
         &self,
         receiver: &Receiver,
         scale: Option<f32>,

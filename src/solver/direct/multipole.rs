@@ -32,9 +32,9 @@ const RESOLUTION: f32 = 1e-5;
 
 /// Moments of the light of some emitters.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Multipole {
+pub(super) struct Multipole {
     /// Centre of the power (luminance).
-    pub(crate) centre: Vec3,
+    pub(super) centre: Vec3,
     /// Radius of a sphere about the centre that holds all emitters.
     radius: f32,
     /// Luminance of the power.
@@ -58,7 +58,7 @@ pub(crate) struct Multipole {
 
 /// What a point sees of a multipole.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sight {
+pub(super) struct Sight {
     /// The centre relative to the point, and its squared distance.
     separation: Vec3,
     squared: f32,
@@ -95,7 +95,7 @@ impl Multipole {
     }
 
     /// Of the emitters of both.
-    pub(crate) fn merged(&self, other: &Self) -> Self {
+    pub(super) fn merged(&self, other: &Self) -> Self {
         let power = self.power + other.power;
         let share = match other.power / power {
             share if share.is_finite() => share,
@@ -135,7 +135,7 @@ impl Multipole {
     }
 
     /// What a receiver sees of it; `None` where that is nothing for certain.
-    pub(crate) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
+    pub(super) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
         let separation = self.centre - receiver.point;
         let squared = separation.length_squared();
         let distance = squared.sqrt();
@@ -172,7 +172,7 @@ impl Multipole {
     }
 
     /// How far the luminance of the irradiance may be off, about; infinite where nothing is known.
-    pub(crate) fn error(&self, sight: &Sight) -> f32 {
+    pub(super) fn error(&self, sight: &Sight) -> f32 {
         let distance = sight.squared.sqrt();
         if distance <= NEAREST * self.radius {
             return f32::INFINITY;
@@ -221,7 +221,7 @@ impl Multipole {
     }
 
     /// Whether a point is so far away that the emitters are seen about alike.
-    pub(crate) fn is_far(&self, sight: &Sight) -> bool {
+    pub(super) fn is_far(&self, sight: &Sight) -> bool {
         sight.squared > (2.0 * self.radius).powi(2)
     }
 }

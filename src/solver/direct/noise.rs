@@ -12,13 +12,13 @@ const MOST_SAMPLES: u32 = 16;
 
 impl Limits {
     /// Shadow rays of a point at most.
-    pub(crate) fn most_samples(&self) -> u32 {
+    pub(super) fn most_samples(&self) -> u32 {
         MOST_SAMPLES * self.shadow_samples
     }
 
     /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root, by
     /// what the rays of its neighbours found.
-    pub(crate) fn is_noisy(
+    pub(super) fn is_noisy(
         &self,
         light: &DirectLight,
         neighbours: Tally,
@@ -32,7 +32,7 @@ impl Limits {
     }
 
     /// Whether the noise of the rays of a point can be seen, by its standard error.
-    pub(crate) fn is_grainy(
+    pub(super) fn is_grainy(
         &self,
         light: &DirectLight,
         error: f32,
@@ -45,7 +45,7 @@ impl Limits {
 
     /// Whether the rays of a point are too few where those of its neighbours had another outcome: though all of them
     /// agree, others might not.
-    pub(crate) fn is_doubtful(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
+    pub(super) fn is_doubtful(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
         let beside = mean.max(luminance(light.irradiance()));
         light.tried < self.most_samples() && self.is_noise_seen(light.doubt(), beside, weight)
     }

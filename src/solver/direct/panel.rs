@@ -39,15 +39,15 @@ type Corner = (u32, Vec3);
 
 /// Emitters of one material and radiosity that lie in one plane and hang together by edges.
 #[derive(Clone, Debug)]
-pub(crate) struct Panel {
+pub(super) struct Panel {
     /// Which emitters.
     pub emitters: Range<usize>,
     /// Area of all of them.
     area: f32,
     /// Edges that no two emitters share, in the order of their front's corners.
     outline: Vec<[Vec3; 2]>,
-    pub(crate) normal: Vec3,
-    pub(crate) centre: Vec3,
+    pub(super) normal: Vec3,
+    pub(super) centre: Vec3,
     radius: f32,
 }
 
@@ -94,7 +94,7 @@ impl Panel {
 
 /// Sort emitters so that those of a panel follow each other, and find the panels. Both stay in the order of the first
 /// emitter of each panel.
-pub(crate) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
+pub(super) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
     let (mut sets, mut is_inner) = (
         DisjointSets::new(emitters.len()),
         vec![[false; 3]; emitters.len()],

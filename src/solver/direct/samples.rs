@@ -11,7 +11,7 @@ pub(super) struct Bundle {
     /// The emitter, where it fills a large angle.
     pub(super) seen: Option<SphericalTriangle>,
     /// Rays tried.
-    pub(super) rays: u32,
+    pub(crate) rays: u32,
     shot: u32,
     visible: u32,
     /// Weights of the rays shot.
@@ -44,7 +44,7 @@ impl Bundle {
 
 /// How many shadow rays of one or several points got through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Tally {
+pub(super) struct Tally {
     pub shot: u32,
     pub visible: u32,
 }
@@ -55,7 +55,7 @@ const LIKELY_DEVIATIONS: f32 = 3.0;
 
 impl Tally {
     /// Whether some got through and others did not.
-    pub(crate) fn is_mixed(self) -> bool {
+    pub(super) fn is_mixed(self) -> bool {
         self.visible > 0 && self.visible < self.shot
     }
 
@@ -65,7 +65,7 @@ impl Tally {
     }
 
     /// Whether chance explains how these rays differ from others: by the part of the others, with half a hit and half a miss more.
-    pub(crate) fn is_like(self, others: Self) -> bool {
+    pub(super) fn is_like(self, others: Self) -> bool {
         let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
         let expected = (others.visible as f32 + 0.5) / count;
         let variance = expected * (1.0 - expected) * (1.0 / own + 1.0 / count);
@@ -83,7 +83,7 @@ impl std::ops::AddAssign for Tally {
 
 /// What the shadow rays of a point found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct DirectLight {
+pub(super) struct DirectLight {
     /// Irradiance without occlusion; before the first ray what is expected, 0 for nothing.
     pub(super) exact: Vec4,
     /// Weights of all rays by colour.
@@ -101,7 +101,7 @@ pub(crate) struct DirectLight {
 impl DirectLight {
     /// Before the first ray, where about this irradiance is expected without occlusion: the light of many emitters is then
     /// evaluated no finer than that calls for, without asking first how much there is.
-    pub(crate) fn expected(exact: Vec4) -> Self {
+    pub(super) fn expected(exact: Vec4) -> Self {
         Self {
             exact,
             ..Self::default()
@@ -120,7 +120,7 @@ impl DirectLight {
 
     /// The light of several parts of the emitters together, the colours of each multiplied by a factor. Of parts that
     /// are switched off nothing remains but that rays were tried.
-    pub(crate) fn mixed(parts: impl Iterator<Item = (Self, Vec4)>) -> Self {
+    pub(super) fn mixed(parts: impl Iterator<Item = (Self, Vec4)>) -> Self {
         let mut mixed = Self::default();
         for (part, factor) in parts {
             let exact = part.exact * factor;
@@ -156,12 +156,12 @@ impl DirectLight {
     }
 
     /// Unoccluded irradiance.
-    pub(crate) fn unoccluded(&self) -> Vec4 {
+    pub(super) fn unoccluded(&self) -> Vec4 {
         self.exact
     }
 
     /// The part of the unoccluded irradiance that arrives, by colour, 0…1.
-    pub(crate) fn fraction(&self) -> Vec4 {
+    pub(super) fn fraction(&self) -> Vec4 {
         let ratio = |arrived: f32, sent: f32| {
             if sent > 0.0 {
                 (arrived / sent).clamp(0.0, 1.0)
@@ -178,7 +178,7 @@ impl DirectLight {
     }
 
     /// What its rays found.
-    pub(crate) fn tally(&self) -> Tally {
+    pub(super) fn tally(&self) -> Tally {
         Tally {
             shot: self.shot,
             visible: self.visible,
@@ -188,7 +188,7 @@ impl DirectLight {
     /// Standard error of the luminance as the rays of its neighbours have it, unless its own are unlikely beside them. So
     /// whether more rays are shot does not depend on what its own found, which would bias the light: where few get through, most
     /// points would take their first rays for all, and the others would lose by more.
-    pub(crate) fn error_among(&self, neighbours: Tally) -> f32 {
+    pub(super) fn error_among(&self, neighbours: Tally) -> f32 {
         let own = self.tally();
         if neighbours.shot == 0 || !own.is_like(neighbours) {
             return self.error();
@@ -199,7 +199,7 @@ impl DirectLight {
     }
 
     /// Square of the standard error of the fraction, as if the rays were independent: 0 where all agree.
-    pub(crate) fn fraction_variance(&self) -> f32 {
+    pub(super) fn fraction_variance(&self) -> f32 {
         let shot = self.shot.max(1) as f32;
         let fraction = self.visible as f32 / shot;
         fraction * (1.0 - fraction) / shot
@@ -207,19 +207,19 @@ impl DirectLight {
 
     /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
     /// above 0 where all agree.
-    pub(crate) fn fraction_doubt(&self) -> f32 {
+    pub(super) fn fraction_doubt(&self) -> f32 {
         let shot = self.shot as f32 + 1.0;
         let fraction = (self.visible as f32 + 0.5) / shot;
         (fraction * (1.0 - fraction) / shot).sqrt()
     }
 
     /// As [`Self::fraction_doubt`] for the luminance.
-    pub(crate) fn doubt(&self) -> f32 {
+    pub(super) fn doubt(&self) -> f32 {
         luminance(self.exact) * self.fraction_doubt()
     }
 
     /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.
-    pub(crate) fn error(&self) -> f32 {
+    pub(super) fn error(&self) -> f32 {
         luminance(self.exact) * self.fraction_variance().sqrt()
     }
 }

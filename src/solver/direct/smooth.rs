@@ -32,7 +32,7 @@ struct Fraction {
 }
 
 /// Visible fractions of the vertices, by colour; those of vertices without samples are 0.
-pub(crate) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) -> Vec<Vec4> {
+pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) -> Vec<Vec4> {
     let mut fractions: Vec<Fraction> = samples
         .iter()
         .map(|sample| {

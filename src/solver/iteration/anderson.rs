@@ -88,7 +88,7 @@ impl Anderson {
 
     /// Ratio of the last two images' distance to that of the iterates: below 1 where the iteration contracts. Nothing
     /// before the second iterate, or where iterates differ by rounding only.
-    pub(crate) fn contraction(&self, weights: &[f32]) -> Option<f32> {
+    pub(super) fn contraction(&self, weights: &[f32]) -> Option<f32> {
         let change = self.changes.back()?;
         let (_, image) = self.last.as_ref()?;
         let sum = |of: &(dyn Fn(usize) -> Vec3 + Sync)| {

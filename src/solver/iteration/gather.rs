@@ -21,7 +21,7 @@ const TASK_HOLDERS: usize = 32;
 
 /// The clusters that have links of their own, for all sweeps over these links: most have none, and what is pushed passes
 /// them by.
-pub(crate) struct Holders {
+pub(super) struct Holders {
     /// The clusters, parents before children.
     clusters: Vec<u32>,
     /// For each, the place in this list of the nearest one above it, or [`Self::NONE`].
@@ -59,7 +59,7 @@ impl Holders {
 
 /// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples. `None` when
 /// cancelled.
-pub(crate) fn gather(
+pub(super) fn gather(
     kernel: Kernel<'_>,
     links: &LinkStore,
     holders: &Holders,

@@ -16,7 +16,7 @@ pub(crate) struct LinkedLight {
     /// Irradiance of every element over links, scaled so that form factors add to the closure; the fourth channel is their raw sum.
     pub(crate) irradiance: Vec<Vec4>,
     /// By element, what its radiosity is multiplied by before links carry it (see `balance`); 1 without links.
-    pub(crate) sending: Vec<f32>,
+    pub(super) sending: Vec<f32>,
     /// What links carry: reflected light, and emission where it is linked.
     pub(crate) power: Tables,
 }

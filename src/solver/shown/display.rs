@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// A triangle of the mesh that is shown: its element and its vertices.
-pub(crate) type ClosedTriangle = (u32, [u32; 3]);
+pub(super) type ClosedTriangle = (u32, [u32; 3]);
 
 /// The triangles of elements and of what closes their edges, where these have changed since a mesh was made.
 pub(crate) fn changed_triangles(

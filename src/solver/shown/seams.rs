@@ -16,14 +16,14 @@ const SAME_PLACE: f32 = 1.0 / 1024.0;
 
 /// The repetitions of the vertices of a display mesh.
 #[derive(Default)]
-pub(crate) struct Seams {
+pub(super) struct Seams {
     repetitions: HashMap<u32, Vec<u32>>,
 }
 
 impl Seams {
     /// The vertex, or the repetition of it, that has these texture coordinates; made where there is none. A vertex without
     /// coordinates, which are not numbers then, takes them.
-    pub(crate) fn vertex_with(&mut self, vertex: u32, uv: Vec2, mesh: &mut DisplayMesh) -> u32 {
+    pub(super) fn vertex_with(&mut self, vertex: u32, uv: Vec2, mesh: &mut DisplayMesh) -> u32 {
         let held = &mut mesh.texcoords[vertex as usize];
         if held.is_nan() {
             *held = uv;
@@ -49,7 +49,7 @@ impl Seams {
 }
 
 /// Let values of the first `count` vertices hold for their repetitions, too.
-pub(crate) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32]) {
+pub(super) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32]) {
     values.truncate(count);
     for &vertex in repeated {
         values.push(values[vertex as usize]);
@@ -58,12 +58,12 @@ pub(crate) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32
 
 impl DisplayMesh {
     /// Vertices that are no repetitions.
-    pub(crate) fn own_vertex_count(&self) -> usize {
+    pub(super) fn own_vertex_count(&self) -> usize {
         self.positions.len() - self.repeated.len()
     }
 
     /// The vertex that a vertex repeats, or itself.
-    pub(crate) fn own_vertex(&self, vertex: u32) -> usize {
+    pub(super) fn own_vertex(&self, vertex: u32) -> usize {
         let beyond = (vertex as usize).checked_sub(self.own_vertex_count());
         beyond.map_or(vertex, |place| self.repeated[place]) as usize
     }

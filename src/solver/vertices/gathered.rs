@@ -24,7 +24,7 @@ const MOST_RATIO: f32 = 4.0;
 
 /// What rays from a vertex found.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Gathered {
+pub(super) struct Gathered {
     /// Sum of the radiosities met.
     sum: Vec4,
     /// Sum of the squares of their luminances.
@@ -37,7 +37,7 @@ pub(crate) struct Gathered {
 
 impl Gathered {
     /// Count a ray by the radiosity that it met: `None` for a back.
-    pub(crate) fn count(&mut self, met: Option<Vec4>) {
+    pub(super) fn count(&mut self, met: Option<Vec4>) {
         self.rays += 1;
         self.backs += u32::from(met.is_none());
         let met = met.unwrap_or_default();
@@ -53,7 +53,7 @@ impl Gathered {
 
     /// By how much more luminance was found than is linked, and the square of its standard error: as if the rays were
     /// independent and one more had been off by all that is linked, so that rays which all meet the dark prove nothing.
-    pub(crate) fn gap(&self, linked: Vec4) -> (f32, f32) {
+    pub(super) fn gap(&self, linked: Vec4) -> (f32, f32) {
         let (count, linked) = (self.rays.max(1) as f32, luminance(linked));
         let mean = luminance(self.mean());
         let spread = (self.squares - count * mean * mean).max(0.0);
@@ -61,7 +61,7 @@ impl Gathered {
     }
 
     /// What was found over what is linked.
-    pub(crate) fn over(&self, linked: Vec4) -> Ratio {
+    pub(super) fn over(&self, linked: Vec4) -> Ratio {
         let (_, variance) = self.gap(linked);
         let rays = self.rays.max(1) as f32;
         let ratio = self.mean() / linked.max(Vec4::splat(f32::MIN_POSITIVE));
@@ -77,7 +77,7 @@ impl Gathered {
 
 /// What rays find over what is linked.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ratio {
+pub(super) struct Ratio {
     color: Vec4,
     /// Variance of one ray.
     spread: f32,
