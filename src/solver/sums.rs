@@ -9,7 +9,7 @@ use crate::hierarchy::{Hierarchy, luminance};
 const CHUNK: usize = 4096;
 
 /// A sum over indices whose order does not depend on the number of threads.
-pub(crate) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> DVec3 {
+pub(super) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> DVec3 {
     let parts: Vec<DVec3> = (0..count.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
@@ -21,7 +21,7 @@ pub(crate) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> D
 }
 
 /// Sum over leaves of area times a colour, in fixed order and in double precision.
-pub(crate) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> DVec3 {
+pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> DVec3 {
     let elements = &hierarchy.mesh.elements;
     ordered_sum(elements.len(), |index| {
         if !elements[index].is_leaf() {
@@ -38,7 +38,7 @@ pub(super) fn area_total(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Syn
 }
 
 /// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
-pub(crate) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
+pub(super) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
     let importance = &hierarchy.importance;
     let elements = &hierarchy.mesh.elements;
     let measured = |leaf: usize| of(leaf) * importance.measure(elements[leaf].patch as usize);
@@ -52,7 +52,7 @@ const LEAST_LIT: f32 = 1.0 / 9.0;
 
 /// The luminance by which errors of a quantity are measured: its mean over the scene, or, where it is concentrated on a
 /// small part, what the mean would be if that part were [`LEAST_LIT`] of the scene.
-pub(crate) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
+pub(super) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
     let moments = mean(hierarchy, |leaf| {
         let value = luminance(of(leaf));
         Vec4::new(value, value * value, 0.0, 0.0)
