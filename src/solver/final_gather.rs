@@ -8,6 +8,8 @@
 //! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
 //! factor by vertex, so that it holds for other lights on the same links, too.
 
+use std::f32::consts::PI;
+
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -47,7 +49,8 @@ const GATHERING: u32 = 256;
 /// Smaller gathers by chance, larger misses corners.
 const DEVIATIONS: f32 = 1.5;
 
-/// Part of the light at a vertex that must be indirect for rays to look at it.
+/// Part of the light that leaves a vertex that must be indirect for rays to look at it: what a lamp reflects is not seen beside
+/// what it emits.
 const LEAST_INDIRECT: f32 = 0.1;
 
 /// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
@@ -203,6 +206,7 @@ impl Solver {
     fn looks(&self, linked: &[Vec4]) -> Vec<Look> {
         let mesh = &self.hierarchy.mesh;
         let weights = vertex_share_roots(&self.hierarchy);
+        let emitted = self.emitted_as_irradiance();
         let look = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
             let direct = match &self.direct {
@@ -210,7 +214,8 @@ impl Solver {
                 None => Vec4::ZERO,
             };
             let all = luminance(linked + direct);
-            (luminance(linked) > LEAST_INDIRECT * all).then(|| Look {
+            let leaving = all + emitted[vertex as usize];
+            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| Look {
                 vertex: vertex as usize,
                 place,
                 linked,
@@ -226,6 +231,22 @@ impl Solver {
         let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
         let places = offsets.vertex_places(&self.hierarchy, elements, &all);
         places.into_iter().filter_map(look).collect()
+    }
+
+    /// By vertex, the irradiance (luminance) of which the elements about it would reflect as much light as they emit.
+    fn emitted_as_irradiance(&self) -> Vec<f32> {
+        let (hierarchy, mesh) = (&self.hierarchy, &self.hierarchy.mesh);
+        let power = |leaf: usize, radiosity: Vec3| {
+            mesh.elements[leaf].area_vector.length() * luminance(radiosity.extend(0.0))
+        };
+        let emitted =
+            mesh.sums_about_vertices(|leaf| power(leaf, hierarchy.emission_of(leaf) * PI));
+        let reflected =
+            mesh.sums_about_vertices(|leaf| power(leaf, hierarchy.reflectance_of(leaf)));
+        let ratios = emitted.into_iter().zip(reflected);
+        ratios
+            .map(|(emitted, reflected)| emitted / reflected.max(f32::MIN_POSITIVE))
+            .collect()
     }
 
     /// Shoot rays until each vertex has had as many as are wanted.
