@@ -1,6 +1,8 @@
 //! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
 //! Elements are divided where linear interpolation between their corners would miss it.
 
+use std::sync::OnceLock;
+
 use glam::Vec4;
 use rayon::prelude::*;
 
@@ -38,8 +40,8 @@ const HIDDEN_TOLERANCE: f32 = 4.0;
 /// divides without end where a lamp touches a surface; larger misses the light about a lamp far smaller than the scene.
 const SMOOTH_SHARE: f32 = 1e-6;
 
-/// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance: it is
-/// then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
+/// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance of the last
+/// step: it is then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
 const BEND_SCALE: f32 = 30.0;
 
 /// Rounds of division in one step at most.
@@ -50,6 +52,8 @@ const MOST_ROUNDS: u32 = 8;
 pub(super) struct Limits {
     /// Error of interpolation, times the root of the element's share of the area, relative to the mean.
     pub tolerance: f32,
+    /// The same in the last step.
+    pub finest_tolerance: f32,
     /// Contrast of an error, times the fourth root of the element's share of the area; infinite where it does not count.
     pub contrast: f32,
     /// Children are not smaller, frame units.
@@ -69,6 +73,8 @@ pub(super) struct DirectField {
     pub(super) vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
     pub(super) centres: Vec<Option<DirectLight>>,
+    /// Luminance of the unoccluded irradiance at centroids by element, where it was needed.
+    unoccluded_at_centres: Vec<OnceLock<f32>>,
     /// Elements whose corners are all sampled: those that come after are new.
     pub(super) covered: usize,
     /// Shadow rays that these corners have where it takes all.
@@ -155,12 +161,24 @@ impl DirectField {
             lights,
             vertices: Vec::new(),
             centres: Vec::new(),
+            unoccluded_at_centres: Vec::new(),
             covered: 0,
             samples: 0,
             offsets: OffsetPlaces::default(),
             shown: Vec::new(),
             is_full: false,
         }
+    }
+
+    /// The same light in other colours: of these emitters, with what shadow rays found at vertices and centroids.
+    pub(super) fn recolor(
+        &mut self,
+        lights: Lights,
+        vertices: Vec<Option<DirectLight>>,
+        centres: Vec<Option<DirectLight>>,
+    ) {
+        (self.lights, self.vertices, self.centres) = (lights, vertices, centres);
+        self.unoccluded_at_centres.clear();
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
@@ -329,14 +347,16 @@ impl DirectField {
         if is_dark || brightest * weight <= limits.tolerance {
             return 0.0;
         }
-        let centre = centre_of(hierarchy, element);
-        // What is off by far less than the tolerance tells as much.
-        let brightest_corner = corners.into_iter().fold(0.0, f32::max);
-        let scale = brightest_corner.max(BEND_SCALE * limits.tolerance / weight);
-        let at_centre = self
-            .lights
-            .unoccluded(&centre, Some(scale), &mut Vec::new());
-        let at_centre = luminance(at_centre);
+        let at_centre = *self.unoccluded_at_centres[element].get_or_init(|| {
+            let centre = centre_of(hierarchy, element);
+            // What is off by far less than the tolerance tells as much.
+            let brightest_corner = corners.into_iter().fold(0.0, f32::max);
+            let scale = brightest_corner.max(BEND_SCALE * limits.finest_tolerance / weight);
+            luminance(
+                self.lights
+                    .unoccluded(&centre, Some(scale), &mut Vec::new()),
+            )
+        });
         (at_centre - corners.iter().sum::<f32>() / 3.0).abs() * weight
     }
 
@@ -351,7 +371,10 @@ impl DirectField {
         mean: f32,
         cancel: &Cancel,
     ) -> Option<u64> {
-        self.centres.resize(hierarchy.mesh.elements.len(), None);
+        let element_count = hierarchy.mesh.elements.len();
+        self.centres.resize(element_count, None);
+        self.unoccluded_at_centres
+            .resize(element_count, OnceLock::new());
         let unknown: Vec<usize> = leaves
             .par_iter()
             .copied()
@@ -379,7 +402,7 @@ impl DirectField {
         self.lights.shoot(
             rays,
             &receivers,
-            |_| samples,
+            |_, _| samples,
             limits.seed,
             &mut lights,
             cancel,
@@ -432,6 +455,7 @@ impl DirectField {
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
+            + size_of_val(self.unoccluded_at_centres.as_slice())
             + size_of_val(self.shown.as_slice())
             + self.offsets.memory_bytes()
     }

@@ -17,7 +17,7 @@ use super::{
     places::Receiver,
 };
 use crate::{
-    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_2d},
+    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_1d, low_discrepancy_2d},
     hierarchy::Hierarchy,
     scene::{MaterialId, Scene, TriangleId},
     transport::luminance,
@@ -128,13 +128,13 @@ impl Lights {
         (0..self.is_sampled.len()).filter(|&patch| self.is_sampled[patch])
     }
 
-    /// Shoot shadow rays from many points until each has had `wanted` of them, and add what they find to what is known of
-    /// each. When cancelled, some points are left out and all must be asked again.
+    /// Shoot shadow rays from many points until each has had as many as are `wanted` of a point of this index of which so much is
+    /// known, and add what they find to that. When cancelled, some points are left out and all must be asked again.
     pub(super) fn shoot(
         &self,
         rays: &RayTree,
         receivers: &[Receiver],
-        wanted: impl Fn(&DirectLight) -> u32 + Sync,
+        wanted: impl Fn(usize, &DirectLight) -> u32 + Sync,
         seed: u64,
         known: &mut [DirectLight],
         cancel: &Cancel,
@@ -142,31 +142,34 @@ impl Lights {
         known
             .par_iter_mut()
             .zip(receivers)
+            .enumerate()
             .with_min_len(16)
-            .for_each_init(Vec::new, |cut, (light, receiver)| {
-                if !cancel.is_cancelled() {
-                    self.shoot_at(rays, receiver, light.tried..wanted(light), seed, cut, light);
+            .for_each_init(Shot::default, |shot, (index, (light, receiver))| {
+                let mut samples = light.tried..wanted(index, light);
+                if samples.is_empty() || cancel.is_cancelled() {
+                    return;
+                }
+                let expected = luminance(light.exact);
+                let scale = (expected > 0.0 || light.tried > 0).then_some(expected);
+                light.exact = self.unoccluded(receiver, scale, &mut shot.cut);
+                while !samples.is_empty() {
+                    light.tried = samples.end;
+                    self.shoot_at(rays, receiver, samples, seed, shot, light);
+                    samples = light.tried..wanted(index, light);
                 }
             });
     }
 
-    /// Shoot a range of the shadow rays of one point. `cut` is scratch space.
+    /// Shoot a range of the shadow rays of one point, of which the cut is known.
     fn shoot_at(
         &self,
         rays: &RayTree,
         receiver: &Receiver,
         samples: Range<u32>,
         seed: u64,
-        cut: &mut Vec<Arriving>,
+        Shot { cut, strata }: &mut Shot,
         light: &mut DirectLight,
     ) {
-        if samples.is_empty() {
-            return;
-        }
-        let expected = luminance(light.exact);
-        let scale = (expected > 0.0 || light.tried > 0).then_some(expected);
-        light.exact = self.unoccluded(receiver, scale, cut);
-        light.tried = samples.end.max(light.tried);
         if rays.is_clear() {
             light.arrive_whole();
             return;
@@ -181,13 +184,16 @@ impl Lights {
             .to_array()
             .map(|x| u64::from(x.to_bits()));
         let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
-        let shift = Random::new(seed, place).uniform_2d();
-        // Each range of the rays is stratified by itself, and those to one target follow each other.
-        let mut random = Random::new(seed ^ (u64::from(samples.start + 1) << 32), place);
-        let count = samples.len() as f32;
+        let mut random = Random::new(seed, place);
+        let (shift, scramble) = (random.uniform_2d(), random.next_u32());
+        // All rays so far are stratified together. Those to one target follow each other.
+        strata.clear();
+        strata.extend(samples.map(|sample| (low_discrepancy_1d(sample, scramble), sample)));
+        strata.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let (mut target, mut bundle) = (usize::MAX, Bundle::default());
-        for (stratum, sample) in samples.enumerate() {
-            let at = (stratum as f32 + random.uniform()) / count * total;
+        let mut outcomes = Outcomes::default();
+        for &(at, sample) in &*strata {
+            let at = at * total;
             let chosen = cut.partition_point(|part| part.until <= at);
             let chosen = chosen.min(cut.len() - 1);
             if chosen != target {
@@ -207,9 +213,12 @@ impl Lights {
             }
             let ends = [Some(receiver.triangle), Some(emitter.triangle)];
             let color = emitter.radiosity / luminance(emitter.radiosity);
-            bundle.count(weight, color, !rays.occluded(receiver.point, point, ends));
+            let is_visible = !rays.occluded(receiver.point, point, ends);
+            outcomes.count(is_visible);
+            bundle.count(weight, color, is_visible);
         }
         light.count(&bundle);
+        light.changes += outcomes.changes();
     }
 
     /// Rays that are about to be shot to a target.
@@ -236,6 +245,14 @@ impl Lights {
     ) -> Vec4 {
         self.tree.unoccluded(receiver, scale, cut)
     }
+}
+
+/// Scratch space for the shadow rays of one point.
+#[derive(Default)]
+struct Shot {
+    cut: Vec<Arriving>,
+    /// Places of rays in the light of the cut, 0 to 1, and their numbers.
+    strata: Vec<(f32, u32)>,
 }
 
 /// Largest radiosity by channel.
@@ -275,11 +292,37 @@ impl Bundle {
     }
 }
 
+/// How often successive rays of one range had different outcomes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Outcomes {
+    /// Of the first ray and the last one so far.
+    ends: Option<(bool, bool)>,
+    changes: u32,
+}
+
+impl Outcomes {
+    fn count(&mut self, is_visible: bool) {
+        let (first, last) = self.ends.unwrap_or((is_visible, is_visible));
+        self.changes += u32::from(last != is_visible);
+        self.ends = Some((first, is_visible));
+    }
+
+    /// The first ray follows the last one, so that there are as many pairs as rays.
+    fn changes(&self) -> u32 {
+        self.changes
+            + self
+                .ends
+                .map_or(0, |(first, last)| u32::from(first != last))
+    }
+}
+
 /// How many shadow rays of one or several points got through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub shot: u32,
     pub visible: u32,
+    /// Pairs of rays to neighbouring strata, as many as rays, of which one got through and the other did not.
+    pub changes: u32,
 }
 
 /// Standard errors by which rays of one point may differ from those of its neighbours. Smaller takes chance for a border,
@@ -297,6 +340,16 @@ impl Tally {
         self.visible as f32 / self.shot.max(1) as f32
     }
 
+    /// Variance of a ray within its stratum, 0…¼: half the mean square of the differences between neighbouring strata (the
+    /// estimator of successive differences; Wolter, "Introduction to Variance Estimation", ch. 8), and no more than among all
+    /// strata, since a sequence of low discrepancy alternates. `more` adds half a hit and half a miss.
+    fn variance(self, more: f32) -> f32 {
+        let shot = (self.shot as f32 + more).max(1.0);
+        let fraction = (self.visible as f32 + 0.5 * more) / shot;
+        let within = 0.5 * (self.changes as f32 + more) / shot;
+        within.min(fraction * (1.0 - fraction))
+    }
+
     /// Whether chance explains how these rays differ from others: by the part of the others, with half a hit and half a miss more.
     pub(super) fn is_like(self, others: Self) -> bool {
         let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
@@ -311,6 +364,7 @@ impl std::ops::AddAssign for Tally {
     fn add_assign(&mut self, other: Self) {
         self.shot += other.shot;
         self.visible += other.visible;
+        self.changes += other.changes;
     }
 }
 
@@ -329,6 +383,8 @@ pub(super) struct DirectLight {
     pub shot: u32,
     /// Rays that got through.
     visible: u32,
+    /// As [`Tally::changes`].
+    changes: u32,
 }
 
 impl DirectLight {
@@ -367,6 +423,7 @@ impl DirectLight {
             mixed.arrived += exact * part.fraction();
             mixed.shot += part.shot;
             mixed.visible += part.visible;
+            mixed.changes += part.changes;
         }
         let total = luminance(mixed.exact);
         if total > 0.0 {
@@ -415,6 +472,7 @@ impl DirectLight {
         Tally {
             shot: self.shot,
             visible: self.visible,
+            changes: self.changes,
         }
     }
 
@@ -426,24 +484,19 @@ impl DirectLight {
         if neighbours.shot == 0 || !own.is_like(neighbours) {
             return self.error();
         }
-        let fraction = neighbours.fraction();
-        let variance = fraction * (1.0 - fraction) / self.shot.max(1) as f32;
+        let variance = neighbours.variance(0.0) / self.shot.max(1) as f32;
         luminance(self.exact) * variance.sqrt()
     }
 
-    /// Square of the standard error of the fraction, as if the rays were independent: 0 where all agree.
-    pub(super) fn fraction_variance(&self) -> f32 {
-        let shot = self.shot.max(1) as f32;
-        let fraction = self.visible as f32 / shot;
-        fraction * (1.0 - fraction) / shot
+    /// Square of the standard error of the fraction: 0 where all rays agree.
+    fn fraction_variance(&self) -> f32 {
+        self.tally().variance(0.0) / self.shot.max(1) as f32
     }
 
     /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
     /// above 0 where all agree.
     pub(super) fn fraction_doubt(&self) -> f32 {
-        let shot = self.shot as f32 + 1.0;
-        let fraction = (self.visible as f32 + 0.5) / shot;
-        (fraction * (1.0 - fraction) / shot).sqrt()
+        (self.tally().variance(1.0) / (self.shot as f32 + 1.0)).sqrt()
     }
 
     /// As [`Self::fraction_doubt`] for the luminance.
@@ -451,7 +504,7 @@ impl DirectLight {
         luminance(self.exact) * self.fraction_doubt()
     }
 
-    /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.
+    /// Standard error of the luminance.
     pub(super) fn error(&self) -> f32 {
         luminance(self.exact) * self.fraction_variance().sqrt()
     }

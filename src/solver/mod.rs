@@ -489,6 +489,7 @@ impl Solver {
         let tolerance = self.settings.mesh_tolerance * threshold_scale;
         adapt::Limits {
             tolerance,
+            finest_tolerance: self.settings.mesh_tolerance,
             // Coarse steps are seen for a moment.
             contrast: match is_coarse(threshold_scale) {
                 true => f32::INFINITY,
