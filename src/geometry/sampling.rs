@@ -61,6 +61,19 @@ pub fn low_discrepancy_2d(index: u32, shift: Vec2) -> Vec2 {
     (point - point.floor()).min(Vec2::splat(1.0 - f32::EPSILON))
 }
 
+/// Point `index` of the van der Corput sequence in base 2, scrambled by nested permutations (Owen 1995, by the hash of Laine
+/// and Karras, "Stratified Sampling for Stochastic Transparency", 2011): 0 (included) to 1 (excluded). Of the points `k n`
+/// to `(k + 1) n - 1`, where n is a power of 2, one lies in each n-th part.
+pub fn low_discrepancy_1d(index: u32, scramble: u32) -> f32 {
+    const FACTORS: [u32; 4] = [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6];
+    let permuted = FACTORS
+        .into_iter()
+        .fold(index.wrapping_add(scramble), |x, factor| {
+            x ^ x.wrapping_mul(factor)
+        });
+    (permuted.reverse_bits() >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
 /// Barycentric coordinates of an area-uniform point of a triangle from a point of the unit square
 /// (the low-distortion map of Heitz 2019).
 pub fn triangle_point(square: Vec2) -> Vec3 {

@@ -16,6 +16,8 @@ const NOISE_SHARE: f32 = 0.5;
 pub(super) struct Limits {
     /// Error of interpolation, times the root of the element's share of the area, relative to the mean.
     pub tolerance: f32,
+    /// The same in the last step.
+    pub finest_tolerance: f32,
     /// Contrast of an error, times the fourth root of the element's share of the area; infinite where it does not count.
     pub contrast: f32,
     /// Children are not smaller, frame units.
@@ -39,6 +41,7 @@ impl Limits {
         let tolerance = settings.mesh_tolerance * threshold_scale;
         Self {
             tolerance,
+            finest_tolerance: settings.mesh_tolerance,
             // Coarse steps are seen for a moment.
             contrast: match is_coarse(threshold_scale) {
                 true => f32::INFINITY,

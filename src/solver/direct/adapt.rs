@@ -32,8 +32,8 @@ const HIDDEN_TOLERANCE: f32 = 4.0;
 /// divides without end where a lamp touches a surface; larger misses the light about a lamp far smaller than the scene.
 const SMOOTH_SHARE: f32 = 1e-6;
 
-/// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance: it is
-/// then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
+/// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance of the last
+/// step: it is then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
 const BEND_SCALE: f32 = 30.0;
 
 /// Rounds of division in one step at most.
@@ -159,13 +159,15 @@ impl DirectField {
     }
 
     /// How far light that nothing blocks is from linear between the corners of an element, as `spread` counts; 0 where it
-    /// cannot be above the tolerance, or where none reaches the corners.
+    /// cannot be above the tolerance, or where none reaches the corners. `at_centre` is the luminance of that light at the
+    /// centroid, found where it is not known yet.
     fn bend_unoccluded(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
         limits: Limits,
         mean: f32,
+        at_centre: &mut Option<f32>,
     ) -> f32 {
         let lights = hierarchy.mesh.elements[element]
             .vertices
@@ -177,14 +179,14 @@ impl DirectField {
         if is_dark || brightest * weight <= limits.tolerance {
             return 0.0;
         }
-        let centre = centre_of(hierarchy, element);
-        // What is off by far less than the tolerance tells as much.
-        let brightest_corner = corners.into_iter().fold(0.0, f32::max);
-        let scale = brightest_corner.max(BEND_SCALE * limits.tolerance / weight);
-        let at_centre = self
-            .lights
-            .unoccluded(&centre, Some(scale), &mut Vec::new());
-        let at_centre = luminance(at_centre);
+        let at_centre = *at_centre.get_or_insert_with(|| {
+            let centre = centre_of(hierarchy, element);
+            // What is off by far less than the tolerance tells as much.
+            let brightest_corner = corners.into_iter().fold(0.0, f32::max);
+            let scale = brightest_corner.max(BEND_SCALE * limits.finest_tolerance / weight);
+            let mut cut = Vec::new();
+            luminance(self.lights.unoccluded(&centre, Some(scale), &mut cut))
+        });
         (at_centre - corners.iter().sum::<f32>() / 3.0).abs() * weight
     }
 
@@ -199,20 +201,32 @@ impl DirectField {
         mean: f32,
         cancel: &Cancel,
     ) -> Option<u64> {
-        self.centres.resize(hierarchy.mesh.elements.len(), None);
-        let unknown: Vec<usize> = leaves
-            .par_iter()
-            .copied()
-            .filter(|&leaf| {
-                hierarchy.mesh.is_held(leaf)
-                    && hierarchy.mesh.elements[leaf].is_outside_solids()
-                    && self.centres[leaf].is_none()
-                    && (self.spread(hierarchy, leaf, mean) > limits.tolerance
-                        || self.bend_unoccluded(hierarchy, leaf, limits, mean) > limits.tolerance
-                        || self.may_show(hierarchy, leaf, limits, mean)
-                        || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance)
+        let element_count = hierarchy.mesh.elements.len();
+        self.centres.resize(element_count, None);
+        self.unoccluded_at_centres.resize(element_count, None);
+        // The leaves to sample: what lies between their corners may show.
+        let candidates = leaves.par_iter().copied().filter(|&leaf| {
+            hierarchy.mesh.is_held(leaf)
+                && hierarchy.mesh.elements[leaf].is_outside_solids()
+                && self.centres[leaf].is_none()
+        });
+        let probed: Vec<(usize, bool, Option<f32>)> = candidates
+            .map(|leaf| {
+                let mut at_centre = self.unoccluded_at_centres[leaf];
+                let is_wanted = self.spread(hierarchy, leaf, mean) > limits.tolerance
+                    || self.bend_unoccluded(hierarchy, leaf, limits, mean, &mut at_centre)
+                        > limits.tolerance
+                    || self.may_show(hierarchy, leaf, limits, mean)
+                    || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance;
+                (leaf, is_wanted, at_centre)
             })
             .collect();
+        for &(leaf, _, at_centre) in &probed {
+            self.unoccluded_at_centres[leaf] = at_centre;
+        }
+        let wanted = probed.iter().filter(|(_, is_wanted, _)| *is_wanted);
+        let unknown: Vec<usize> = wanted.map(|&(leaf, ..)| leaf).collect();
+        // Shadow rays from their centroids.
         let receivers: Vec<Receiver> = unknown
             .iter()
             .map(|&leaf| centre_of(hierarchy, leaf))
@@ -227,12 +241,13 @@ impl DirectField {
         self.lights.shoot(
             rays,
             &receivers,
-            |_| samples,
+            |_, _| samples,
             limits.seed,
             &mut lights,
             cancel,
         );
         cancel.proceed()?;
+        // More of them where they are too noisy.
         let noisy = |index: usize, light: &DirectLight| {
             let corners = self.tally_of_corners(hierarchy, unknown[index]);
             limits.is_noisy(light, corners, share_root(hierarchy, unknown[index]), mean)
@@ -247,32 +262,51 @@ impl DirectField {
     }
 
     /// Those of some leaves whose corners do not tell what lies between.
-    fn bent(&self, hierarchy: &Hierarchy, leaves: &[usize], limits: Limits, mean: f32) -> Vec<u32> {
-        let mesh = &hierarchy.mesh;
-        leaves
-            .iter()
-            .copied()
-            .filter(|&leaf| {
-                let element = &mesh.elements[leaf];
-                let area = element.area_vector.length();
-                let Some(centre) = self.centres.get(leaf).copied().flatten() else {
-                    return false;
-                };
-                // What reaches into a solid was divided as far as it shall be.
-                if !element.is_outside_solids() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
-                    return false;
-                }
-                // Shadows have borders however small elements are; light that nothing blocks does not.
-                if area * 0.25 < limits.min_area {
-                    return self.bend_unoccluded(hierarchy, leaf, limits, mean) > limits.tolerance;
-                }
-                let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
-                let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
-                let weight = share_root(hierarchy, leaf) / mean.max(f32::MIN_POSITIVE);
-                bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
-                    || self.shows(hierarchy, leaf, &centre, limits, mean)
-            })
-            .map(|leaf| leaf as u32)
-            .collect()
+    fn bent(
+        &mut self,
+        hierarchy: &Hierarchy,
+        leaves: &[usize],
+        limits: Limits,
+        mean: f32,
+    ) -> Vec<u32> {
+        let mut bent = Vec::new();
+        for &leaf in leaves {
+            let mut at_centre = self.unoccluded_at_centres[leaf];
+            if self.is_bent(hierarchy, leaf, limits, mean, &mut at_centre) {
+                bent.push(leaf as u32);
+            }
+            self.unoccluded_at_centres[leaf] = at_centre;
+        }
+        bent
+    }
+
+    /// Whether the corners of a leaf do not tell what lies between; `at_centre` as [`Self::bend_unoccluded`] has it.
+    fn is_bent(
+        &self,
+        hierarchy: &Hierarchy,
+        leaf: usize,
+        limits: Limits,
+        mean: f32,
+        at_centre: &mut Option<f32>,
+    ) -> bool {
+        let element = &hierarchy.mesh.elements[leaf];
+        let area = element.area_vector.length();
+        let Some(centre) = self.centres.get(leaf).copied().flatten() else {
+            return false;
+        };
+        // What reaches into a solid was divided as far as it shall be.
+        if !element.is_outside_solids() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
+            return false;
+        }
+        // Shadows have borders however small elements are; light that nothing blocks does not.
+        if area * 0.25 < limits.min_area {
+            return self.bend_unoccluded(hierarchy, leaf, limits, mean, at_centre)
+                > limits.tolerance;
+        }
+        let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
+        let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
+        let weight = share_root(hierarchy, leaf) / mean.max(f32::MIN_POSITIVE);
+        bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
+            || self.shows(hierarchy, leaf, &centre, limits, mean)
     }
 }

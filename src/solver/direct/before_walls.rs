@@ -67,7 +67,7 @@ impl DirectField {
         let all = 0..hierarchy.mesh.elements.len();
         let receivers = self.receivers(hierarchy, all, |vertex, _| is_new[vertex]);
         let (samples, seed) = (limits.shadow_samples, limits.seed);
-        self.shoot(rays, &receivers, |_| samples, seed, cancel);
+        self.shoot(rays, &receivers, samples, seed, cancel);
         if cancel.is_cancelled() {
             self.forget(&receivers);
             return None;

@@ -61,14 +61,14 @@ impl DirectField {
             }
         }
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
-        self.shoot(rays, &receivers, |_| probing, seed, cancel);
+        self.shoot(rays, &receivers, probing, seed, cancel);
         let disputed = self.disputed(&self.neighbours(hierarchy, elements.clone()));
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
             .filter(|&(vertex, _)| disputed[vertex as usize])
             .collect();
-        self.shoot(rays, &rest, |_| samples, seed, cancel);
+        self.shoot(rays, &rest, samples, seed, cancel);
         if cancel.is_cancelled() {
             self.forget(&receivers);
             return None;
@@ -123,33 +123,18 @@ impl DirectField {
         &self,
         rays: &RayTree,
         receivers: &[Receiver],
-        is_noisy: impl Fn(usize, &DirectLight) -> bool,
+        is_noisy: impl Fn(usize, &DirectLight) -> bool + Sync,
         seed: u64,
         known: &mut [DirectLight],
         cancel: &Cancel,
     ) -> Option<()> {
-        loop {
-            let noisy: Vec<usize> = (0..known.len())
-                .filter(|&index| is_noisy(index, &known[index]))
-                .collect();
-            if noisy.is_empty() {
-                return Some(());
-            }
-            let places: Vec<Receiver> = noisy.iter().map(|&index| receivers[index]).collect();
-            let mut lights: Vec<DirectLight> = noisy.iter().map(|&index| known[index]).collect();
-            self.lights.shoot(
-                rays,
-                &places,
-                |light| 2 * light.tried,
-                seed,
-                &mut lights,
-                cancel,
-            );
-            cancel.proceed()?;
-            for (index, light) in noisy.into_iter().zip(lights) {
-                known[index] = light;
-            }
-        }
+        let wanted = |index: usize, light: &DirectLight| match is_noisy(index, light) {
+            true => 2 * light.tried,
+            false => light.tried,
+        };
+        self.lights
+            .shoot(rays, receivers, wanted, seed, known, cancel);
+        cancel.proceed()
     }
 
     /// What is known of some vertices.
@@ -188,14 +173,14 @@ impl DirectField {
         &mut self,
         rays: &RayTree,
         receivers: &[(u32, Receiver)],
-        wanted: impl Fn(&DirectLight) -> u32 + Sync,
+        wanted: u32,
         seed: u64,
         cancel: &Cancel,
     ) {
         let places: Vec<Receiver> = receivers.iter().map(|&(_, receiver)| receiver).collect();
         let mut known = self.known(receivers);
         self.lights
-            .shoot(rays, &places, wanted, seed, &mut known, cancel);
+            .shoot(rays, &places, |_, _| wanted, seed, &mut known, cancel);
         self.learn(receivers, known);
     }
 

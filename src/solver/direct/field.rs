@@ -18,6 +18,8 @@ pub(crate) struct DirectField {
     pub(super) vertices: Vec<Option<DirectLight>>,
     /// By element, where it was needed.
     pub(super) centres: Vec<Option<DirectLight>>,
+    /// Luminance of the unoccluded irradiance at centroids by element, where it was needed.
+    pub(super) unoccluded_at_centres: Vec<Option<f32>>,
     /// Elements whose corners are all sampled: those that come after are new.
     pub(super) covered: usize,
     /// Shadow rays that these corners have where it takes all.
@@ -33,10 +35,22 @@ impl DirectField {
             lights,
             vertices: Vec::new(),
             centres: Vec::new(),
+            unoccluded_at_centres: Vec::new(),
             covered: 0,
             samples: 0,
             offsets: OffsetPlaces::default(),
         }
+    }
+
+    /// The same light in other colours: of these emitters, with what shadow rays found at vertices and centroids.
+    pub(super) fn recolor(
+        &mut self,
+        lights: Lights,
+        vertices: Vec<Option<DirectLight>>,
+        centres: Vec<Option<DirectLight>>,
+    ) {
+        (self.lights, self.vertices, self.centres) = (lights, vertices, centres);
+        self.unoccluded_at_centres.clear();
     }
 
     /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
@@ -123,6 +137,7 @@ impl DirectField {
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())
+            + size_of_val(self.unoccluded_at_centres.as_slice())
             + self.offsets.memory_bytes()
     }
 }

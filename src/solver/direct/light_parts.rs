@@ -81,9 +81,9 @@ impl LightParts {
         }
         let factors = self.factors(appearances)?;
         let mixed = self.mixed(&factors);
-        (field.vertices, field.centres) = (mixed.vertices, mixed.centres);
         let emission = |material: MaterialId| appearances[material.index()].emission;
-        field.lights = field.lights.repainted(|material| Some(emission(material)));
+        let lights = field.lights.repainted(|material| Some(emission(material)));
+        field.recolor(lights, mixed.vertices, mixed.centres);
         Some(shot)
     }
 
@@ -255,7 +255,7 @@ fn shoot_like(
         lights.shoot(
             rays,
             &receivers,
-            |_| count,
+            |_, _| count,
             seed,
             &mut known,
             shooting.cancel,

@@ -13,10 +13,10 @@ use super::{
     emitter::Emitter,
     light_tree::{Arriving, LightTree, Target},
     panel::panels,
-    samples::{Bundle, DirectLight},
+    samples::{Bundle, DirectLight, Outcomes},
 };
 use crate::{
-    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_2d},
+    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_1d, low_discrepancy_2d},
     hierarchy::Hierarchy,
     scene::{MaterialId, Scene, TriangleId},
     solver::{Cancel, Direct, places::Receiver},
@@ -128,13 +128,13 @@ impl Lights {
         (0..self.is_sampled.len()).filter(|&patch| self.is_sampled[patch])
     }
 
-    /// Shoot shadow rays from many points until each has had `wanted` of them, and add what they find to what is known of
-    /// each. When cancelled, some points are left out and all must be asked again.
+    /// Shoot shadow rays from many points until each has had as many as are `wanted` of a point of this index of which so much is
+    /// known, and add what they find to that. When cancelled, some points are left out and all must be asked again.
     pub(super) fn shoot(
         &self,
         rays: &RayTree,
         receivers: &[Receiver],
-        wanted: impl Fn(&DirectLight) -> u32 + Sync,
+        wanted: impl Fn(usize, &DirectLight) -> u32 + Sync,
         seed: u64,
         known: &mut [DirectLight],
         cancel: &Cancel,
@@ -142,31 +142,34 @@ impl Lights {
         known
             .par_iter_mut()
             .zip(receivers)
+            .enumerate()
             .with_min_len(16)
-            .for_each_init(Vec::new, |cut, (light, receiver)| {
-                if !cancel.is_cancelled() {
-                    self.shoot_at(rays, receiver, light.tried..wanted(light), seed, cut, light);
+            .for_each_init(Shot::default, |shot, (index, (light, receiver))| {
+                let mut samples = light.tried..wanted(index, light);
+                if samples.is_empty() || cancel.is_cancelled() {
+                    return;
+                }
+                let expected = luminance(light.exact);
+                let scale = (expected > 0.0 || light.tried > 0).then_some(expected);
+                light.exact = self.unoccluded(receiver, scale, &mut shot.cut);
+                while !samples.is_empty() {
+                    light.tried = samples.end;
+                    self.shoot_at(rays, receiver, samples, seed, shot, light);
+                    samples = light.tried..wanted(index, light);
                 }
             });
     }
 
-    /// Shoot a range of the shadow rays of one point. `cut` is scratch space.
+    /// Shoot a range of the shadow rays of one point, of which the cut is known.
     fn shoot_at(
         &self,
         rays: &RayTree,
         receiver: &Receiver,
         samples: Range<u32>,
         seed: u64,
-        cut: &mut Vec<Arriving>,
+        Shot { cut, strata }: &mut Shot,
         light: &mut DirectLight,
     ) {
-        if samples.is_empty() {
-            return;
-        }
-        let expected = luminance(light.exact);
-        let scale = (expected > 0.0 || light.tried > 0).then_some(expected);
-        light.exact = self.unoccluded(receiver, scale, cut);
-        light.tried = samples.end.max(light.tried);
         if rays.is_clear() {
             light.arrive_whole();
             return;
@@ -181,13 +184,16 @@ impl Lights {
             .to_array()
             .map(|x| u64::from(x.to_bits()));
         let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
-        let shift = Random::new(seed, place).uniform_2d();
-        // Each range of the rays is stratified by itself, and those to one target follow each other.
-        let mut random = Random::new(seed ^ (u64::from(samples.start + 1) << 32), place);
-        let count = samples.len() as f32;
+        let mut random = Random::new(seed, place);
+        let (shift, scramble) = (random.uniform_2d(), random.next_u32());
+        // All rays so far are stratified together. Those to one target follow each other.
+        strata.clear();
+        strata.extend(samples.map(|sample| (low_discrepancy_1d(sample, scramble), sample)));
+        strata.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let (mut target, mut bundle) = (usize::MAX, Bundle::default());
-        for (stratum, sample) in samples.enumerate() {
-            let at = (stratum as f32 + random.uniform()) / count * total;
+        let mut outcomes = Outcomes::default();
+        for &(at, sample) in &*strata {
+            let at = at * total;
             let chosen = cut.partition_point(|part| part.until <= at);
             let chosen = chosen.min(cut.len() - 1);
             if chosen != target {
@@ -207,9 +213,12 @@ impl Lights {
             }
             let ends = [Some(receiver.triangle), Some(emitter.triangle)];
             let color = emitter.radiosity / luminance(emitter.radiosity);
-            bundle.count(weight, color, !rays.occluded(receiver.point, point, ends));
+            let is_visible = !rays.occluded(receiver.point, point, ends);
+            outcomes.count(is_visible);
+            bundle.count(weight, color, is_visible);
         }
         light.count(&bundle);
+        light.changes += outcomes.changes();
     }
 
     /// Rays that are about to be shot to a target.
@@ -233,6 +242,14 @@ impl Lights {
     ) -> Vec4 {
         self.tree.unoccluded(receiver, scale, cut)
     }
+}
+
+/// Scratch space for the shadow rays of one point.
+#[derive(Default)]
+struct Shot {
+    cut: Vec<Arriving>,
+    /// Places of rays in the light of the cut, 0 to 1, and their numbers.
+    strata: Vec<(f32, u32)>,
 }
 
 /// Largest radiosity by channel.

@@ -177,19 +177,24 @@ impl Multipole {
         if distance <= NEAREST * self.radius {
             return f32::INFINITY;
         }
-        let [of_emitters, of_receiver] = sight.most_cosines;
-        let scale = of_receiver / (PI * sight.squared);
-        let most = self.power * of_emitters * scale;
+        let most = self.most_irradiance(sight);
         let truncation =
             TRUNCATION * self.spread * self.spread * self.radius / (distance * sight.squared);
         if sight.is_whole {
             return most * truncation;
         }
         let (least_shown, most_shown) = self.directional.bounds(-sight.separation / distance);
-        let unknown = luminance(most_shown - least_shown) * scale;
+        let unknown =
+            luminance(most_shown - least_shown) * sight.most_cosines[1] / (PI * sight.squared);
         // Without terms of first and second order, and cut off by the horizon.
         let ratio = self.radius / distance;
         most * (truncation + ratio) + unknown
+    }
+
+    /// Luminance of the irradiance without occlusion at most, if all emitters were as far away as the centre.
+    pub(super) fn most_irradiance(&self, sight: &Sight) -> f32 {
+        let [of_emitters, of_receiver] = sight.most_cosines;
+        self.power * of_emitters * of_receiver / (PI * sight.squared)
     }
 
     /// Irradiance at a receiver without occlusion.

@@ -60,6 +60,7 @@ mod tests {
         let settings = SolveSettings::default();
         Limits {
             tolerance,
+            finest_tolerance: tolerance,
             contrast: CONTRAST_TOLERANCE * tolerance,
             min_area: 0.0,
             shadow_samples: settings.shadow_samples,

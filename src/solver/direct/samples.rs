@@ -42,11 +42,37 @@ impl Bundle {
     }
 }
 
+/// How often successive rays of one range had different outcomes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcomes {
+    /// Of the first ray and the last one so far.
+    ends: Option<(bool, bool)>,
+    changes: u32,
+}
+
+impl Outcomes {
+    pub(super) fn count(&mut self, is_visible: bool) {
+        let (first, last) = self.ends.unwrap_or((is_visible, is_visible));
+        self.changes += u32::from(last != is_visible);
+        self.ends = Some((first, is_visible));
+    }
+
+    /// The first ray follows the last one, so that there are as many pairs as rays.
+    pub(super) fn changes(&self) -> u32 {
+        self.changes
+            + self
+                .ends
+                .map_or(0, |(first, last)| u32::from(first != last))
+    }
+}
+
 /// How many shadow rays of one or several points got through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub shot: u32,
     pub visible: u32,
+    /// Pairs of rays to neighbouring strata, as many as rays, of which one got through and the other did not.
+    pub changes: u32,
 }
 
 /// Standard errors by which rays of one point may differ from those of its neighbours. Smaller takes chance for a border,
@@ -64,6 +90,16 @@ impl Tally {
         self.visible as f32 / self.shot.max(1) as f32
     }
 
+    /// Variance of a ray within its stratum, 0…¼: half the mean square of the differences between neighbouring strata (the
+    /// estimator of successive differences; Wolter, "Introduction to Variance Estimation", ch. 8), and no more than among all
+    /// strata, since a sequence of low discrepancy alternates. `more` adds half a hit and half a miss.
+    fn variance(self, more: f32) -> f32 {
+        let shot = (self.shot as f32 + more).max(1.0);
+        let fraction = (self.visible as f32 + 0.5 * more) / shot;
+        let within = 0.5 * (self.changes as f32 + more) / shot;
+        within.min(fraction * (1.0 - fraction))
+    }
+
     /// Whether chance explains how these rays differ from others: by the part of the others, with half a hit and half a miss more.
     pub(super) fn is_like(self, others: Self) -> bool {
         let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
@@ -78,6 +114,7 @@ impl std::ops::AddAssign for Tally {
     fn add_assign(&mut self, other: Self) {
         self.shot += other.shot;
         self.visible += other.visible;
+        self.changes += other.changes;
     }
 }
 
@@ -96,6 +133,8 @@ pub(super) struct DirectLight {
     pub shot: u32,
     /// Rays that got through.
     visible: u32,
+    /// As [`Tally::changes`].
+    pub(super) changes: u32,
 }
 
 impl DirectLight {
@@ -134,6 +173,7 @@ impl DirectLight {
             mixed.arrived += exact * part.fraction();
             mixed.shot += part.shot;
             mixed.visible += part.visible;
+            mixed.changes += part.changes;
         }
         let total = luminance(mixed.exact);
         if total > 0.0 {
@@ -151,7 +191,7 @@ impl DirectLight {
     }
 
     /// Direct irradiance.
-    pub(crate) fn irradiance(&self) -> Vec4 {
+    pub(super) fn irradiance(&self) -> Vec4 {
         self.exact * self.fraction()
     }
 
@@ -182,6 +222,7 @@ impl DirectLight {
         Tally {
             shot: self.shot,
             visible: self.visible,
+            changes: self.changes,
         }
     }
 
@@ -193,24 +234,19 @@ impl DirectLight {
         if neighbours.shot == 0 || !own.is_like(neighbours) {
             return self.error();
         }
-        let fraction = neighbours.fraction();
-        let variance = fraction * (1.0 - fraction) / self.shot.max(1) as f32;
+        let variance = neighbours.variance(0.0) / self.shot.max(1) as f32;
         luminance(self.exact) * variance.sqrt()
     }
 
-    /// Square of the standard error of the fraction, as if the rays were independent: 0 where all agree.
-    pub(super) fn fraction_variance(&self) -> f32 {
-        let shot = self.shot.max(1) as f32;
-        let fraction = self.visible as f32 / shot;
-        fraction * (1.0 - fraction) / shot
+    /// Square of the standard error of the fraction: 0 where all rays agree.
+    fn fraction_variance(&self) -> f32 {
+        self.tally().variance(0.0) / self.shot.max(1) as f32
     }
 
     /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
     /// above 0 where all agree.
     pub(super) fn fraction_doubt(&self) -> f32 {
-        let shot = self.shot as f32 + 1.0;
-        let fraction = (self.visible as f32 + 0.5) / shot;
-        (fraction * (1.0 - fraction) / shot).sqrt()
+        (self.tally().variance(1.0) / (self.shot as f32 + 1.0)).sqrt()
     }
 
     /// As [`Self::fraction_doubt`] for the luminance.
@@ -218,7 +254,7 @@ impl DirectLight {
         luminance(self.exact) * self.fraction_doubt()
     }
 
-    /// Standard error of the luminance, as if the rays were independent: stratification makes it smaller.
+    /// Standard error of the luminance.
     pub(super) fn error(&self) -> f32 {
         luminance(self.exact) * self.fraction_variance().sqrt()
     }

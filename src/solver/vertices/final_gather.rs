@@ -8,6 +8,8 @@
 //! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
 //! factor by vertex, so that it holds for other lights on the same links, too.
 
+use std::f32::consts::PI;
+
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -49,7 +51,8 @@ const GATHERING: u32 = 256;
 /// Smaller gathers by chance, larger misses corners.
 const DEVIATIONS: f32 = 1.5;
 
-/// Part of the light at a vertex that must be indirect for rays to look at it.
+/// Part of the light that leaves a vertex that must be indirect for rays to look at it: what a lamp reflects is not seen beside
+/// what it emits.
 const LEAST_INDIRECT: f32 = 0.1;
 
 /// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
@@ -228,6 +231,7 @@ impl FinalGather<'_> {
         let Surfaces { hierarchy, direct } = self.surfaces;
         let mesh = &hierarchy.mesh;
         let weights = vertex_share_roots(hierarchy);
+        let emitted = emitted_as_irradiance(hierarchy);
         let look = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
             let direct = match direct {
@@ -235,7 +239,8 @@ impl FinalGather<'_> {
                 None => Vec4::ZERO,
             };
             let all = luminance(linked + direct);
-            (luminance(linked) > LEAST_INDIRECT * all).then(|| Look {
+            let leaving = all + emitted[vertex as usize];
+            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| Look {
                 vertex: vertex as usize,
                 place,
                 linked,
@@ -322,6 +327,20 @@ impl FinalGather<'_> {
             })
             .collect()
     }
+}
+
+/// By vertex, the irradiance (luminance) of which the elements about it would reflect as much light as they emit.
+fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
+    let mesh = &hierarchy.mesh;
+    let power = |leaf: usize, radiosity: Vec3| {
+        mesh.elements[leaf].area_vector.length() * luminance(radiosity.extend(0.0))
+    };
+    let emitted = mesh.sums_about_vertices(|leaf| power(leaf, hierarchy.emission_of(leaf) * PI));
+    let reflected = mesh.sums_about_vertices(|leaf| power(leaf, hierarchy.reflectance_of(leaf)));
+    let ratios = emitted.into_iter().zip(reflected);
+    ratios
+        .map(|(emitted, reflected)| emitted / reflected.max(f32::MIN_POSITIVE))
+        .collect()
 }
 
 /// Count the radiosity of what rays met, of irradiance `received` at vertices.

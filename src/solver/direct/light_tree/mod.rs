@@ -2,7 +2,7 @@
 //!
 //! A point takes the coarsest nodes of which the error does not count (a cut, as in Walter et al., "Lightcuts", 2005):
 //! near emitters give their exact irradiance, far ones that of their multipole together. A shadow ray to a node goes
-//! to one of its emitters, chosen on the way down by how much light the two sides of each node give.
+//! to one of its emitters, chosen on the way down by how much light the two sides of each node give at most.
 
 mod growth;
 #[cfg(test)]
@@ -234,9 +234,7 @@ impl LightTree {
             let [a, b] = [first, second].map(|child| {
                 let light = &self.nodes[child].light;
                 let sight = light.sight(receiver);
-                sight.map_or(0.0, |sight| {
-                    luminance(light.irradiance(&sight, receiver.normal))
-                })
+                sight.map_or(0.0, |sight| light.most_irradiance(&sight))
             });
             let share = share_of(a, b, || {
                 self.nodes[first].light.power / node.light.power.max(f32::MIN_POSITIVE)
