@@ -1,4 +1,4 @@
-//! What a solve tells of itself.
+//! What a solve tells of itself, and what may change on the way.
 
 use std::sync::Arc;
 
@@ -27,6 +27,12 @@ impl Solver {
     /// The state as it stands. Cheap: parts are shared.
     pub fn snapshot(&self) -> Snapshot {
         self.snapshot.clone()
+    }
+
+    /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
+    /// threshold, the tolerances, the smallest area and the number of steps.
+    pub fn change_settings(&mut self, settings: SolveSettings) {
+        self.settings = settings;
     }
 
     /// The scene being lit.

@@ -26,10 +26,6 @@ use crate::{
     scene::{ActiveMaterials, Appearance, Scene},
 };
 
-/// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
-/// comes soon; the first step shoots the others.
-const FIRST_RAYS: usize = 1 << 20;
-
 /// A solve in progress.
 ///
 /// Between two calls: `linked` and `direct` hold light for every element and every sampled vertex of `hierarchy`, source
@@ -159,10 +155,10 @@ impl Solver {
         self.ray_count += shot;
         self.is_full |= !fits;
         // A few shadow rays from each vertex.
-        let most = (FIRST_RAYS / self.hierarchy.mesh.vertices.len().max(1)).max(1);
-        let count = shadow_samples(&self.settings, true).min(most as u32);
+        let count = shadow_samples(&self.settings, true);
         if let Some(field) = &mut self.direct {
-            self.ray_count += field.cover(rays, &self.hierarchy, count, limits.seed, cancel)?;
+            self.ray_count +=
+                field.cover_first(rays, &self.hierarchy, count, limits.seed, cancel)?;
         }
         self.extend_to_new_elements();
         self.pull();
@@ -197,20 +193,16 @@ impl Solver {
         // Factors by which what is sent adds up, as what is received does.
         self.balance(cancel)?;
         // Exchange light over the links until it settles. Coarse links err by more than light that has not quite settled.
-        self.iterate(
-            self.settings.tolerance * threshold_scale,
-            &mut report,
-            cancel,
-        )?;
+        let tolerance = self.settings.tolerance * threshold_scale;
+        self.iterate(tolerance, &mut report, cancel)?;
         // Light at the corners of each leaf, from its links.
         self.gather_for_leaves(is_coarse, cancel)?;
         cancel.proceed()?;
         // In the last step, what rays from vertices find over what links tell.
-        let is_last = self.is_full || report.step >= step_count;
-        self.vertex_factors = match is_last {
-            true => self.final_gather(1.0, cancel)?,
-            false => Vec::new(),
-        };
+        self.vertex_factors.clear();
+        if self.is_full || report.step >= step_count {
+            self.vertex_factors = self.final_gather(1.0, cancel)?;
+        }
         // Figures and picture.
         self.fill(&mut report);
         self.show(report.step, cancel)?;
@@ -236,12 +228,6 @@ impl Solver {
         Some(report)
     }
 
-    /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
-    /// threshold, the tolerances, the smallest area and the number of steps.
-    pub fn change_settings(&mut self, settings: SolveSettings) {
-        self.settings = settings;
-    }
-
     pub(super) fn surfaces(&self) -> Surfaces<'_> {
         Surfaces::new(&self.hierarchy, &self.direct)
     }
@@ -261,13 +247,8 @@ impl Solver {
     }
 
     fn limits(&self, threshold_scale: f32) -> Limits {
-        let most_elements = self.budget().most_elements(self.surfaces(), &self.linked);
-        Limits::new(
-            &self.settings,
-            &self.hierarchy,
-            threshold_scale,
-            most_elements,
-        )
+        let most = self.budget().most_elements(self.surfaces(), &self.linked);
+        Limits::new(&self.settings, &self.hierarchy, threshold_scale, most)
     }
 
     fn pull(&mut self) {
@@ -305,15 +286,10 @@ impl Solver {
 
     /// Where nothing else divides them, divide elements over which the light of the last step bends.
     fn adapt_to_linked(&mut self, threshold_scale: f32) {
-        if !self.plan.follows_light {
-            return;
-        }
-        let (limits, mean) = (self.limits(threshold_scale), self.mean_irradiance);
-        let wanted = vertices::bent_under(&self.hierarchy, &self.leaves, limits, mean);
-        let fits = self.hierarchy.mesh.fits(&wanted, limits.most_elements);
-        self.is_full |= !fits;
-        if fits {
-            self.hierarchy.mesh.divide(&wanted);
+        if self.plan.follows_light {
+            let (limits, mean) = (self.limits(threshold_scale), self.mean_irradiance);
+            let (hierarchy, leaves) = (&mut self.hierarchy, &self.leaves);
+            self.is_full |= !vertices::divide_bent(hierarchy, leaves, limits, mean);
             self.extend_to_new_elements();
         }
     }
@@ -416,9 +392,6 @@ impl Solver {
 
     /// By what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
     fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<Vec<Vec4>> {
-        if self.rays.is_clear() {
-            return Some(Vec::new());
-        }
         let tolerance = threshold_scale * self.settings.tolerance;
         let gather = FinalGather {
             surfaces: self.surfaces(),

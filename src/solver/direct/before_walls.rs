@@ -38,6 +38,7 @@ impl DirectField {
     ) -> Option<u64> {
         let count = hierarchy.mesh.vertices.len();
         self.offsets.looked_at.resize(count, u32::MAX);
+        // Look for a place before the wall, for each dark vertex beside light.
         let found: Vec<(u32, u32, (Option<Moved>, u64))> = self
             .dark_beside_light(hierarchy)
             .into_par_iter()
@@ -50,6 +51,7 @@ impl DirectField {
             })
             .collect();
         cancel.proceed()?;
+        // Take these places over.
         let mut shot = 0;
         let mut is_new = vec![false; count];
         for (vertex, leaf, (moved, rays)) in found {
@@ -64,6 +66,7 @@ impl DirectField {
         if !is_new.contains(&true) {
             return Some(shot);
         }
+        // Sample there.
         let all = 0..hierarchy.mesh.elements.len();
         let receivers = self.receivers(hierarchy, all, |vertex, _| is_new[vertex]);
         let (samples, seed) = (limits.shadow_samples, limits.seed);

@@ -19,10 +19,28 @@ use crate::{
     },
 };
 
+/// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
+/// comes soon; the first step shoots the others.
+const FIRST_RAYS: usize = 1 << 20;
+
 /// Share of the shadow rays that is shot first.
 const PROBING_SHARE: f32 = 0.25;
 
 impl DirectField {
+    /// Sample the corners of leaves for the first picture, by `samples` rays or fewer where there are many. Returns the rays
+    /// shot; `None` when cancelled.
+    pub(crate) fn cover_first(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        samples: u32,
+        seed: u64,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let most = (FIRST_RAYS / hierarchy.mesh.vertices.len().max(1)).max(1);
+        self.cover(rays, hierarchy, samples.min(most as u32), seed, cancel)
+    }
+
     /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.
     ///
     /// A share of the rays comes first. Where those of all other vertices of the same elements agree there is no shadow
@@ -46,6 +64,7 @@ impl DirectField {
         if elements.is_empty() {
             return Some(0);
         }
+        // The vertices that have not had so many rays; of new ones, what is expected.
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
         let is_due = |_, light: Option<DirectLight>| light.is_none_or(|had| had.tried < samples);
         let receivers = self.receivers(hierarchy, elements.clone(), is_due);
@@ -60,6 +79,7 @@ impl DirectField {
                 self.vertices[vertex] = Some(DirectLight::expected(expected));
             }
         }
+        // A share of the rays, and the others where these disagree.
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, probing, seed, cancel);
         let disputed = self.disputed(&self.neighbours(hierarchy, elements.clone()));
@@ -73,6 +93,7 @@ impl DirectField {
             self.forget(&receivers);
             return None;
         }
+        // All are sampled.
         self.covered = elements.end;
         self.samples = self.samples.max(samples);
         Some(self.shot(&receivers) - before)

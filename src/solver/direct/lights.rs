@@ -190,6 +190,7 @@ impl Lights {
         strata.clear();
         strata.extend(samples.map(|sample| (low_discrepancy_1d(sample, scramble), sample)));
         strata.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        // Shoot them, each to an emitter of the part of the cut that it falls on.
         let (mut target, mut bundle) = (usize::MAX, Bundle::default());
         let mut outcomes = Outcomes::default();
         for &(at, sample) in &*strata {

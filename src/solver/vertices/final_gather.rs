@@ -135,7 +135,7 @@ pub(crate) struct FinalGather<'a> {
 
 /// What a final gather finds.
 pub(crate) struct Gathering {
-    /// By vertex, what linked light is to be multiplied by.
+    /// By vertex, what linked light is to be multiplied by; empty for 1.
     pub factors: Vec<Vec4>,
     /// Rays shot.
     pub ray_count: u64,
@@ -147,8 +147,14 @@ pub(crate) fn settled_change(tolerance: f32, mean_irradiance: f32) -> f32 {
 }
 
 impl FinalGather<'_> {
-    /// Find by what linked light at vertices is to be multiplied; `None` when cancelled.
+    /// Find by what linked light at vertices is to be multiplied; `None` when cancelled. Where nothing blocks, links tell all.
     pub(crate) fn run(self) -> Option<Gathering> {
+        if self.rays.is_clear() {
+            return Some(Gathering {
+                factors: Vec::new(),
+                ray_count: 0,
+            });
+        }
         let hierarchy = self.surfaces.hierarchy;
         // Light at vertices as links and shadow rays tell it.
         let linked = VertexMeans::new(hierarchy, self.leaves, &[]).irradiance;

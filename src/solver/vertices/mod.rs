@@ -6,4 +6,4 @@ mod reconstruct;
 
 pub(crate) use final_gather::{FinalGather, settled_change};
 pub(crate) use reconstruct::{LeafLight, VertexMeans, link_irradiance, own_irradiance};
-pub(crate) use reconstruct::{bent_under, gather_leaves};
+pub(crate) use reconstruct::{divide_bent, gather_leaves};

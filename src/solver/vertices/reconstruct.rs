@@ -379,13 +379,14 @@ impl VertexMeans {
     }
 }
 
-/// Leaves between whose corners the light that they found over links bends, as [`DirectField::adapt`] has it.
-pub(crate) fn bent_under(
-    hierarchy: &Hierarchy,
+/// Divide leaves between whose corners the light that they found over links bends, as direct light may. Returns whether there
+/// was room: else none is divided.
+pub(crate) fn divide_bent(
+    hierarchy: &mut Hierarchy,
     found: &[LeafLight],
     limits: Limits,
     mean: f32,
-) -> Vec<u32> {
+) -> bool {
     let is_bent = |light: &LeafLight| {
         let element = &hierarchy.mesh.elements[light.element as usize];
         let corners = light.corners.map(luminance);
@@ -396,5 +397,10 @@ pub(crate) fn bent_under(
             && (bend + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
     };
     let bent = found.iter().filter(|light| is_bent(light));
-    bent.map(|light| light.element).collect()
+    let wanted: Vec<u32> = bent.map(|light| light.element).collect();
+    let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
+    if fits {
+        hierarchy.mesh.divide(&wanted);
+    }
+    fits
 }

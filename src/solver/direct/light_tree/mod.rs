@@ -147,6 +147,7 @@ impl LightTree {
             until += luminance(irradiance);
             cut.push(Arriving { until, target });
         };
+        // From the root down, past nodes that give nothing: as one where the error does not count, as a panel, or each emitter.
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             let index = at;
