@@ -8,7 +8,7 @@ use common::assert_close;
 use glam::{DVec3, Vec3};
 use vecrad::{
     scene::{Material, SceneBuilder, Sides},
-    solver::SolveSettings,
+    solver::{Direct, SolveSettings},
 };
 
 /// Emitted radiance of the lamps, and their area.
@@ -33,9 +33,28 @@ fn hall(reflectance: f32) -> SceneBuilder {
     builder
 }
 
-/// Absorbed over emitted power.
-fn absorbed(reflectance: f32) -> f64 {
-    let snapshot = solved(hall(reflectance), Sides::One, SolveSettings::normal());
+/// A low room of walls and a lamp that reflect half of the light, the lamp small and just under the ceiling.
+fn low_room() -> SceneBuilder {
+    let mut builder = SceneBuilder::default();
+    let walls = Material::plain("wall", Vec3::splat(0.5), Vec3::ZERO);
+    let lamp = Material::plain("lamp", Vec3::splat(0.5), Vec3::splat(RADIANCE));
+    let [walls, lamp] = [walls, lamp].map(|material| builder.push_material(material));
+    let high = DVec3::new(10.0, 10.0, 3.0);
+    cuboid(&mut builder, DVec3::ZERO, high, true, walls);
+    let corners = [(4.75, 4.75), (4.75, 5.25), (5.25, 5.25), (5.25, 4.75)];
+    let first = corners.map(|(x, y)| builder.push_vertex(DVec3::new(x, y, 2.98)))[0];
+    builder.push_triangle([first, first + 1, first + 2], lamp);
+    builder.push_triangle([first, first + 2, first + 3], lamp);
+    builder
+}
+
+/// Absorbed power, where `absorptance` tells the share of what arrives about a point that stays there.
+fn absorbed(
+    builder: SceneBuilder,
+    settings: SolveSettings,
+    absorptance: impl Fn(DVec3) -> f64,
+) -> f64 {
+    let snapshot = solved(builder, Sides::One, settings);
     let (mesh, light) = (&snapshot.mesh, &snapshot.light);
     let mut absorbed = 0.0;
     for vertices in &mesh.indices {
@@ -44,21 +63,32 @@ fn absorbed(reflectance: f32) -> f64 {
             .cross(corners[2] - corners[0])
             .length()
             * 0.5;
-        let is_lamp = corners
-            .iter()
-            .all(|p| p.x.abs() < 0.6 && (p.y - 12.15).abs() < 0.2);
-        let share = if is_lamp { 1.0 } else { 1.0 - reflectance };
         let received = vertices.map(|vertex| light.irradiance[vertex as usize].x);
-        absorbed += f64::from(received.iter().sum::<f32>() / 3.0 * share) * area;
+        let share = absorptance(corners.iter().sum::<DVec3>() / 3.0);
+        absorbed += f64::from(received.iter().sum::<f32>() / 3.0) * share * area;
     }
-    absorbed / (f64::from(std::f32::consts::PI * RADIANCE) * LAMP_AREA)
+    absorbed
+}
+
+/// Power that lamps of an area emit.
+fn emitted(area: f64) -> f64 {
+    f64::from(std::f32::consts::PI * RADIANCE) * area
 }
 
 #[test]
 fn closed_rooms_absorb_what_is_emitted() {
     // Measured 0.9998 and 1.0011. Where links are balanced for receivers alone, it is 0.9976 and 0.9960.
     for reflectance in [0.3, 0.7] {
-        let share = absorbed(reflectance);
+        let is_lamp = |p: DVec3| p.x.abs() < 0.6 && (p.y - 12.15).abs() < 0.2;
+        let absorptance = |p| {
+            if is_lamp(p) {
+                1.0
+            } else {
+                f64::from(1.0 - reflectance)
+            }
+        };
+        let found = absorbed(hall(reflectance), SolveSettings::normal(), absorptance);
+        let share = found / emitted(LAMP_AREA);
         assert_close(
             share,
             1.0,
@@ -66,4 +96,16 @@ fn closed_rooms_absorb_what_is_emitted() {
             format_args!("reflectance {reflectance}"),
         );
     }
+}
+
+/// Few of the rays of the final gather meet a lamp that fills a thousandth of the view: what they miss is not missing.
+#[test]
+fn light_of_a_small_lamp_is_not_lost_where_links_carry_it() {
+    let settings = SolveSettings {
+        direct: Direct::Linked,
+        ..SolveSettings::normal()
+    };
+    // Measured MEASURED. Where rays are believed that all missed the lamp, it is 0.92.
+    let share = absorbed(low_room(), settings, |_| 0.5) / emitted(0.25);
+    assert_close(share, 1.0, 6e-3, "linked");
 }

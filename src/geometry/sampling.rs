@@ -171,6 +171,25 @@ mod tests {
     }
 
     #[test]
+    fn each_part_of_a_line_has_one_of_as_many_points() {
+        for scramble in [0, 1, 0xdead_beef] {
+            for count in [2_u32, 8, 64, 1024] {
+                for first in [0, count, 5 * count] {
+                    let mut parts: Vec<u32> = (first..first + count)
+                        .map(|index| {
+                            let at = low_discrepancy_1d(index, scramble);
+                            assert!((0.0..1.0).contains(&at));
+                            (at * count as f32) as u32
+                        })
+                        .collect();
+                    parts.sort_unstable();
+                    assert!(parts.into_iter().eq(0..count), "{count} from {first}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn random_numbers_are_uniform() {
         let mut random = Random::new(1, 2);
         let mut bins = [0_u32; 16];

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Snapshot, SolveSettings, StepReport,
+    Cancel, Direct, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, Closures},
     direct::{self, DirectField, Lights, Surfaces},
@@ -24,6 +24,7 @@ use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, SheetSides},
     scene::{ActiveMaterials, Appearance, Scene},
+    transport::Kernel,
 };
 
 /// A solve in progress.
@@ -390,12 +391,32 @@ impl Solver {
         Some(())
     }
 
+    /// As [`Self::gather_for_leaves`], of the square of the luminance.
+    fn gather_squares(&self, cancel: &Cancel) -> Option<Vec<LeafLight>> {
+        let tables = self.linked.squares(&self.hierarchy);
+        let kernel = Kernel {
+            tables: &tables,
+            ..self
+                .linked
+                .kernel(&self.hierarchy, self.settings.method.reading())
+        };
+        let none = OffsetPlaces::default();
+        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
+        let (links, closures) = (&self.linked.links, &self.closures);
+        vertices::gather_leaves(kernel, links, closures, offsets, false, cancel)
+    }
+
     /// By what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
     fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<Vec<Vec4>> {
         let tolerance = threshold_scale * self.settings.tolerance;
+        let squares = match self.settings.direct {
+            Direct::Linked => self.gather_squares(cancel)?,
+            Direct::Sampled => Vec::new(),
+        };
         let gather = FinalGather {
             surfaces: self.surfaces(),
             leaves: &self.leaves,
+            squares: &squares,
             rays: &self.rays,
             limits: self.limits(threshold_scale),
             settled: vertices::settled_change(tolerance, self.mean_irradiance),

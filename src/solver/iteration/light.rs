@@ -65,6 +65,16 @@ impl LinkedLight {
         }
     }
 
+    /// Tables of the square of the luminance that is sent: gathered over links, they tell how much rays to the same sources differ.
+    pub(crate) fn squares(&self, hierarchy: &Hierarchy) -> Tables {
+        let mut squares = Tables::default();
+        squares.pull(hierarchy, |leaf| {
+            let sent = self.power.elements[leaf];
+            Vec3::splat(luminance(sent).powi(2)).extend(sent.w)
+        });
+        squares
+    }
+
     /// Mean irradiance (luminance), to which thresholds relate. Before any link it is guessed from the direct light.
     pub(crate) fn mean_irradiance(&self, surfaces: Surfaces<'_>) -> f32 {
         let hierarchy = surfaces.hierarchy;

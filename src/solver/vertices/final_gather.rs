@@ -104,6 +104,8 @@ struct Look {
     all: f32,
     /// Root of the vertex's share of the area.
     weight: f32,
+    /// Variance of the luminance that one ray meets, as links tell it; 0 where they carry no emission.
+    variance: f32,
     met: Vec<Met>,
     found: Gathered,
 }
@@ -111,7 +113,7 @@ struct Look {
 impl Look {
     /// Whether noise of what was found would show.
     fn is_noisy(&self, limits: Limits) -> bool {
-        let (_, variance) = self.found.gap(self.linked);
+        let (_, variance) = self.found.gap(self.linked, self.variance);
         limits.is_noise_seen(variance.sqrt(), self.all, self.weight)
     }
 }
@@ -123,6 +125,9 @@ pub(crate) struct FinalGather<'a> {
     pub surfaces: Surfaces<'a>,
     /// What leaves found over links.
     pub leaves: &'a [LeafLight],
+    /// The same for the square of the luminance, where links carry emission: a few rays do not find a small lamp, and only links
+    /// tell how much it counts. Empty elsewhere.
+    pub squares: &'a [LeafLight],
     /// What blocks.
     pub rays: &'a RayTree,
     /// Which noise shows.
@@ -213,7 +218,7 @@ impl FinalGather<'_> {
             self.cancel.proceed()?;
             let mut ratios = vec![None; mesh.vertices.len()];
             for look in &*looks {
-                ratios[look.vertex] = Some(look.found.over(look.linked));
+                ratios[look.vertex] = Some(look.found.over(look.linked, look.variance));
             }
             let mut factors = factors(ratios, edges);
             carry_over(mesh, tells, &mut factors);
@@ -238,6 +243,7 @@ impl FinalGather<'_> {
         let mesh = &hierarchy.mesh;
         let weights = vertex_share_roots(hierarchy);
         let emitted = emitted_as_irradiance(hierarchy);
+        let squares = VertexMeans::new(hierarchy, self.squares, &[]).irradiance;
         let look = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
             let direct = match direct {
@@ -246,12 +252,14 @@ impl FinalGather<'_> {
             };
             let all = luminance(linked + direct);
             let leaving = all + emitted[vertex as usize];
+            let square = luminance(squares[vertex as usize]);
             (luminance(linked) > LEAST_INDIRECT * leaving).then(|| Look {
                 vertex: vertex as usize,
                 place,
                 linked,
                 all,
                 weight: weights[vertex as usize],
+                variance: (square - luminance(linked).powi(2)).max(0.0),
                 met: Vec::new(),
                 found: Gathered::default(),
             })
@@ -381,7 +389,7 @@ fn in_corners(
     // Gap, its variance, and how many.
     let mut own = vec![(0.0f32, 0.0f32, 0.0f32); vertex_count];
     for look in looks {
-        let (gap, variance) = look.found.gap(look.linked);
+        let (gap, variance) = look.found.gap(look.linked, look.variance);
         own[look.vertex] = (gap, variance, 1.0);
     }
     let mut pooled = own.clone();

@@ -52,17 +52,18 @@ impl Gathered {
     }
 
     /// By how much more luminance was found than is linked, and the square of its standard error: as if the rays were
-    /// independent and one more had been off by all that is linked, so that rays which all meet the dark prove nothing.
-    pub(super) fn gap(&self, linked: Vec4) -> (f32, f32) {
+    /// independent and one more had been off by all that is linked, so that rays which all meet the dark prove nothing. Rays differ
+    /// by no less than links know, which say what the `variance` of one is at least.
+    pub(super) fn gap(&self, linked: Vec4, variance: f32) -> (f32, f32) {
         let (count, linked) = (self.rays.max(1) as f32, luminance(linked));
         let mean = luminance(self.mean());
-        let spread = (self.squares - count * mean * mean).max(0.0);
+        let spread = (self.squares - count * mean * mean).max(count * variance);
         (mean - linked, (spread + linked * linked) / (count * count))
     }
 
     /// What was found over what is linked.
-    pub(super) fn over(&self, linked: Vec4) -> Ratio {
-        let (_, variance) = self.gap(linked);
+    pub(super) fn over(&self, linked: Vec4, variance: f32) -> Ratio {
+        let (_, variance) = self.gap(linked, variance);
         let rays = self.rays.max(1) as f32;
         let ratio = self.mean() / linked.max(Vec4::splat(f32::MIN_POSITIVE));
         let unit = luminance(linked).max(f32::MIN_POSITIVE).powi(-2);
@@ -206,7 +207,7 @@ mod tests {
             let seen = met[ray as usize % met.len()];
             found.count(Some(Vec3::splat(seen).extend(0.0)));
         }
-        found.over(linked)
+        found.over(linked, 0.0)
     }
 
     /// Factors of vertices in a row, each joined with the next twice as over inner edges.
