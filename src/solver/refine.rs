@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    hierarchy::{Hierarchy, luminance},
+    hierarchy::{Channels as _, Hierarchy, luminance},
     transport::{
         Estimate, Judge, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement, Refiner,
     },
@@ -221,7 +221,7 @@ impl Refining<'_> {
         let Some(deviation) = self.painted.deviation(surfaces.hierarchy, leaf) else {
             return 0.0;
         };
-        let reflected = deviation.reflectance * linked.total(surfaces, leaf).truncate();
+        let reflected = deviation.reflectance * linked.total(surfaces, leaf).color();
         let emitted = match surfaces.is_sampled(leaf) {
             true => Vec3::ZERO,
             false => deviation.emission * PI,

@@ -155,12 +155,12 @@ impl Relighting {
         Some(self.solved.as_ref()?.leaves_under(linked))
     }
 
-    /// All leaves have gathered the present light, or not.
+    /// Note whether all leaves have gathered the present light.
     pub(super) fn set_solved(&mut self, is_solved: bool) {
         self.is_solved = is_solved;
     }
 
-    /// All leaves have gathered the present light anew.
+    /// Note that all leaves have gathered the present light anew: nothing is scaled from the light before.
     pub(super) fn forget_solved(&mut self) {
         self.solved = None;
         self.is_solved = true;

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec4};
 use rayon::prelude::*;
 
-use crate::hierarchy::{Hierarchy, luminance};
+use crate::hierarchy::{Channels as _, Hierarchy, luminance};
 
 /// Values that one task sums. It sets the order of sums, so it must not depend on the number of threads.
 const CHUNK: usize = 4096;
@@ -28,7 +28,7 @@ pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync)
             return DVec3::ZERO;
         }
         let area = f64::from(elements[index].area_vector.length());
-        of(index).truncate().as_dvec3() * area
+        of(index).color().as_dvec3() * area
     })
 }
 

@@ -116,6 +116,7 @@ impl Judge<'_> {
     fn can_face(&self, from: NodeId, to: NodeId) -> bool {
         let hierarchy = self.hierarchy();
         match hierarchy.kind(from) {
+            // Some corner of the other node, or of its box, must stand above the plane of the element.
             Kind::Element(index) => {
                 let element = &hierarchy.mesh.elements[index];
                 let normal = hierarchy.patch_of(index).normal;
@@ -139,6 +140,7 @@ impl Judge<'_> {
                     }
                 }
             }
+            // Along some axis the cluster must show area towards a part of the other node's box.
             Kind::Cluster(index) => {
                 let cluster = &hierarchy.clusters[index];
                 let (min, max) = hierarchy.bounds(to);

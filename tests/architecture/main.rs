@@ -319,10 +319,27 @@ fn no_files_of_a_room_import_each_other_in_a_circle() {
     let modules = sources()
         .into_iter()
         .map(|(path, source)| (module_of(&path), source));
-    let imports = sibling_imports(&modules.collect());
+    let modules: BTreeMap<ModulePath, String> = modules.collect();
+    let imports = sibling_imports(&modules);
     assert!(imports.len() > 10, "the parser finds imports");
     let found = tangles(&imports, &ORDERED_CHILDREN);
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn an_order_names_all_children_of_its_module() {
+    for (name, order) in ORDERED_CHILDREN {
+        let parent: ModulePath = name.split("::").map(str::to_owned).collect();
+        let paths = sources().into_keys().map(|path| module_of(&path));
+        let mut children: Vec<String> = paths
+            .filter(|module| module.len() > parent.len() && module.starts_with(&parent))
+            .map(|module| module[parent.len()].clone())
+            .collect();
+        children.dedup();
+        let mut order = order.to_vec();
+        order.sort_unstable();
+        assert_eq!(children, order, "{name}");
+    }
 }
 
 #[test]

@@ -289,7 +289,7 @@ mod tests {
             let light = (radiosity * row).extend(row);
             let scaled = closure.scaled(light, (1.0, row), radiosity);
             let expected = radiosity * row * closure.factor(row);
-            assert!((scaled.truncate() - expected).abs().max_element() < 1e-5);
+            assert!((scaled.color() - expected).abs().max_element() < 1e-5);
             assert_eq!(scaled.form_factor_sum(), row);
         }
     }
@@ -303,7 +303,7 @@ mod tests {
             let light = (seen * row).extend(row);
             let whole = Closure::CLOSED.scaled(light, (1.0, row), nearby);
             let luminance = |color: Vec3| luminance(color.extend(0.0));
-            let lacking = luminance(whole.truncate() - seen * row) / (1.0 - row).max(1e-6);
+            let lacking = luminance(whole.color() - seen * row) / (1.0 - row).max(1e-6);
             let least = luminance(seen).min(luminance(nearby));
             assert!(
                 (lacking - least).abs() < 1e-3 || row > 0.999,

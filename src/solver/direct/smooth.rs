@@ -8,7 +8,10 @@
 use glam::Vec4;
 
 use super::samples::DirectLight;
-use crate::{hierarchy::Hierarchy, solver::places::agreement};
+use crate::{
+    hierarchy::{Channels as _, Hierarchy},
+    solver::places::agreement,
+};
 
 /// Rounds of averaging. None leaves visible grain, many widen narrow penumbrae and draw their borders as saw teeth.
 const ROUNDS: u32 = 1;
@@ -40,7 +43,7 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
                 let color = light.fraction();
                 Fraction {
                     color,
-                    mean: color.truncate().element_sum() / 3.0,
+                    mean: color.color().element_sum() / 3.0,
                     variance: light.fraction_doubt().powi(2),
                     is_mixed: light.tally().is_mixed(),
                 }
@@ -91,7 +94,7 @@ fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
         .zip(next)
         .map(|(fraction, color)| Fraction {
             color,
-            mean: color.truncate().element_sum() / 3.0,
+            mean: color.color().element_sum() / 3.0,
             ..*fraction
         })
         .collect()

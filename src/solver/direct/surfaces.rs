@@ -6,7 +6,10 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::field::DirectField;
-use crate::{hierarchy::Hierarchy, solver::sums::ordered_sum};
+use crate::{
+    hierarchy::{Channels as _, Hierarchy},
+    solver::sums::ordered_sum,
+};
 
 /// The elements with the light that falls on them straight from emitters: what stays as it is while light is exchanged over
 /// links.
@@ -60,7 +63,7 @@ impl<'a> Surfaces<'a> {
         if self.hierarchy.mesh.elements[element].is_inside_solid() {
             return Vec4::ZERO;
         }
-        let reflected = self.hierarchy.reflectance_of(element) * irradiance.truncate();
+        let reflected = self.hierarchy.reflectance_of(element) * irradiance.color();
         let emitted = if self.is_sampled(element) {
             Vec3::ZERO
         } else {

@@ -53,8 +53,8 @@ impl Anderson {
     /// The next iterate from the present one and its image; not negative, and with the image's fourth channel.
     /// `weights` are the shares by which squares are summed.
     pub(crate) fn next(&mut self, weights: &[f32], at: &[Vec4], image: &[Vec4]) -> Vec<Vec4> {
-        let residual = map(image, at, |image, at| (image - at).truncate());
-        let image_colors: Vec<Vec3> = image.par_iter().map(|image| image.truncate()).collect();
+        let residual = map(image, at, |image, at| (image - at).color());
+        let image_colors: Vec<Vec3> = image.par_iter().map(|image| image.color()).collect();
         if let Some((last_residual, last_image)) = &self.last
             && self.depth > 0
         {
@@ -72,14 +72,14 @@ impl Anderson {
             .par_iter()
             .enumerate()
             .map(|(index, image)| {
-                let mut color = image.truncate();
+                let mut color = image.color();
                 for (change, share) in self.changes.iter().zip(&shares) {
                     color -= change.image[index] * *share;
                 }
                 let color = if color.is_finite() {
                     color.max(Vec3::ZERO)
                 } else {
-                    image.truncate()
+                    image.color()
                 };
                 color.extend(image.unit_response())
             })
@@ -227,7 +227,7 @@ mod tests {
             let error = at
                 .iter()
                 .zip(expected)
-                .map(|(x, e)| (x.truncate() / *e - 1.0).abs().max_element())
+                .map(|(x, e)| (x.color() / *e - 1.0).abs().max_element())
                 .fold(0.0, f32::max);
             if error < 1e-3 {
                 return (sweep, error);

@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec4};
 
 use crate::{
-    hierarchy::{Hierarchy, Reading, Tables, luminance},
+    hierarchy::{Channels as _, Hierarchy, Reading, Tables, luminance},
     solver::{direct::Surfaces, sums},
     transport::{Kernel, LinkStore},
 };
@@ -79,7 +79,7 @@ impl LinkedLight {
     pub(crate) fn mean_irradiance(&self, surfaces: Surfaces<'_>) -> f32 {
         let hierarchy = surfaces.hierarchy;
         let mean = sums::scale(hierarchy, |leaf| self.total(surfaces, leaf));
-        let is_dark = |light: &Vec4| light.truncate() == Vec3::ZERO;
+        let is_dark = |light: &Vec4| light.color() == Vec3::ZERO;
         if !self.irradiance.iter().all(is_dark) {
             return mean;
         }

@@ -299,6 +299,6 @@ pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: 
 /// A colour that is safe to show: finite and not negative.
 fn displayable(color: Vec4) -> Vec3 {
     color
-        .truncate()
+        .color()
         .map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
 }

@@ -6,7 +6,10 @@
 
 use glam::Vec4;
 
-use crate::{solver::places::agreement, transport::luminance};
+use crate::{
+    hierarchy::{Channels as _, luminance},
+    solver::places::agreement,
+};
 
 /// Standard errors of their difference by which neighbours may differ to be pooled by half. Smaller leaves grain, larger
 /// blurs.
@@ -88,7 +91,7 @@ pub(super) struct Ratio {
 
 impl Ratio {
     fn mean(&self) -> f32 {
-        self.color.truncate().element_sum() / 3.0
+        self.color.color().element_sum() / 3.0
     }
 
     /// Square of the standard error.

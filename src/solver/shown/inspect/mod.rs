@@ -57,7 +57,7 @@ impl<'a> Inspector<'a> {
             Kind::Element(leaf) => {
                 let light: Vec3 = links.iter().map(|link| link.irradiance).sum();
                 (
-                    self.surfaces.direct(leaf).truncate(),
+                    self.surfaces.direct(leaf).color(),
                     self.closure_scale(leaf, light.extend(row_sum)),
                 )
             }
@@ -155,7 +155,7 @@ impl<'a> Inspector<'a> {
                     source: self.place(link.source),
                     receiver: place,
                     visibility: link.light_factor(),
-                    irradiance: share.truncate(),
+                    irradiance: share.color(),
                     form_factor: share.form_factor_sum(),
                     error: link.error,
                 });
@@ -183,7 +183,7 @@ impl<'a> Inspector<'a> {
         let patch = elements[leaf].patch as usize;
         let nearby = self.closures.nearby(&self.linked.power, patch);
         let scaled = self.closures.of(cell).scaled(light, sums, nearby);
-        let ratio = (scaled / light).truncate();
+        let ratio = (scaled / light).color();
         Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }
 

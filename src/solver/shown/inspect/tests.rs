@@ -41,7 +41,7 @@ fn links_of_a_leaf_add_to_the_light_that_is_shown() {
     assert!(solver.leaves.len() > 100);
     for light in solver.leaves.iter().step_by(7) {
         let inspection = inspect_leaf(&solver, light.element as usize);
-        let expected = light.centre.truncate();
+        let expected = light.centre.color();
         // Sums of some hundred terms in another order.
         let slack = 1e-3 * expected.max_element() + 1e-9;
         assert!(
