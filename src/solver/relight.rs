@@ -1,15 +1,34 @@
-//! The light of changed emitters and materials, solved anew on the links that there are (see `relighting`).
+//! What is made of the links that there are, without a step: the light of changed emitters and materials (see `relighting`),
+//! and the final gather before its time.
 
 use std::sync::Arc;
 
 use super::{
     Cancel, Relit, Solver, StepReport,
     direct::{Shooting, Surfaces},
-    relighting, shown,
+    relighting,
+    schedule::threshold_scale,
+    shown,
 };
 use crate::scene::Appearance;
 
 impl Solver {
+    /// Find the light at the vertices by the final gather, as the last step does, on the links that there are: where no further
+    /// step can end in time. The report is that of the last step once more. `None` when cancelled on the way; the light is then
+    /// that of the last step.
+    pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        let scale = threshold_scale(self.step, self.settings.step_count());
+        let found = self.final_gather(scale, cancel)?;
+        let before = std::mem::replace(&mut self.vertex_factors, found);
+        let mut report = self.relighting.last_report();
+        self.fill(&mut report);
+        if self.show(self.step, cancel).is_none() {
+            self.vertex_factors = before;
+            return None;
+        }
+        Some(report)
+    }
+
     /// Light the scene with materials that look so, one for each: see [`Scene::allowed`](crate::scene::Scene::allowed). On
     /// the links, elements and closures that there are; a step that follows refines them. Returns `None` when cancelled on
     /// the way: to be asked for again before the next step.

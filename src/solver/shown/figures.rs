@@ -30,6 +30,13 @@ pub(crate) fn fill(
     fill_row_sums(report, hierarchy, linked);
 }
 
+/// Say that the memory limit kept the step from being finer.
+pub(crate) fn note_full(report: &mut StepReport) {
+    report.is_full = true;
+    let note = "the memory limit is reached; refinement stops here with what fits";
+    report.notes.push(note.to_owned());
+}
+
 /// Power that arrives at all leaves relative to power that left: emission and reflection.
 fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let hierarchy = surfaces.hierarchy;
