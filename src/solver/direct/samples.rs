@@ -259,3 +259,64 @@ impl DirectLight {
         luminance(self.exact) * self.fraction_variance().sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Random;
+
+    /// What rays find one after the other.
+    fn tally(outcomes: impl Iterator<Item = bool>) -> Tally {
+        let (mut tally, mut changes) = (Tally::default(), Outcomes::default());
+        for is_visible in outcomes {
+            tally.shot += 1;
+            tally.visible += u32::from(is_visible);
+            changes.count(is_visible);
+        }
+        tally.changes = changes.changes();
+        tally
+    }
+
+    #[test]
+    fn noise_of_rays_that_strata_do_not_tell_apart_is_that_of_independent_ones() {
+        let mut random = Random::new(1, 0);
+        for part in [0.1, 0.5, 0.8] {
+            let variance = tally((0..20_000).map(|_| random.uniform() < part)).variance(0.0);
+            let expected = part * (1.0 - part);
+            assert!(
+                (variance / expected - 1.0).abs() < 0.05,
+                "{variance} for {part}"
+            );
+        }
+    }
+
+    #[test]
+    fn noise_within_strata_is_estimated_and_not_that_among_them() {
+        const STRATA: u32 = 32;
+        let mut random = Random::new(2, 0);
+        let (mut error, mut estimate) = (0.0, 0.0);
+        const TRIALS: u32 = 4000;
+        for _ in 0..TRIALS {
+            // A shadow that covers the light from one place to another.
+            let ends = [0.1, 0.6].map(|end| end + 0.2 * random.uniform());
+            let is_visible = |stratum: u32| {
+                let at = (stratum as f32 + random.uniform()) / STRATA as f32;
+                at < ends[0] || at > ends[1]
+            };
+            let tally = tally((0..STRATA).map(is_visible));
+            let expected = 1.0 - (ends[1] - ends[0]);
+            error += (tally.fraction() - expected).powi(2);
+            estimate += tally.variance(0.0) / STRATA as f32;
+        }
+        // Independent rays err by seven times as much.
+        let ratio = estimate / error;
+        assert!((1.0..4.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn rays_that_alternate_are_no_noisier_than_independent_ones() {
+        assert_eq!(tally((0..64).map(|ray| ray % 2 == 0)).variance(0.0), 0.25);
+        assert_eq!(tally([true; 16].into_iter()).variance(0.0), 0.0);
+        assert!(tally([true; 16].into_iter()).variance(1.0) > 0.0);
+    }
+}
