@@ -30,18 +30,23 @@ const TRUNCATION: f32 = 8.0;
 /// lamps in one ceiling look at each of them; larger, and surfaces just before an emitter stay dark.
 const RESOLUTION: f32 = 1e-5;
 
-/// Moments of the light of some emitters.
+/// The light of some emitters from afar.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Multipole {
+    pub(super) extent: Extent,
+    pub(super) expansion: Expansion,
+}
+
+/// Where some emitters are and how they face: all that most nodes of a tree are asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Extent {
     /// Centre of the power (luminance).
-    pub(super) centre: Vec3,
+    centre: Vec3,
     /// Radius of a sphere about the centre that holds all emitters.
     radius: f32,
     /// Luminance of the power.
-    pub(crate) power: f32,
-    /// Mean of `e eᵀ` over the power (luminance), with e the place relative to the centre.
-    second: Mat3,
-    /// Root of the mean of `|e|²`.
+    pub(super) power: f32,
+    /// Root of the mean of `|e|²` over the power (luminance), with e the place relative to the centre.
     spread: f32,
     /// Normals differ from this one by no more than the angle, radians; π where it says nothing.
     axis: Vec3,
@@ -50,6 +55,13 @@ pub(super) struct Multipole {
     sin_cos: (f32, f32),
     /// How far emitters lie from the plane through the centre that the axis is normal to, at most.
     thickness: f32,
+}
+
+/// Moments of the light of some emitters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expansion {
+    /// Mean of `e eᵀ` over the power (luminance), with e the place relative to the centre.
+    second: Mat3,
     /// Moments of `B S`.
     directional: Moments<Vec4>,
     /// `Σ B S_a e_b`.
@@ -79,61 +91,74 @@ impl Multipole {
         let second = outwards.map(|e| outer(e, e)).into_iter().sum::<Mat3>() * (1.0 / 12.0);
         let axis = emitter.normal;
         let lengths = outwards.map(Vec3::length);
-        Self {
+        let extent = Extent {
             centre,
             radius: lengths.into_iter().fold(0.0, f32::max),
             power: luminance(emitter.radiosity) * emitter.area,
-            second,
             spread: trace(&second).sqrt(),
             axis,
             angle: 0.0,
             sin_cos: (0.0, 1.0),
             thickness: 0.0,
+        };
+        let expansion = Expansion {
+            second,
             directional: Moments::of(axis * emitter.area, emitter.radiosity),
             first: [[Vec4::ZERO; 3]; 3],
-        }
+        };
+        Self { extent, expansion }
     }
 
     /// Of the emitters of both.
     pub(super) fn merged(&self, other: &Self) -> Self {
-        let power = self.power + other.power;
-        let share = match other.power / power {
+        let [one, two] = [&self.extent, &other.extent];
+        let power = one.power + two.power;
+        let share = match two.power / power {
             share if share.is_finite() => share,
             _ => 0.5,
         };
-        let centre = self.centre.lerp(other.centre, share);
-        let (axis, angle) = enclosing_cone((self.axis, self.angle), (other.axis, other.angle));
-        let mut merged = Self {
+        let centre = one.centre.lerp(two.centre, share);
+        let (axis, angle) = enclosing_cone((one.axis, one.angle), (two.axis, two.angle));
+        let mut extent = Extent {
             centre,
             radius: 0.0,
             power,
-            second: Mat3::ZERO,
             spread: 0.0,
             axis,
             angle,
             sin_cos: angle.sin_cos(),
             thickness: 0.0,
+        };
+        let mut expansion = Expansion {
+            second: Mat3::ZERO,
             directional: Moments::default(),
             first: [[Vec4::ZERO; 3]; 3],
         };
         for (part, share) in [(self, 1.0 - share), (other, share)] {
-            let shift = part.centre - centre;
-            merged.radius = merged.radius.max(part.radius + shift.length());
-            let tilt = part.radius * axis.cross(part.axis).length();
-            let thickness = part.thickness + shift.dot(axis).abs() + tilt;
-            merged.thickness = merged.thickness.max(thickness);
-            merged.second += (part.second + outer(shift, shift)) * share;
-            merged.directional.merge(&part.directional);
+            let Self {
+                extent: of,
+                expansion: part,
+            } = part;
+            let shift = of.centre - centre;
+            extent.radius = extent.radius.max(of.radius + shift.length());
+            let tilt = of.radius * axis.cross(of.axis).length();
+            let thickness = of.thickness + shift.dot(axis).abs() + tilt;
+            extent.thickness = extent.thickness.max(thickness);
+            expansion.second += (part.second + outer(shift, shift)) * share;
+            expansion.directional.merge(&part.directional);
             for a in 0..3 {
                 for b in 0..3 {
-                    merged.first[a][b] += part.first[a][b] + part.directional.linear[a] * shift[b];
+                    expansion.first[a][b] +=
+                        part.first[a][b] + part.directional.linear[a] * shift[b];
                 }
             }
         }
-        merged.spread = trace(&merged.second).sqrt();
-        merged
+        extent.spread = trace(&expansion.second).sqrt();
+        Self { extent, expansion }
     }
+}
 
+impl Extent {
     /// What a receiver sees of it; `None` where that is nothing for certain.
     pub(super) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
         let separation = self.centre - receiver.point;
@@ -171,8 +196,8 @@ impl Multipole {
         })
     }
 
-    /// How far the luminance of the irradiance may be off, about; infinite where nothing is known.
-    pub(super) fn error(&self, sight: &Sight) -> f32 {
+    /// How far the luminance of the irradiance by an expansion may be off, about; infinite where nothing is known.
+    pub(super) fn error(&self, expansion: &Expansion, sight: &Sight) -> f32 {
         let distance = sight.squared.sqrt();
         if distance <= NEAREST * self.radius {
             return f32::INFINITY;
@@ -183,7 +208,7 @@ impl Multipole {
         if sight.is_whole {
             return most * truncation;
         }
-        let (least_shown, most_shown) = self.directional.bounds(-sight.separation / distance);
+        let (least_shown, most_shown) = expansion.directional.bounds(-sight.separation / distance);
         let unknown =
             luminance(most_shown - least_shown) * sight.most_cosines[1] / (PI * sight.squared);
         // Without terms of first and second order, and cut off by the horizon.
@@ -197,8 +222,15 @@ impl Multipole {
         self.power * of_emitters * of_receiver / (PI * sight.squared)
     }
 
+    /// Whether a point is so far away that the emitters are seen about alike.
+    pub(super) fn is_far(&self, sight: &Sight) -> bool {
+        sight.squared > (2.0 * self.radius).powi(2)
+    }
+}
+
+impl Expansion {
     /// Irradiance at a receiver without occlusion.
-    pub(crate) fn irradiance(&self, sight: &Sight, normal: Vec3) -> Vec4 {
+    pub(super) fn irradiance(&self, sight: &Sight, normal: Vec3) -> Vec4 {
         let (y, height) = (sight.separation, sight.height);
         let scale = 1.0 / (PI * sight.squared * sight.squared);
         if !sight.is_whole {
@@ -223,11 +255,6 @@ impl Multipole {
                 + self.first[a][a] * height;
         }
         (-sum * scale).max(Vec4::ZERO)
-    }
-
-    /// Whether a point is so far away that the emitters are seen about alike.
-    pub(super) fn is_far(&self, sight: &Sight) -> bool {
-        sight.squared > (2.0 * self.radius).powi(2)
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{LEAF_EMITTERS, NONE, Node};
-use crate::solver::direct::{emitter::Emitter, multipole::Multipole, panel::Panel};
+use crate::solver::direct::{emitter::Emitter, multipole::Extent, panel::Panel};
 
 /// What a spread of normals counts beside one of places. Where a node is split by normals first, lamps far from each other
 /// stay together; where it is split by places alone, both sides of a sheet do.
@@ -104,14 +104,13 @@ impl<'a> Growth<'a> {
     }
 
     fn begin(&mut self) -> usize {
-        let light = Multipole::of(&self.emitters[0]);
         self.nodes.push(Node {
             start: self.order.len() as u32,
             end: 0,
             next: 0,
             panel: NONE,
             is_even: false,
-            light,
+            extent: Extent::default(),
         });
         self.nodes.len() - 1
     }
