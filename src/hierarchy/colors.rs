@@ -122,7 +122,7 @@ impl Hierarchy {
     }
 
     /// Look at the textures of some elements more closely than at their patches.
-    pub fn look_at_textures(
+    pub fn measure_textures(
         &mut self,
         scene: &Scene,
         appearances: &[Appearance],
@@ -151,7 +151,7 @@ impl Hierarchy {
         if fresh.is_empty() {
             return;
         }
-        self.look_at_textures(scene, appearances, &fresh);
+        self.measure_textures(scene, appearances, &fresh);
         self.pull_textures(scene, appearances);
     }
 

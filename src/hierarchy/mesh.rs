@@ -263,11 +263,11 @@ impl Mesh {
 
     /// The leaves for which light is computed, in order.
     pub fn active_leaves(&self) -> impl Iterator<Item = usize> + '_ {
-        self.leaves().filter(|&leaf| self.is_held(leaf))
+        self.leaves().filter(|&leaf| self.is_active(leaf))
     }
 
     /// Whether light is computed for an element.
-    pub fn is_held(&self, element: usize) -> bool {
+    pub fn is_active(&self, element: usize) -> bool {
         self.elements[element].patch < self.active_count
     }
 
@@ -295,7 +295,7 @@ impl Mesh {
             .collect();
         while let Some(index) = pending.pop() {
             let element = self.elements[index as usize];
-            if !element.is_leaf() || !self.is_held(index as usize) {
+            if !element.is_leaf() || !self.is_active(index as usize) {
                 continue;
             }
             self.divide_one(index);
@@ -436,14 +436,14 @@ impl Mesh {
 
     /// The leaves as triangles without T-junctions between those that light is computed for, each with the element that
     /// it lies on: where a neighbour divided an edge, the vertex in its middle is used on this side, too. Vertices that this side of a crease lacks are made.
-    pub fn closed_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
+    pub fn crack_free_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
         let mut triangles = Vec::with_capacity(self.elements.len());
         for index in 0..self.elements.len() {
             if !self.elements[index].is_leaf() {
                 continue;
             }
             let corners = self.elements[index].vertices;
-            if !self.is_held(index) {
+            if !self.is_active(index) {
                 // No light, and so none that could differ beside a vertex in the middle of an edge.
                 triangles.push((index as u32, corners));
                 continue;

@@ -31,7 +31,7 @@ pub(super) struct Budget {
 
 impl Budget {
     /// Bytes held in all.
-    pub(super) fn held_bytes(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
+    pub(super) fn used_bytes(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
         let own = surfaces.hierarchy.memory_bytes()
             + surfaces.direct.map_or(0, DirectField::memory_bytes)
             + linked.memory_bytes();
@@ -44,7 +44,7 @@ impl Budget {
             return u64::MAX;
         };
         let iteration = iteration_bytes(surfaces.hierarchy.mesh.elements.len()) as u64;
-        limit.saturating_sub(self.held_bytes(surfaces, linked) + iteration)
+        limit.saturating_sub(self.used_bytes(surfaces, linked) + iteration)
     }
 
     /// Links that a refinement may have while the present ones are kept.
@@ -62,6 +62,6 @@ impl Budget {
     /// Whether the limit is exceeded.
     pub(super) fn is_exceeded(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> bool {
         self.limit
-            .is_some_and(|limit| self.held_bytes(surfaces, linked) > limit)
+            .is_some_and(|limit| self.used_bytes(surfaces, linked) > limit)
     }
 }

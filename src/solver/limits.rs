@@ -56,13 +56,13 @@ impl Limits {
 
     /// Whether an error of luminance (of which the part above noise counts) is seen on an element, or about a point, of
     /// which `weight` is the root of the share of the area, beside light of luminance `beside`.
-    pub(super) fn is_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
+    pub(super) fn is_visible(&self, error: f32, beside: f32, weight: f32) -> bool {
         error * weight.sqrt() > self.contrast * beside
     }
 
-    /// As [`Self::is_seen`] for noise of a point, by its standard error.
-    pub(super) fn is_noise_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
-        self.is_seen(error / NOISE_SHARE, beside, weight)
+    /// As [`Self::is_visible`] for noise of a point, by its standard error.
+    pub(super) fn is_noise_visible(&self, error: f32, beside: f32, weight: f32) -> bool {
+        self.is_visible(error / NOISE_SHARE, beside, weight)
     }
 }
 

@@ -29,7 +29,7 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, InspectedLink, Inspection, LeftOut, PathNode, Place, Relit, Snapshot,
+    ClusterBox, DisplayMesh, InspectedLink, Inspection, Omitted, PathNode, Place, Relit, Snapshot,
     StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};

@@ -43,23 +43,23 @@ impl Keep {
     /// Nothing: all is left out that can be.
     pub const NONE: Self = Self(0);
 
-    /// Whether this is kept.
+    /// Whether this is required.
     pub const fn has(self, omission: Omission) -> bool {
         self.0 & (1 << omission as u8) != 0
     }
 }
 
 impl From<Vec<Omission>> for Keep {
-    fn from(kept: Vec<Omission>) -> Self {
+    fn from(required: Vec<Omission>) -> Self {
         let add = |bits: u8, omission: Omission| bits | (1 << omission as u8);
-        Self(kept.into_iter().fold(0, add))
+        Self(required.into_iter().fold(0, add))
     }
 }
 
 impl From<Keep> for Vec<Omission> {
     fn from(keep: Keep) -> Self {
-        let kept = Omission::ALL.into_iter();
-        kept.filter(|&omission| keep.has(omission)).collect()
+        let required = Omission::ALL.into_iter();
+        required.filter(|&omission| keep.has(omission)).collect()
     }
 }
 
@@ -69,13 +69,13 @@ mod tests {
 
     #[test]
     fn what_is_kept_survives_a_file_and_unknown_names_do_not() {
-        for kept in [vec![], vec![Omission::Rays], Omission::ALL.to_vec()] {
-            let keep = Keep::from(kept.clone());
-            assert_eq!(Vec::from(keep), kept);
+        for required in [vec![], vec![Omission::Rays], Omission::ALL.to_vec()] {
+            let keep = Keep::from(required.clone());
+            assert_eq!(Vec::from(keep), required);
             let text = serde_json::to_string(&keep).unwrap();
             assert_eq!(serde_json::from_str::<Keep>(&text).unwrap(), keep);
             for omission in Omission::ALL {
-                assert_eq!(keep.has(omission), kept.contains(&omission));
+                assert_eq!(keep.has(omission), required.contains(&omission));
             }
         }
         assert_eq!(Keep::from(Omission::ALL.to_vec()), Keep::ALL);

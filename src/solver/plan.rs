@@ -18,7 +18,7 @@
 //! * channels of grey scenes: all channels of a quantity are one vector in one register. A sweep over links between elements
 //!   takes 0.7 to 0.8 of the time with one channel, 0.6 with links packed anew for it, and all sweeps of a solve are 3 to
 //!   6 % of it: the rest is geometry, which has no colour;
-//! * links of black sources: form factors of all sources must add to the closure, and since they are judged by little light
+//! * links of black sources: form factors of all sources must add to the coverage, and since they are judged by little light
 //!   they are few, a twentieth of the links and a hundredth of the rays where the blocks or the floor of the Cornell box are
 //!   black;
 //! * tables of clusters with one normal or along the axes: a sixth of the clusters in rooms and soups at most, and so a
@@ -28,25 +28,25 @@
 
 use std::sync::Arc;
 
-use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::LeftOut};
+use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::Omitted};
 use crate::{
     hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
     scene::{ActiveMaterials, Scene},
 };
 
 /// Patches of a scene that is solved patch by patch, at most: their pairs are fewer than the links of usual scenes.
-/// Fewer, and open rooms probe closures by rays, at 160 patches for a sixth more time and a fifth more error; more, and
+/// Fewer, and open rooms probe coverage by rays, at 160 patches for a sixth more time and a fifth more error; more, and
 /// all pairs are too many: a sphere of 320 patches would take a quarter more time.
 const FEW_PATCHES: usize = 256;
 
-impl LeftOut {
+impl Omitted {
     /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
     pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
         let active = ActiveMaterials::default();
         let sheets = SheetSides::of(scene, &mut None);
         let is_cancelled = || cancel.is_cancelled();
         let (plan, _) = Plan::make(scene, sheets.as_ref(), settings, active, &is_cancelled)?;
-        Some(Arc::unwrap_or_clone(plan.left_out))
+        Some(Arc::unwrap_or_clone(plan.omitted))
     }
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Plan {
     /// Nothing blocks: there is no ray to shoot.
     pub(super) is_clear: bool,
     /// The patches fill the view of each other, so that form factors add to 1.
-    pub(super) is_closed: bool,
+    pub(super) is_enclosed: bool,
     /// Elements are divided where light bends, and nowhere else.
     pub(super) follows_light: bool,
     /// Only elements exchange light.
@@ -64,7 +64,7 @@ pub(super) struct Plan {
     /// Materials that it is made for as if they emitted or reflected.
     active: ActiveMaterials,
     /// The list.
-    pub(super) left_out: Arc<Vec<LeftOut>>,
+    pub(super) omitted: Arc<Vec<Omitted>>,
 }
 
 impl Plan {
@@ -92,12 +92,12 @@ impl Plan {
                 settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
             let has_few = tree.active_patches().len() <= FEW_PATCHES;
             plan.is_clear = true;
-            plan.is_closed = tree.is_closed(scene);
+            plan.is_enclosed = tree.is_closed(scene);
             plan.follows_light = is_exact_wanted && may_omit(Omission::Elements);
             plan.is_by_patch = is_exact_wanted && has_few && may_omit(Omission::Clusters);
             plan.note_clear(scene, &tree);
         }
-        Arc::make_mut(&mut plan.left_out).extend(left_out_by_loading(scene));
+        Arc::make_mut(&mut plan.omitted).extend(omitted_by_loading(scene));
         Some((plan, tree))
     }
 
@@ -154,15 +154,15 @@ impl Plan {
         }
         let all = self.active.joined(active);
         let side = |patch: &Patch| 2 * patch.triangle.index() + usize::from(patch.is_back);
-        let mut is_held = vec![false; 2 * scene.triangles.len()];
+        let mut is_active = vec![false; 2 * scene.triangles.len()];
         for patch in &hierarchy.patches[hierarchy.active_patches()] {
-            is_held[side(patch)] = true;
+            is_active[side(patch)] = true;
         }
         let Some(tree) = PatchTree::build(scene, None, &|| false) else {
             return false;
         };
         let mut lit = tree.lit(scene, &all).into_iter().zip(&tree.patches);
-        let holds = lit.all(|(is_lit, patch)| !is_lit || is_held[side(patch)]);
+        let holds = lit.all(|(is_lit, patch)| !is_lit || is_active[side(patch)]);
         if holds {
             self.active = all;
         }
@@ -171,8 +171,8 @@ impl Plan {
 
     /// List what is left out where nothing blocks.
     fn note_clear(&mut self, scene: &Scene, tree: &PatchTree) {
-        let (triangles, held) = (scene.triangles.len(), tree.active_patches().len());
-        let exception = if self.is_closed || self.is_by_patch {
+        let (triangles, active) = (scene.triangles.len(), tree.active_patches().len());
+        let exception = if self.is_enclosed || self.is_by_patch {
             ""
         } else {
             ", but for those that look how open the scene is"
@@ -187,8 +187,8 @@ impl Plan {
         if self.follows_light {
             self.note(
                 Omission::Elements,
-                held,
-                format!("elements of {held} patches where light does not bend, and links between them"),
+                active,
+                format!("elements of {active} patches where light does not bend, and links between them"),
                 "nothing casts a shadow, and between elements in full view form factors are known exactly",
                 "light differs by no more than the tolerances of mesh and links",
             );
@@ -215,7 +215,7 @@ impl Plan {
         reason: &str,
         bound: &'static str,
     ) {
-        Arc::make_mut(&mut self.left_out).push(LeftOut {
+        Arc::make_mut(&mut self.omitted).push(Omitted {
             name: omission.name(),
             count: count as u64,
             what,
@@ -226,7 +226,7 @@ impl Plan {
 }
 
 /// What the reader of the scene left out already.
-fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
+fn omitted_by_loading(scene: &Scene) -> Vec<Omitted> {
     // Count it.
     let backs = scene
         .triangles
@@ -266,7 +266,7 @@ fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
     ];
     let found = entries.into_iter().filter(|entry| entry.1 > 0);
     found
-        .map(|(name, count, what, reason, bound)| LeftOut {
+        .map(|(name, count, what, reason, bound)| Omitted {
             name,
             count: count as u64,
             what: format!("{count} {what}"),

@@ -16,7 +16,7 @@ impl Solver {
             surfaces: self.surfaces(),
             linked: &self.linked,
             reading: self.settings.method.reading(),
-            closures: &self.closures,
+            coverage: &self.coverage,
             leaves: &self.leaves,
             boxes: &self.snapshot.clusters,
             step: self.step,

@@ -11,7 +11,7 @@ use crate::scene::Appearance;
 
 impl Solver {
     /// Light the scene with materials that look so, one for each: see [`Scene::allowed`](crate::scene::Scene::allowed). On
-    /// the links, elements and closures that there are; a step that follows refines them. Returns `None` when cancelled on
+    /// the links, elements and coverage that there are; a step that follows refines them. Returns `None` when cancelled on
     /// the way: to be asked for again before the next step.
     pub fn relight(&mut self, wished: &[Appearance], cancel: &Cancel) -> Option<Relit> {
         cancel.proceed()?;

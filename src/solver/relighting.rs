@@ -1,6 +1,6 @@
 //! What relighting remembers: the light of changed emitters and materials is found on the links that there are.
 //!
-//! Nothing is refined or divided, and no closure is probed again. Direct light is put together from parts (see
+//! Nothing is refined or divided, and no coverage is probed again. Direct light is put together from parts (see
 //! `light_parts`). Where all that emits changes alike and nothing else does, all light is scaled with it: from the light
 //! that was solved last, so that what was switched off comes back as it was. Else the iteration begins from the light
 //! before, and corners of elements take their share as they did in the light that was solved last, until
@@ -136,7 +136,7 @@ impl Relighting {
                 cancel,
                 ..
             } = shooting;
-            shot += field.cover(rays, hierarchy, field.samples, seed, cancel)?;
+            shot += field.sample_vertices(rays, hierarchy, field.samples, seed, cancel)?;
         }
         let parts = self
             .parts

@@ -7,7 +7,7 @@ use glam::Vec4;
 use super::{
     Cancel, Direct, Snapshot, SolveSettings, StepReport,
     budget::Budget,
-    coverage::{self, Closures},
+    coverage::{self, CoverageMap},
     direct::{self, DirectField, Lights, Surfaces},
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
@@ -46,7 +46,7 @@ pub struct Solver {
     pub(super) direct: Option<DirectField>,
     pub(super) linked: LinkedLight,
     /// Part of the view of each piece of surface that lit surfaces fill.
-    pub(super) closures: Closures,
+    pub(super) coverage: CoverageMap,
     /// What leaves found over links when they gathered last.
     pub(super) leaves: Vec<LeafLight>,
     /// By what linked light at each vertex is multiplied; empty for 1.
@@ -107,7 +107,7 @@ impl Solver {
         let mut solver = Self {
             direct: None,
             linked: LinkedLight::default(),
-            closures: Closures::default(),
+            coverage: CoverageMap::default(),
             leaves: Vec::new(),
             vertex_factors: Vec::new(),
             mean_irradiance: 0.0,
@@ -159,7 +159,7 @@ impl Solver {
         let count = shadow_samples(&self.settings, true);
         if let Some(field) = &mut self.direct {
             self.ray_count +=
-                field.cover_first(rays, &self.hierarchy, count, limits.seed, cancel)?;
+                field.sample_vertices_first(rays, &self.hierarchy, count, limits.seed, cancel)?;
         }
         self.extend_to_new_elements();
         self.pull();
@@ -179,7 +179,7 @@ impl Solver {
         self.is_full = false;
         self.relighting.begin_step();
         // Which part of its view lit surfaces fill, for each cell of the first mesh.
-        self.probe_closures(is_coarse, cancel)?;
+        self.probe_coverage(is_coarse, cancel)?;
         // Divide elements where light bends between their corners: that of the last step, and direct light.
         self.adapt_to_linked(threshold_scale);
         self.adapt_to_direct(threshold_scale, cancel)?;
@@ -236,7 +236,7 @@ impl Solver {
     /// The memory limit, and what is held beside the mesh and its light.
     fn budget(&self) -> Budget {
         let others = self.rays.memory_bytes()
-            + self.closures.memory_bytes()
+            + self.coverage.memory_bytes()
             + size_of_val(self.leaves.as_slice())
             + size_of_val(self.vertex_factors.as_slice())
             + self.relighting.memory_bytes()
@@ -264,20 +264,19 @@ impl Solver {
         self.linked.extend(&self.hierarchy);
     }
 
-    /// Probe closures of the first mesh, unless those that are known are good enough.
-    pub(super) fn probe_closures(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
-        if self.closures.serve(is_coarse) {
+    /// Probe coverage of the first mesh, unless those that are known are good enough.
+    pub(super) fn probe_coverage(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
+        if self.coverage.serve(is_coarse) {
             return Some(());
         }
-        if let Some(closures) = Closures::without_rays(&self.plan, &self.hierarchy) {
-            self.closures = closures;
+        if let Some(coverage) = CoverageMap::without_rays(&self.plan, &self.hierarchy) {
+            self.coverage = coverage;
             return Some(());
         }
         let (scene, rays, seed) = (&self.scene, &self.rays, self.settings.seed);
-        let known = &self.closures;
-        let probed =
-            coverage::closures(scene, &self.hierarchy, rays, known, is_coarse, seed, cancel)?;
-        self.closures = probed.closures;
+        let known = &self.coverage;
+        let probed = coverage::probe(scene, &self.hierarchy, rays, known, is_coarse, seed, cancel)?;
+        self.coverage = probed.coverage;
         self.ray_count += probed.ray_count;
         // What rays found to lie within solids.
         let within = &probed.within;
@@ -290,7 +289,8 @@ impl Solver {
         if self.plan.follows_light {
             let (limits, mean) = (self.limits(threshold_scale), self.mean_irradiance);
             let (hierarchy, leaves) = (&mut self.hierarchy, &self.leaves);
-            self.is_full |= !vertices::divide_bent(hierarchy, leaves, limits, mean);
+            self.is_full |=
+                !vertices::divide_by_interpolation_error(hierarchy, leaves, limits, mean);
             self.extend_to_new_elements();
         }
     }
@@ -354,8 +354,8 @@ impl Solver {
 
     fn balance(&mut self, cancel: &Cancel) -> Option<()> {
         let surfaces = Surfaces::new(&self.hierarchy, &self.direct);
-        let (closures, settings) = (&self.closures, &self.settings);
-        iteration::balance(&mut self.linked, surfaces, closures, settings, cancel)
+        let (coverage, settings) = (&self.coverage, &self.settings);
+        iteration::balance(&mut self.linked, surfaces, coverage, settings, cancel)
     }
 
     /// Exchange light until it settles to a tolerance, as that of the settings is.
@@ -367,7 +367,7 @@ impl Solver {
     ) -> Option<()> {
         let iteration = Iteration {
             surfaces: Surfaces::new(&self.hierarchy, &self.direct),
-            closures: &self.closures,
+            coverage: &self.coverage,
             settings: &self.settings,
             tolerance,
             cancel,
@@ -386,8 +386,8 @@ impl Solver {
         let kernel = self.linked.kernel(&self.hierarchy, reading);
         let none = OffsetPlaces::default();
         let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
-        let (links, closures) = (&self.linked.links, &self.closures);
-        self.leaves = vertices::gather_leaves(kernel, links, closures, offsets, is_coarse, cancel)?;
+        let (links, coverage) = (&self.linked.links, &self.coverage);
+        self.leaves = vertices::gather_leaves(kernel, links, coverage, offsets, is_coarse, cancel)?;
         Some(())
     }
 
@@ -402,8 +402,8 @@ impl Solver {
         };
         let none = OffsetPlaces::default();
         let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
-        let (links, closures) = (&self.linked.links, &self.closures);
-        vertices::gather_leaves(kernel, links, closures, offsets, false, cancel)
+        let (links, coverage) = (&self.linked.links, &self.coverage);
+        vertices::gather_leaves(kernel, links, coverage, offsets, false, cancel)
     }
 
     /// By what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
@@ -419,7 +419,7 @@ impl Solver {
             squares: &squares,
             rays: &self.rays,
             limits: self.limits(threshold_scale),
-            settled: vertices::settled_change(tolerance, self.mean_irradiance),
+            converged_change: vertices::converged_change(tolerance, self.mean_irradiance),
             cancel,
         };
         let found = gather.run()?;
@@ -432,7 +432,7 @@ impl Solver {
         let (surfaces, budget) = (self.surfaces(), self.budget());
         shown::fill(report, surfaces, &self.linked, &self.leaves);
         report.shadow_rays = self.ray_count;
-        report.memory_bytes = budget.held_bytes(surfaces, &self.linked);
+        report.memory_bytes = budget.used_bytes(surfaces, &self.linked);
         if self.is_full || budget.is_exceeded(surfaces, &self.linked) {
             report.is_full = true;
             report.notes.push(
@@ -453,7 +453,7 @@ impl Solver {
             linked: &self.linked,
             leaves: &self.leaves,
             factors: &self.vertex_factors,
-            left_out: &self.plan.left_out,
+            omitted: &self.plan.omitted,
             step,
         };
         self.snapshot = view.show(triangles, &self.snapshot, cancel)?;

@@ -122,7 +122,7 @@ impl Painted<'_> {
                 && error_of(hierarchy, sent, leaf, most) > unseen
         };
         let unknown: Vec<usize> = leaves.iter().copied().filter(may_err).collect();
-        hierarchy.look_at_textures(self.scene, self.appearances, &unknown);
+        hierarchy.measure_textures(self.scene, self.appearances, &unknown);
         // Take the largest errors until the rest is small.
         let mut errors: Vec<(f32, usize)> = leaves
             .par_iter()

@@ -39,7 +39,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     }
 
     /// Whether nothing that decides about a link has changed since it was judged.
-    fn is_settled(&self, source: NodeId, receiver: NodeId) -> bool {
+    fn is_up_to_date(&self, source: NodeId, receiver: NodeId) -> bool {
         let hierarchy = self.hierarchy();
         // What a division makes comes after all that was there before.
         self.judged.is_some_and(|count| {
@@ -106,7 +106,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mut is_wanted = false;
         let mut pending: Vec<NodeId> = Vec::new();
         for link in (self.links_of)(receiver) {
-            if self.is_settled(link.source, receiver) {
+            if self.is_up_to_date(link.source, receiver) {
                 out.links.push(*link);
                 continue;
             }

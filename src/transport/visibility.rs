@@ -2,7 +2,7 @@
 //!
 //! A fraction of area-uniform rays is biased, since most of them stand for little light. Here each ray stands for the
 //! light that it carries: points of the source are chosen by power and by area in turn, of a few candidate point pairs
-//! one is kept with probability proportional to its unoccluded transfer, and the outcome of its ray counts with their
+//! one is chosen with probability proportional to its unoccluded transfer, and the outcome of its ray counts with their
 //! mean weight (resampled importance sampling, Talbot 2005).
 
 use std::ops::Range;
@@ -297,17 +297,17 @@ impl PairSampler<'_> {
         let mut all = Share::default();
         let (source, receiver) = (self.source(source), self.receiver(receiver));
         for _ in 0..ray_count {
-            let (mut kept, mut sum) = (None, 0.0);
+            let (mut chosen, mut sum) = (None, 0.0);
             for _ in 0..CANDIDATES {
                 let candidate = self.sample_source(&source, random);
                 let to = self.sample(&receiver, random);
                 let weight = transfer(&candidate.from, &to);
                 sum += weight;
-                if kept.is_none() || random.uniform() * sum < weight {
-                    kept = Some((candidate, to));
+                if chosen.is_none() || random.uniform() * sum < weight {
+                    chosen = Some((candidate, to));
                 }
             }
-            let Some((candidate, to)) = kept else {
+            let Some((candidate, to)) = chosen else {
                 continue;
             };
             let from = candidate.from;

@@ -1,14 +1,14 @@
-//! How closures are found: rays from groups of cells, and from each cell of those groups that are open.
+//! How coverage are found: rays from groups of cells, and from each cell of those groups that are open.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::closure::{Closure, Closures};
+use super::hemisphere::{CoverageMap, HemisphereCoverage};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Element, Hierarchy},
     scene::Scene,
-    solver::{Cancel, places::open_places},
+    solver::{Cancel, places::outside_places},
 };
 
 /// Share of all rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and open places
@@ -29,7 +29,7 @@ const GROUP_RAYS: usize = 24;
 const CELLS_PER_RAY: usize = 2;
 
 /// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
-/// `GROUP_RAYS` find closed may yet see a few holes, and where walls are white these few decide.
+/// `GROUP_RAYS` find enclosed may yet see a few holes, and where walls are white these few decide.
 const SECOND_RAYS: usize = 100_000;
 
 /// Rays of the second look per group at most.
@@ -37,7 +37,7 @@ const MOST_SECOND_RAYS: usize = 1024;
 
 /// Rays spent on all cells together where the rays of a group did not all meet a lit side, as long as that leaves each
 /// cell between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
-const OPEN_RAYS: usize = 100_000;
+const CELL_RAYS: usize = 100_000;
 
 /// Rays per cell at least.
 const LEAST_CELL_RAYS: usize = 16;
@@ -52,9 +52,9 @@ const MOST_SHARES: usize = 15_000;
 /// Rays per cell at most.
 const MOST_CELL_RAYS: usize = 8192;
 
-/// Neighbouring cells of open groups count as closed if that many rays from them met nothing but lit sides. Fewer, and
-/// what leaks goes unseen; more, and few cells of small open scenes are known to be closed.
-const CLOSED_RAYS: f32 = 512.0;
+/// Neighbouring cells of open groups count as enclosed if that many rays from them met nothing but lit sides. Fewer, and
+/// what leaks goes unseen; more, and few cells of small open scenes are known to be enclosed.
+const ENCLOSED_RAYS: f32 = 512.0;
 
 /// What the rays of a cell met.
 #[derive(Clone, Copy, Debug, Default)]
@@ -78,10 +78,10 @@ impl Met {
         (self.share() * (1.0 - self.share()) / (rays + 1.0)).sqrt()
     }
 
-    /// The closure of each of `sharing` cells, by what their rays met and what those of their neighbourhood did.
-    fn closure(self, around: Self, sharing: usize) -> Closure {
+    /// The coverage of each of `sharing` cells, by what their rays met and what those of their neighbourhood did.
+    fn coverage(self, around: Self, sharing: usize) -> HemisphereCoverage {
         if self.rays == 0.0 {
-            return Closure::BURIED;
+            return HemisphereCoverage::INSIDE_SOLID;
         }
         // Of cells that share their rays it is known no better than by a few of their own.
         let rays = if sharing > 1 {
@@ -91,7 +91,7 @@ impl Met {
         };
         // One ray more that met what those about it do on average: few rays say little.
         let share = (self.hits + around.share()) / (self.rays + 1.0);
-        Closure::estimated(share, self.deviation(rays))
+        HemisphereCoverage::estimated(share, self.deviation(rays))
     }
 
     fn and(self, other: Self) -> Self {
@@ -103,36 +103,36 @@ impl Met {
     }
 }
 
-/// The closures of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of
-/// whose rays met lit sides are closed if these are enough to tell; the others are halved for as long as they are several.
-fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure>) {
+/// The coverage of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of
+/// whose rays met lit sides are enclosed if these are enough to tell; the others are halved for as long as they are several.
+fn pooled(cells: &[Met], around: Met, sharing: usize, coverage: &mut Vec<HemisphereCoverage>) {
     let met = cells.iter().copied().fold(Met::default(), Met::and);
-    if met.hits >= met.rays && met.rays >= CLOSED_RAYS {
-        closures.resize(closures.len() + cells.len(), Closure::CLOSED);
+    if met.hits >= met.rays && met.rays >= ENCLOSED_RAYS {
+        coverage.resize(coverage.len() + cells.len(), HemisphereCoverage::ENCLOSED);
     } else if let [cell] = cells {
-        closures.push(cell.closure(around, sharing));
+        coverage.push(cell.coverage(around, sharing));
     } else {
         let (first, second) = cells.split_at(cells.len() / 2);
-        pooled(first, met, sharing, closures);
-        pooled(second, met, sharing, closures);
+        pooled(first, met, sharing, coverage);
+        pooled(second, met, sharing, coverage);
     }
 }
 
 /// What is found about the cells of a mesh.
 pub(crate) struct Probed {
-    pub closures: Closures,
+    pub coverage: CoverageMap,
     /// Cells that lie within a solid, in part or as a whole, so far as rays told.
     pub within: Vec<usize>,
     pub ray_count: u64,
 }
 
-/// Closures of all cells for coarse links or for others; `None` when cancelled. The cells are those of what is `known`, or,
+/// CoverageMap of all cells for coarse links or for others; `None` when cancelled. The cells are those of what is `known`, or,
 /// where nothing is, the leaves of the mesh as it is now.
-pub(crate) fn closures(
+pub(crate) fn probe(
     scene: &Scene,
     hierarchy: &Hierarchy,
     rays: &RayTree,
-    known: &Closures,
+    known: &CoverageMap,
     is_coarse: bool,
     seed: u64,
     cancel: &Cancel,
@@ -161,32 +161,32 @@ pub(crate) fn closures(
         .filter(|cells| !cells.is_empty())
         .collect();
     // Rays from groups, and from each cell of those that are open.
-    let (open, looked) = prober.open_groups(&groups);
-    let (found, probed) = prober.probe_groups(&open);
+    let (unenclosed, tested) = prober.unenclosed_groups(&groups);
+    let (found, probed) = prober.probe_groups(&unenclosed);
     cancel.proceed()?;
-    // All others are closed, or lie within solids.
+    // All others are enclosed, or lie within solids.
     let elements = &hierarchy.mesh.elements[..count];
-    let untold = |element: &Element| match element.is_inside_solid() {
-        true => Closure::BURIED,
-        false => Closure::CLOSED,
+    let unprobed = |element: &Element| match element.is_inside_solid() {
+        true => HemisphereCoverage::INSIDE_SOLID,
+        false => HemisphereCoverage::ENCLOSED,
     };
-    let mut of: Vec<Closure> = elements.iter().map(untold).collect();
+    let mut of: Vec<HemisphereCoverage> = elements.iter().map(unprobed).collect();
     let mut within = Vec::new();
-    let cells = open.into_iter().flatten();
-    for (&cell, (closure, is_within)) in cells.zip(found.into_iter().flatten()) {
-        of[cell] = closure;
+    let cells = unenclosed.into_iter().flatten();
+    for (&cell, (coverage, is_within)) in cells.zip(found.into_iter().flatten()) {
+        of[cell] = coverage;
         if is_within {
             within.push(cell);
         }
     }
     Some(Probed {
-        closures: Closures::new(hierarchy, of, is_coarse),
+        coverage: CoverageMap::new(hierarchy, of, is_coarse),
         within,
-        ray_count: (looked + probed) as u64,
+        ray_count: (tested + probed) as u64,
     })
 }
 
-/// Shoots the rays of closures. When cancelled, what it finds is incomplete.
+/// Shoots the rays of coverage. When cancelled, what it finds is incomplete.
 struct Prober<'a> {
     scene: &'a Scene,
     hierarchy: &'a Hierarchy,
@@ -204,46 +204,51 @@ impl Prober<'_> {
     }
 
     /// What one ray from a cell meets.
-    fn look(&self, cell: usize, number: usize) -> Met {
+    fn probe_once(&self, cell: usize, number: usize) -> Met {
         self.probe(cell, 1, number as u32)
     }
 
     /// The groups of cells that are not surrounded by lit surfaces, and the rays spent on finding them.
-    fn open_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
-        let look = |group: &[usize], first: usize, count: usize| {
+    fn unenclosed_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
+        let all_hit = |group: &[usize], first: usize, count: usize| {
             (0..count).all(|ray| {
                 !self.cancel.is_cancelled()
                     && self
-                        .look(group[ray * group.len() / count], first + ray)
+                        .probe_once(group[ray * group.len() / count], first + ray)
                         .hits
                         > 0.0
             })
         };
-        let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
-        let mut closed: Vec<bool> = groups
+        let first_rays = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
+        let mut enclosed: Vec<bool> = groups
             .par_iter()
-            .map(|group| look(group, 0, first_look(group)))
+            .map(|group| all_hit(group, 0, first_rays(group)))
             .collect();
-        let mut shot: usize = groups.iter().map(|group| first_look(group)).sum();
-        if closed.iter().any(|is_closed| !is_closed) {
+        let mut shot: usize = groups.iter().map(|group| first_rays(group)).sum();
+        if enclosed.iter().any(|is_enclosed| !is_enclosed) {
             let count = (self.budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
-            closed
+            enclosed
                 .par_iter_mut()
                 .zip(groups)
-                .filter(|(is_closed, _)| **is_closed)
-                .for_each(|(is_closed, group)| *is_closed = look(group, first_look(group), count));
+                .filter(|(is_enclosed, _)| **is_enclosed)
+                .for_each(|(is_enclosed, group)| {
+                    *is_enclosed = all_hit(group, first_rays(group), count)
+                });
             shot += groups.len() * count;
         }
-        let open = groups
+        let unenclosed = groups
             .iter()
-            .zip(&closed)
-            .filter(|(_, is_closed)| !**is_closed);
-        (open.map(|(group, _)| group.as_slice()).collect(), shot)
+            .zip(&enclosed)
+            .filter(|(_, is_enclosed)| !**is_enclosed);
+        (
+            unenclosed.map(|(group, _)| group.as_slice()).collect(),
+            shot,
+        )
     }
 
-    /// The closures of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
+    /// The coverage of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
     /// them. Where there are many cells, neighbours share their rays.
-    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(Closure, bool)>>, usize) {
+    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(HemisphereCoverage, bool)>>, usize) {
         // How many cells share their rays, and how many rays a part of a group gets.
         let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
         let cells = || groups.iter().copied().flatten();
@@ -257,16 +262,16 @@ impl Prober<'_> {
         let even = sharing as f32 / cell_count.max(1) as f32;
         let count = |part: &[usize]| {
             let share = part.iter().map(area).sum::<f32>() / whole;
-            let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
+            let count = self.budget(CELL_RAYS) as f32 * 0.5 * (even + share);
             (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
         };
         // What the rays of a part meet.
-        let look = |part: &[usize]| match part {
+        let probe_part = |part: &[usize]| match part {
             [cell] => self.probe(*cell, count(part) as u32, 0),
             _ => {
                 let count = count(part);
                 let cell = |ray: usize| part[ray * part.len() / count];
-                let met = (0..count).map(|ray| self.look(cell(ray), ray));
+                let met = (0..count).map(|ray| self.probe_once(cell(ray), ray));
                 met.fold(Met::default(), Met::and)
             }
         };
@@ -275,15 +280,15 @@ impl Prober<'_> {
             if self.cancel.is_cancelled() {
                 return Vec::new();
             }
-            let met: Vec<Met> = group.chunks(sharing).map(look).collect();
-            let mut closures = Vec::with_capacity(met.len());
-            pooled(&met, Met::default(), sharing, &mut closures);
+            let met: Vec<Met> = group.chunks(sharing).map(probe_part).collect();
+            let mut coverage = Vec::with_capacity(met.len());
+            pooled(&met, Met::default(), sharing, &mut coverage);
             let is_within = met
                 .iter()
                 .flat_map(|met| std::iter::repeat_n(met.within > 0.0, sharing));
-            let parts = group.chunks(sharing).zip(closures);
+            let parts = group.chunks(sharing).zip(coverage);
             parts
-                .flat_map(|(part, closure)| std::iter::repeat_n(closure, part.len()))
+                .flat_map(|(part, coverage)| std::iter::repeat_n(coverage, part.len()))
                 .zip(is_within)
                 .collect()
         });
@@ -300,14 +305,14 @@ impl Prober<'_> {
         let shift = random.uniform_2d();
         let [a, b, c] = self.hierarchy.mesh.corners(element);
         let patch = self.hierarchy.patch_of(element);
-        let places = open_places(self.hierarchy, element);
+        let places = outside_places(self.hierarchy, element);
         let mut met = Met::default();
         for index in 0..count {
             // Only the directions are stratified: a point from the same sequence would go with its direction.
             let at = triangle_point(random.uniform_2d());
             let place = (random.uniform() * places.len() as f32) as usize;
             let origin: Vec3 = match places.get(place) {
-                Some(&open) => open,
+                Some(&place) => place,
                 None => a * at.x + b * at.y + c * at.z,
             };
             let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
@@ -367,10 +372,10 @@ mod tests {
         for threshold_scale in [16.0, 8.0, 4.0, 2.0, 1.0] {
             let before = solver.ray_count;
             solver
-                .probe_closures(is_coarse(threshold_scale), &cancel)
+                .probe_coverage(is_coarse(threshold_scale), &cancel)
                 .unwrap();
-            assert!(solver.closures.serve(is_coarse(threshold_scale)));
-            assert_eq!(solver.closures.count(), cells);
+            assert!(solver.coverage.serve(is_coarse(threshold_scale)));
+            assert_eq!(solver.coverage.count(), cells);
             probed.push(solver.ray_count - before);
             // Elements that are divided since are no cells.
             let leaf = solver.hierarchy.mesh.leaves().next().unwrap();

@@ -34,7 +34,7 @@ const SMOOTH_SHARE: f32 = 1e-6;
 
 /// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance of the last
 /// step: it is then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
-const BEND_SCALE: f32 = 30.0;
+const INTERPOLATION_SCALE: f32 = 30.0;
 
 /// Rounds of division in one step at most.
 const MOST_ROUNDS: u32 = 8;
@@ -55,16 +55,16 @@ pub(crate) fn divide_coarse(
             .filter(|&leaf| is_large(hierarchy, leaf, limits))
             .collect();
         // Elsewhere than in the clear, links divide elements for the light that they carry.
-        let bends = |leaf: usize| match lights {
+        let has_error = |leaf: usize| match lights {
             Some(lights) if is_clear || lights.are_all(hierarchy) => {
-                lights.bend_over(hierarchy, leaf, limits)
+                lights.has_interpolation_error(hierarchy, leaf, limits)
             }
             _ => is_clear,
         };
         let wanted: Vec<u32> = large
             .into_par_iter()
             .filter(|&leaf| {
-                (!is_clear && !hierarchy.is_empty_above(leaf, EMPTY_RADII)) || bends(leaf)
+                (!is_clear && !hierarchy.is_empty_above(leaf, EMPTY_RADII)) || has_error(leaf)
             })
             .map(|leaf| leaf as u32)
             .collect();
@@ -109,7 +109,7 @@ impl DirectField {
             fresh = elements.end;
             let leaves: Vec<usize> = hierarchy.mesh.leaves_among(elements).collect();
             ray_count += self.probe_centres(rays, hierarchy, &leaves, limits, mean, cancel)?;
-            let wanted = self.bent(hierarchy, &leaves, limits, mean);
+            let wanted = self.leaves_to_divide(hierarchy, &leaves, limits, mean);
             let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
             if !fits || !hierarchy.mesh.divide(&wanted) {
                 return Some((ray_count, fits));
@@ -126,11 +126,12 @@ impl DirectField {
         limits: Limits,
         cancel: &Cancel,
     ) -> Option<(u64, f32)> {
-        let covering = self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
-        let moving = self.move_before_walls(rays, hierarchy, limits, cancel)?;
+        let sampled =
+            self.sample_vertices(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
+        let offset = self.offset_before_walls(rays, hierarchy, limits, cancel)?;
         let mean = self.mean(hierarchy);
-        let settling = self.settle(rays, hierarchy, limits, mean, cancel)?;
-        Some((covering + moving + settling, mean))
+        let denoised = self.reduce_noise(rays, hierarchy, limits, mean, cancel)?;
+        Some((sampled + offset + denoised, mean))
     }
 
     /// How much the luminance of the corners varies, times the weight of the element, relative to the mean.
@@ -161,7 +162,7 @@ impl DirectField {
     /// How far light that nothing blocks is from linear between the corners of an element, as `spread` counts; 0 where it
     /// cannot be above the tolerance, or where none reaches the corners. `at_centre` is the luminance of that light at the
     /// centroid, found where it is not known yet.
-    fn bend_unoccluded(
+    fn unoccluded_interpolation_error(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -183,7 +184,8 @@ impl DirectField {
             let centre = centre_of(hierarchy, element);
             // What is off by far less than the tolerance tells as much.
             let brightest_corner = corners.into_iter().fold(0.0, f32::max);
-            let scale = brightest_corner.max(BEND_SCALE * limits.finest_tolerance / weight);
+            let scale =
+                brightest_corner.max(INTERPOLATION_SCALE * limits.finest_tolerance / weight);
             let mut cut = Vec::new();
             luminance(self.lights.unoccluded(&centre, Some(scale), &mut cut))
         });
@@ -206,7 +208,7 @@ impl DirectField {
         self.unoccluded_at_centres.resize(element_count, None);
         // The leaves to sample: what lies between their corners may show.
         let candidates = leaves.par_iter().copied().filter(|&leaf| {
-            hierarchy.mesh.is_held(leaf)
+            hierarchy.mesh.is_active(leaf)
                 && hierarchy.mesh.elements[leaf].is_outside_solids()
                 && self.centres[leaf].is_none()
         });
@@ -214,9 +216,14 @@ impl DirectField {
             .map(|leaf| {
                 let mut at_centre = self.unoccluded_at_centres[leaf];
                 let is_wanted = self.spread(hierarchy, leaf, mean) > limits.tolerance
-                    || self.bend_unoccluded(hierarchy, leaf, limits, mean, &mut at_centre)
-                        > limits.tolerance
-                    || self.may_show(hierarchy, leaf, limits, mean)
+                    || self.unoccluded_interpolation_error(
+                        hierarchy,
+                        leaf,
+                        limits,
+                        mean,
+                        &mut at_centre,
+                    ) > limits.tolerance
+                    || self.may_error_be_visible(hierarchy, leaf, limits, mean)
                     || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance;
                 (leaf, is_wanted, at_centre)
             })
@@ -262,26 +269,26 @@ impl DirectField {
     }
 
     /// Those of some leaves whose corners do not tell what lies between.
-    fn bent(
+    fn leaves_to_divide(
         &mut self,
         hierarchy: &Hierarchy,
         leaves: &[usize],
         limits: Limits,
         mean: f32,
     ) -> Vec<u32> {
-        let mut bent = Vec::new();
+        let mut wanted = Vec::new();
         for &leaf in leaves {
             let mut at_centre = self.unoccluded_at_centres[leaf];
-            if self.is_bent(hierarchy, leaf, limits, mean, &mut at_centre) {
-                bent.push(leaf as u32);
+            if self.needs_division(hierarchy, leaf, limits, mean, &mut at_centre) {
+                wanted.push(leaf as u32);
             }
             self.unoccluded_at_centres[leaf] = at_centre;
         }
-        bent
+        wanted
     }
 
-    /// Whether the corners of a leaf do not tell what lies between; `at_centre` as [`Self::bend_unoccluded`] has it.
-    fn is_bent(
+    /// Whether the corners of a leaf do not tell what lies between; `at_centre` as [`Self::unoccluded_interpolation_error`] has it.
+    fn needs_division(
         &self,
         hierarchy: &Hierarchy,
         leaf: usize,
@@ -300,13 +307,13 @@ impl DirectField {
         }
         // Shadows have borders however small elements are; light that nothing blocks does not.
         if area * 0.25 < limits.min_area {
-            return self.bend_unoccluded(hierarchy, leaf, limits, mean, at_centre)
+            return self.unoccluded_interpolation_error(hierarchy, leaf, limits, mean, at_centre)
                 > limits.tolerance;
         }
         let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
-        let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
+        let error = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
         let weight = share_root(hierarchy, leaf) / mean.max(f32::MIN_POSITIVE);
-        bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
-            || self.shows(hierarchy, leaf, &centre, limits, mean)
+        error * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
+            || self.is_error_visible(hierarchy, leaf, &centre, limits, mean)
     }
 }

@@ -13,7 +13,7 @@ use crate::{
     solver::{
         Cancel,
         limits::Limits,
-        places::{Moved, inset, is_behind_wall},
+        places::{OffsetPlace, inset, is_behind_wall},
     },
     transport::luminance,
 };
@@ -29,7 +29,7 @@ const DARK_SHARE: f32 = 0.1;
 impl DirectField {
     /// Find places before the wall for vertices that lie beyond one, and sample there. A vertex is looked at once at each
     /// element, where it is dark and the element is not. Returns the rays shot.
-    pub(super) fn move_before_walls(
+    pub(super) fn offset_before_walls(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -37,9 +37,9 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let count = hierarchy.mesh.vertices.len();
-        self.offsets.looked_at.resize(count, u32::MAX);
+        self.offsets.probed_at.resize(count, u32::MAX);
         // Look for a place before the wall, for each dark vertex beside light.
-        let found: Vec<(u32, u32, (Option<Moved>, u64))> = self
+        let found: Vec<(u32, u32, (Option<OffsetPlace>, u64))> = self
             .dark_beside_light(hierarchy)
             .into_par_iter()
             .map(|(vertex, leaf)| match cancel.is_cancelled() {
@@ -56,9 +56,9 @@ impl DirectField {
         let mut is_new = vec![false; count];
         for (vertex, leaf, (moved, rays)) in found {
             shot += rays;
-            self.offsets.looked_at[vertex as usize] = leaf;
+            self.offsets.probed_at[vertex as usize] = leaf;
             if let Some(moved) = moved {
-                self.offsets.moved.insert(vertex, moved);
+                self.offsets.by_vertex.insert(vertex, moved);
                 self.vertices[vertex as usize] = Some(DirectLight::default());
                 is_new[vertex as usize] = true;
             }
@@ -102,7 +102,7 @@ impl DirectField {
         let found = lightest.into_iter().enumerate();
         found
             .filter_map(|(vertex, found)| Some((vertex as u32, found?.1)))
-            .filter(|&(vertex, leaf)| self.offsets.looked_at[vertex as usize] != leaf)
+            .filter(|&(vertex, leaf)| self.offsets.probed_at[vertex as usize] != leaf)
             .collect()
     }
 }
@@ -114,7 +114,7 @@ fn before_wall(
     hierarchy: &Hierarchy,
     vertex: u32,
     leaf: usize,
-) -> (Option<Moved>, u64) {
+) -> (Option<OffsetPlace>, u64) {
     let (at, mesh) = (hierarchy.mesh.position(vertex), &hierarchy.mesh);
     let element = &mesh.elements[leaf];
     let place = |inset: f32| at.lerp(element.centroid, inset);
@@ -128,7 +128,7 @@ fn before_wall(
         let (is_behind, shot) = is_behind_wall(rays, hierarchy, leaf, place);
         ray_count += shot;
         if !is_behind {
-            return (Some(Moved { place, inset }), ray_count);
+            return (Some(OffsetPlace { place, inset }), ray_count);
         }
     }
     (None, ray_count)

@@ -17,7 +17,7 @@ const NOISE_DEVIATIONS: f32 = 0.5;
 
 impl DirectField {
     /// Whether what lies between the corners of an element may show: how far they differ, beyond noise, is seen.
-    pub(super) fn may_show(
+    pub(super) fn may_error_be_visible(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -28,11 +28,11 @@ impl DirectField {
             most, least, noise, ..
         } = self.corners(hierarchy, element);
         let spread = most - least - NOISE_DEVIATIONS * noise;
-        limits.is_seen(spread, mean.max(most), share_root(hierarchy, element))
+        limits.is_visible(spread, mean.max(most), share_root(hierarchy, element))
     }
 
     /// Whether the bend between the corners of an element and its centroid shows.
-    pub(super) fn shows(
+    pub(super) fn is_error_visible(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -47,11 +47,11 @@ impl DirectField {
             noise,
         } = self.corners(hierarchy, element);
         let at_centre = luminance(centre.irradiance());
-        let bend = (at_centre - between).abs() + SPREAD_SHARE * (most - least);
+        let error = (at_centre - between).abs() + SPREAD_SHARE * (most - least);
         let noise = centre.error().hypot(noise);
         let beside = mean.max(most).max(at_centre);
-        let error = bend - NOISE_DEVIATIONS * noise;
-        limits.is_seen(error, beside, share_root(hierarchy, element))
+        let visible = error - NOISE_DEVIATIONS * noise;
+        limits.is_visible(visible, beside, share_root(hierarchy, element))
     }
 
     /// Luminances of direct light at the corners of an element.

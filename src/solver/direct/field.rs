@@ -21,7 +21,7 @@ pub(crate) struct DirectField {
     /// Luminance of the unoccluded irradiance at centroids by element, where it was needed.
     pub(super) unoccluded_at_centres: Vec<Option<f32>>,
     /// Elements whose corners are all sampled: those that come after are new.
-    pub(super) covered: usize,
+    pub(super) sampled_elements: usize,
     /// Shadow rays that these corners have where it takes all.
     pub(crate) samples: u32,
     /// Vertices behind walls.
@@ -36,7 +36,7 @@ impl DirectField {
             vertices: Vec::new(),
             centres: Vec::new(),
             unoccluded_at_centres: Vec::new(),
-            covered: 0,
+            sampled_elements: 0,
             samples: 0,
             offsets: OffsetPlaces::default(),
         }
@@ -102,8 +102,8 @@ impl DirectField {
                 self.lights.bounded(unoccluded * fraction)
             })
             .collect();
-        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        carry_over(&hierarchy.mesh, tells, &mut shown);
+        let is_known = |element: &Element, side| !element.is_inside_solid_at(side);
+        carry_over(&hierarchy.mesh, is_known, &mut shown);
         let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
         let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
             let centre = self.centres.get(leaf).copied().flatten()?;

@@ -178,8 +178,8 @@ pub(crate) fn common_ratio(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> Option<
             if !ratio.is_finite() {
                 return None;
             }
-            let held = *common.get_or_insert(ratio);
-            if (ratio - held).abs() > SAME_RATIO * held.max(ratio) {
+            let known = *common.get_or_insert(ratio);
+            if (ratio - known).abs() > SAME_RATIO * known.max(ratio) {
                 return None;
             }
         }

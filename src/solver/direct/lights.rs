@@ -110,8 +110,9 @@ impl Lights {
 
     /// Whether all emission that light is computed from is sampled.
     pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
-        let mut held = hierarchy.active_patches();
-        held.all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
+        let mut active = hierarchy.active_patches();
+        active
+            .all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
     }
 
     /// Luminance of the power of the emitters per area of the scene: the mean irradiance if all of it arrives, where that is

@@ -40,14 +40,14 @@ impl Limits {
         mean: f32,
     ) -> bool {
         let beside = mean.max(luminance(light.irradiance()));
-        self.is_noise_seen(error, beside, weight)
+        self.is_noise_visible(error, beside, weight)
     }
 
     /// Whether the rays of a point are too few where those of its neighbours had another outcome: though all of them
     /// agree, others might not.
     pub(super) fn is_doubtful(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
         let beside = mean.max(luminance(light.irradiance()));
-        light.tried < self.most_samples() && self.is_noise_seen(light.doubt(), beside, weight)
+        light.tried < self.most_samples() && self.is_noise_visible(light.doubt(), beside, weight)
     }
 }
 
@@ -70,25 +70,25 @@ mod tests {
     }
 
     #[test]
-    fn an_error_is_seen_the_sooner_the_larger_the_element_and_the_darker_its_surroundings() {
+    fn an_error_is_visible_the_sooner_the_larger_the_element_and_the_darker_its_surroundings() {
         let limits = limits(1e-3);
-        let least_seen = |beside: f32, weight: f32| {
+        let least_visible = |beside: f32, weight: f32| {
             let errors = (0..4000).map(|step| step as f32 * 1e-3);
-            let mut seen = errors.filter(|&error| limits.is_seen(error, beside, weight));
+            let mut seen = errors.filter(|&error| limits.is_visible(error, beside, weight));
             seen.next().unwrap_or(f32::INFINITY)
         };
         for (small, large) in [(1e-3, 1e-2), (1e-2, 1e-1)] {
-            assert!(least_seen(1.0, large) < least_seen(1.0, small));
-            assert!(least_seen(1.0, small) < least_seen(4.0, small));
-            assert!(least_seen(0.1, large) > 0.0);
+            assert!(least_visible(1.0, large) < least_visible(1.0, small));
+            assert!(least_visible(1.0, small) < least_visible(4.0, small));
+            assert!(least_visible(0.1, large) > 0.0);
         }
     }
 
     #[test]
-    fn noise_is_seen_before_a_bend_of_the_same_size_is() {
+    fn noise_is_visible_before_an_interpolation_error_of_the_same_size() {
         let limits = limits(1e-3);
-        assert!(!limits.is_seen(0.03, 1.0, 0.01));
-        assert!(limits.is_noise_seen(0.03, 1.0, 0.01));
+        assert!(!limits.is_visible(0.03, 1.0, 0.01));
+        assert!(limits.is_noise_visible(0.03, 1.0, 0.01));
     }
 
     #[test]

@@ -191,9 +191,9 @@ fn straightened(mut edges: Vec<[Corner; 2]>) -> Vec<[Corner; 2]> {
         while let Some(&[next]) = starting.get(&edges[index][1].0).map(Vec::as_slice) {
             let ([start, end], [_, last]) = (edges[index], edges[next]);
             let (along, on) = (end.1 - start.1, last.1 - end.1);
-            let bend = along.cross(on).length();
+            let sine = along.cross(on).length();
             let is_straight =
-                along.dot(on) > 0.0 && bend <= STRAIGHT * along.length() * on.length();
+                along.dot(on) > 0.0 && sine <= STRAIGHT * along.length() * on.length();
             if !is_straight || next == index || is_part[index] || is_part[next] {
                 break;
             }
@@ -279,11 +279,11 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_or_bends_is_no_panel() {
+    fn emitters_that_differ_or_meet_at_an_angle_are_no_panel() {
         let mut colors = lamp(1, |_, _| false);
         colors[1].radiosity = Vec4::splat(2.0);
-        let mut bent = lamp(1, |_, _| false);
-        bent[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize_or_zero();
+        let mut tilted = lamp(1, |_, _| false);
+        tilted[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize_or_zero();
         let mut materials = lamp(1, |_, _| false);
         materials[1].material = MaterialId(1);
         // The two sides of one triangle.
@@ -296,7 +296,7 @@ mod tests {
             normal: Vec3::Z,
             ..sides[0]
         };
-        for emitters in [colors, bent, materials, sides] {
+        for emitters in [colors, tilted, materials, sides] {
             assert_eq!(panels(&emitters).1.len(), 2);
         }
     }

@@ -239,7 +239,7 @@ mod tests {
     }
 
     /// A closed scene: rows add to `reflectance`, so that the solution is 1 / (1 − reflectance) everywhere.
-    fn closed(reflectance: f32, seed: u64) -> (Vec<Vec<f32>>, Vec<f32>) {
+    fn enclosure(reflectance: f32, seed: u64) -> (Vec<Vec<f32>>, Vec<f32>) {
         let mut random = Random::new(seed, 0);
         let matrix = (0..40)
             .map(|_| {
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn white_walls_take_few_sweeps() {
         for seed in 0..20 {
-            let (matrix, expected) = closed(0.999, seed);
+            let (matrix, expected) = enclosure(0.999, seed);
             let (plain, _) = sweeps(&matrix, &expected, 0);
             let (accelerated, _) = sweeps(&matrix, &expected, 3);
             assert!(plain > 5000, "seed {seed}: {plain}");

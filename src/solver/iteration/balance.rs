@@ -1,9 +1,9 @@
 //! Balance: what an element sends over links adds up, as what it receives does.
 //!
-//! Form factors of a receiver are scaled so that they add to its closure (see `closure`). Form factors err most between
+//! Form factors of a receiver are scaled so that they add to its coverage (see `coverage`). Form factors err most between
 //! near surfaces, so scaling receivers alone shifts light: a sender that its neighbours see too large would lose light to all
 //! others' scaling, and closed rooms came out up to 0.6 % too dark. Exchange is reciprocal, `A_i F_ij = A_j F_ji`, so
-//! the same factors serve senders: with `d_i F_ij d_j`, rows and columns add to the closures alike. This is the scaling of
+//! the same factors serve senders: with `d_i F_ij d_j`, rows and columns add to the coverage alike. This is the scaling of
 //! a symmetric matrix to given sums (Sinkhorn and Knopp, "Concerning nonnegative matrices and doubly stochastic
 //! matrices", 1967), relaxed so that it settles in few sweeps.
 //!
@@ -18,10 +18,10 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::{
-    gather::{self, Holders},
+    gather::{self, LinkedClusters},
     light::LinkedLight,
 };
-use crate::solver::{Cancel, SolveSettings, coverage::Closures, direct::Surfaces};
+use crate::solver::{Cancel, SolveSettings, coverage::CoverageMap, direct::Surfaces};
 
 /// A sender's factor is at most this, and at least its inverse. Larger, and what coarse links get wrong by more is mirrored as
 /// though it were reciprocal (first step of `cornell`: 6.7 % with 1.1, 7.0 % with 1.2, 18 % without a bound); smaller, and less
@@ -37,25 +37,31 @@ const SWEEPS: u32 = 3;
 pub(crate) fn balance(
     linked: &mut LinkedLight,
     surfaces: Surfaces<'_>,
-    closures: &Closures,
+    coverage: &CoverageMap,
     settings: &SolveSettings,
     cancel: &Cancel,
 ) -> Option<()> {
     let hierarchy = surfaces.hierarchy;
-    let holders = Holders::new(hierarchy, &linked.links);
+    let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let emits =
         |leaf: usize| !surfaces.is_sampled(leaf) && hierarchy.emission_of(leaf) != Vec3::ZERO;
     for sweep in 0..SWEEPS {
         // The sums of form factors under the present factors.
         let kernel = linked.kernel(hierarchy, settings.method.reading());
-        let sums = gather::gather(kernel, &linked.links, &holders, settings.push, cancel)?;
+        let sums = gather::gather(
+            kernel,
+            &linked.links,
+            &linked_clusters,
+            settings.push,
+            cancel,
+        )?;
         // Move the factors towards what would make these sums right.
         let relaxation = relaxation(sweep);
         let next = |sending: &f32, factor: f32| {
             let next = sending.powf(1.0 - relaxation) * factor.powf(relaxation);
             next.clamp(1.0 / MOST_FACTOR, MOST_FACTOR)
         };
-        let factors = closures.factors(hierarchy, &sums);
+        let factors = coverage.factors(hierarchy, &sums);
         linked.sending = linked
             .sending
             .iter()

@@ -17,11 +17,11 @@ use crate::{
 const TASK_NODES: usize = 256;
 
 /// Clusters with links that one task gathers for.
-const TASK_HOLDERS: usize = 32;
+const TASK_CLUSTERS: usize = 32;
 
 /// The clusters that have links of their own, for all sweeps over these links: most have none, and what is pushed passes
 /// them by.
-pub(super) struct Holders {
+pub(super) struct LinkedClusters {
     /// The clusters, parents before children.
     clusters: Vec<u32>,
     /// For each, the place in this list of the nearest one above it, or [`Self::NONE`].
@@ -30,12 +30,12 @@ pub(super) struct Holders {
     of_patch: Vec<u32>,
 }
 
-impl Holders {
+impl LinkedClusters {
     const NONE: u32 = u32::MAX;
 
     /// Those of some links.
     pub(crate) fn new(hierarchy: &Hierarchy, links: &LinkStore) -> Self {
-        let mut holders = Self {
+        let mut linked_clusters = Self {
             clusters: Vec::new(),
             above: Vec::new(),
             of_patch: vec![Self::NONE; hierarchy.patches.len()],
@@ -45,15 +45,15 @@ impl Holders {
             let above = nearest.get(cluster.parent as usize).copied();
             nearest[index] = above.unwrap_or(Self::NONE);
             if !links.of(NodeId(index as u32)).is_empty() {
-                holders.above.push(nearest[index]);
-                nearest[index] = holders.clusters.len() as u32;
-                holders.clusters.push(index as u32);
+                linked_clusters.above.push(nearest[index]);
+                nearest[index] = linked_clusters.clusters.len() as u32;
+                linked_clusters.clusters.push(index as u32);
             }
             if cluster.is_leaf() {
-                holders.of_patch[cluster.patches()].fill(nearest[index]);
+                linked_clusters.of_patch[cluster.patches()].fill(nearest[index]);
             }
         }
-        holders
+        linked_clusters
     }
 }
 
@@ -62,7 +62,7 @@ impl Holders {
 pub(super) fn gather(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    holders: &Holders,
+    linked_clusters: &LinkedClusters,
     push: Push,
     cancel: &Cancel,
 ) -> Option<Vec<Vec4>> {
@@ -70,7 +70,7 @@ pub(super) fn gather(
     let mut irradiance = own_irradiance(kernel, links, cancel);
     cancel.proceed()?;
     let from_clusters = match push {
-        Push::Combined => push_moments(kernel, links, holders, cancel)?,
+        Push::Combined => push_moments(kernel, links, linked_clusters, cancel)?,
         Push::AtOnce => push_at_once(kernel, links, cancel),
     };
     cancel.proceed()?;
@@ -123,16 +123,16 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
 fn push_moments(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    holders: &Holders,
+    linked_clusters: &LinkedClusters,
     cancel: &Cancel,
 ) -> Option<Vec<Vec4>> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
     // What each cluster receives over its own links.
-    let mut incident: Vec<Moments<Vec4>> = holders
+    let mut incident: Vec<Moments<Vec4>> = linked_clusters
         .clusters
         .par_iter()
-        .with_min_len(TASK_HOLDERS)
+        .with_min_len(TASK_CLUSTERS)
         .map(|&index| {
             if cancel.is_cancelled() {
                 return Moments::default();
@@ -142,8 +142,8 @@ fn push_moments(
         .collect();
     cancel.proceed()?;
     // Those above come first, with all that is above them.
-    for (place, &above) in holders.above.iter().enumerate() {
-        if above != Holders::NONE {
+    for (place, &above) in linked_clusters.above.iter().enumerate() {
+        if above != LinkedClusters::NONE {
             let above = incident[above as usize];
             incident[place].merge(&above);
         }
@@ -151,10 +151,10 @@ fn push_moments(
     // The share that each patch takes by its normal.
     let active = hierarchy.active_patches();
     let project = |patch: usize| {
-        let holder = incident.get(holders.of_patch[patch] as usize);
-        match holder {
-            Some(holder) if active.contains(&patch) => {
-                holder.project(hierarchy.patches[patch].normal, reading)
+        let nearest = incident.get(linked_clusters.of_patch[patch] as usize);
+        match nearest {
+            Some(nearest) if active.contains(&patch) => {
+                nearest.project(hierarchy.patches[patch].normal, reading)
             }
             _ => Vec4::ZERO,
         }

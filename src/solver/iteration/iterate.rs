@@ -20,12 +20,12 @@ use rayon::prelude::*;
 
 use super::{
     anderson::Anderson,
-    gather::{self, Holders},
+    gather::{self, LinkedClusters},
     light::LinkedLight,
 };
 use crate::{
     hierarchy::Hierarchy,
-    solver::{Cancel, SolveSettings, coverage::Closures, direct::Surfaces, sums::area_total},
+    solver::{Cancel, SolveSettings, coverage::CoverageMap, direct::Surfaces, sums::area_total},
 };
 
 /// Iterates that acceleration remembers: 24 bytes each for every element. See above; below 3 white rooms take many
@@ -58,7 +58,7 @@ pub(crate) struct Iteration<'a> {
     /// What exchanges light.
     pub surfaces: Surfaces<'a>,
     /// What form factors are scaled to.
-    pub closures: &'a Closures,
+    pub coverage: &'a CoverageMap,
     /// How tables are read and irradiance is pushed.
     pub settings: &'a SolveSettings,
     /// To which part of the power the light must settle, as the tolerance of the settings is.
@@ -88,7 +88,7 @@ struct Sweep {
     sent: f64,
     /// Power that was reflected of what arrived.
     returned: f64,
-    /// As `returned`, had the links not been scaled to the closure.
+    /// As `returned`, had the links not been scaled to the coverage.
     returned_unscaled: f64,
     /// Power that arrived, direct light included.
     arrived: f64,
@@ -99,9 +99,9 @@ struct Sweep {
 /// How the iteration ended.
 enum Ending {
     /// It settled.
-    Settled,
+    Converged,
     /// It did not settle within the sweeps that it has.
-    Unsettled,
+    NotConverged,
     /// Each sweep made light.
     Growing,
 }
@@ -112,9 +112,9 @@ pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Opt
     let before = linked.irradiance.clone();
     let mut convergence = Convergence::default();
     for bounds_rows in [false, true] {
-        match settle(linked, iteration, bounds_rows, &mut convergence)? {
-            Ending::Settled => break,
-            Ending::Unsettled => {
+        match converge(linked, iteration, bounds_rows, &mut convergence)? {
+            Ending::Converged => break,
+            Ending::NotConverged => {
                 convergence.notes.push(format!(
                     "the iteration has not converged after {} sweeps: the residual is {:.1e}",
                     convergence.sweeps, convergence.residual
@@ -138,7 +138,7 @@ pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Opt
 }
 
 /// One iteration, with or without a bound on the sums of form factors.
-fn settle(
+fn converge(
     linked: &mut LinkedLight,
     iteration: Iteration<'_>,
     bounds_rows: bool,
@@ -153,7 +153,7 @@ fn settle(
     // What is the same in all sweeps.
     let hierarchy = surfaces.hierarchy;
     let weights = leaf_areas(hierarchy);
-    let holders = Holders::new(hierarchy, &linked.links);
+    let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let direct = surfaces.direct_of_leaves();
     let ceiling = CEILING_SLACK * surfaces.most_power();
     let mut acceleration = Anderson::new(DEPTH);
@@ -161,7 +161,7 @@ fn settle(
     for _ in 0..MOST_SWEEPS {
         // Gather, and let the acceleration propose the next light.
         cancel.proceed()?;
-        let sweep = sweep(linked, iteration, &holders, &direct, bounds_rows)?;
+        let sweep = sweep(linked, iteration, &linked_clusters, &direct, bounds_rows)?;
         convergence.sweeps += 1;
         cancel.proceed()?;
         let next = acceleration.next(&weights, &linked.irradiance, &sweep.image);
@@ -186,42 +186,48 @@ fn settle(
             return Some(Ending::Growing);
         }
         // Go on from the proposed light, or end with what was gathered.
-        let is_settled = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
-        linked.irradiance = if is_settled { sweep.image } else { next };
+        let is_converged = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
+        linked.irradiance = if is_converged { sweep.image } else { next };
         linked.pull(surfaces);
-        if is_settled {
+        if is_converged {
             note_unscaled_growth(convergence, sweep.returned_unscaled / sweep.sent);
-            return Some(Ending::Settled);
+            return Some(Ending::Converged);
         }
     }
-    Some(Ending::Unsettled)
+    Some(Ending::NotConverged)
 }
 
 /// Gather once, and measure what came of it beside the direct light of the leaves; `None` when cancelled.
 fn sweep(
     linked: &LinkedLight,
     iteration: Iteration<'_>,
-    holders: &Holders,
+    linked_clusters: &LinkedClusters,
     direct: &[Vec4],
     bounds_rows: bool,
 ) -> Option<Sweep> {
     let Iteration {
         surfaces,
-        closures,
+        coverage,
         settings,
         tolerance: _,
         cancel,
     } = iteration;
     let hierarchy = surfaces.hierarchy;
     let kernel = linked.kernel(hierarchy, settings.method.reading());
-    let mut image = gather::gather(kernel, &linked.links, holders, settings.push, cancel)?;
+    let mut image = gather::gather(
+        kernel,
+        &linked.links,
+        linked_clusters,
+        settings.push,
+        cancel,
+    )?;
     let returned = |image: &[Vec4]| {
         area_total(hierarchy, |leaf| {
             hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])
         })
     };
     let returned_unscaled = returned(&image);
-    closures.scale(hierarchy, &linked.power, &mut image, bounds_rows);
+    coverage.scale(hierarchy, &linked.power, &mut image, bounds_rows);
     cancel.proceed()?;
     Some(Sweep {
         sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf))
@@ -252,12 +258,12 @@ fn leaf_areas(hierarchy: &Hierarchy) -> Vec<f32> {
         .collect()
 }
 
-/// Say so where only the scaling to the closure keeps the light from growing.
+/// Say so where only the scaling to the coverage keeps the light from growing.
 fn note_unscaled_growth(convergence: &mut Convergence, gain: f64) {
     if gain > 1.0 + UNSCALED_SLACK {
         convergence.notes.push(format!(
             "the links are too coarse to keep energy: by themselves they would return {gain:.2} times the light that \
-             is sent, sweep after sweep; scaled to the closure they do not"
+             is sent, sweep after sweep; scaled to the coverage they do not"
         ));
     }
 }

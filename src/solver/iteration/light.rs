@@ -13,7 +13,7 @@ use crate::{
 pub(crate) struct LinkedLight {
     /// Over which pairs of nodes light travels.
     pub(crate) links: LinkStore,
-    /// Irradiance of every element over links, scaled so that form factors add to the closure; the fourth channel is their raw sum.
+    /// Irradiance of every element over links, scaled so that form factors add to the coverage; the fourth channel is their raw sum.
     pub(crate) irradiance: Vec<Vec4>,
     /// By element, what its radiosity is multiplied by before links carry it (see `balance`); 1 without links.
     pub(super) sending: Vec<f32>,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::left_out::LeftOut;
+use super::omitted::Omitted;
 use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
@@ -88,7 +88,7 @@ pub struct Snapshot {
     /// The cluster tree, children after parents; patches and elements left out.
     pub clusters: Arc<Vec<ClusterBox>>,
     /// What the scene does not need and was left out.
-    pub left_out: Arc<Vec<LeftOut>>,
+    pub omitted: Arc<Vec<Omitted>>,
 }
 
 impl Snapshot {

@@ -7,11 +7,11 @@ use crate::hierarchy::{Element, Hierarchy, Mesh};
 /// Elements over which light is carried at most: vertices under an object and those beside them.
 const CARRIED: u32 = 2;
 
-/// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,
+/// Give vertices of elements that lie within a solid in part, at which no leaf `is_known` what its corner there receives,
 /// the mean of those of these elements at which one does.
 pub(crate) fn carry_over(
     mesh: &Mesh,
-    tells: impl Fn(&Element, usize) -> bool,
+    is_known: impl Fn(&Element, usize) -> bool,
     values: &mut [Vec4],
 ) {
     let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
@@ -20,14 +20,14 @@ pub(crate) fn carry_over(
         return;
     }
     // Vertices that some leaf tells of.
-    let mut told = vec![false; values.len()];
+    let mut known = vec![false; values.len()];
     for leaf in mesh.active_leaves() {
         let element = &mesh.elements[leaf];
         for (side, vertex) in element.vertices.into_iter().enumerate() {
-            told[vertex as usize] |= tells(element, side);
+            known[vertex as usize] |= is_known(element, side);
         }
     }
-    // Means over the elements in contact, from vertices that are told to those that are not.
+    // Means over the elements in contact, from vertices that are known to those that are not.
     for _ in 0..CARRIED {
         let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
         for &leaf in &contacts {
@@ -37,7 +37,7 @@ pub(crate) fn carry_over(
                 .vertices
                 .into_iter()
                 .map(|vertex| vertex as usize)
-                .partition(|&vertex| told[vertex]);
+                .partition(|&vertex| known[vertex]);
             for &from in &from {
                 for &to in &to {
                     sums[to].0 += values[from] * area;
@@ -47,7 +47,7 @@ pub(crate) fn carry_over(
         }
         for (vertex, (sum, weight)) in sums.into_iter().enumerate() {
             if weight > 0.0 {
-                (values[vertex], told[vertex]) = (sum / weight, true);
+                (values[vertex], known[vertex]) = (sum / weight, true);
             }
         }
     }

@@ -21,7 +21,7 @@ const CONTACT_TOLERANCE: f32 = 1.0;
 /// Whether an element lies within a solid is looked at if it is this many times larger than those that are not divided
 /// for it, or a whole patch was, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose
 /// contacts are fine anyway.
-const LOOKED_AT: f32 = 64.0;
+const PROBED_SIZE: f32 = 64.0;
 
 /// Tangents of the probes' directions against the normal. Of the first, one at least must meet a back before the others
 /// are shot; they look further down, between the first.
@@ -94,20 +94,20 @@ pub(crate) fn probe_contacts(
         .active_leaves()
         .filter(|&leaf| elements[leaf].inside_solid == Element::UNPROBED)
         .collect();
-    let is_looked_at = |leaf: usize| {
+    let is_probed = |leaf: usize| {
         let element = &elements[leaf];
         let above = elements.get(element.parent as usize);
         let whole = elements[element.patch as usize].area_vector.length();
-        element.area_vector.length() > LOOKED_AT * least
+        element.area_vector.length() > PROBED_SIZE * least
             || above.is_some_and(|parent| match parent.inside_solid {
-                Element::UNPROBED => whole > LOOKED_AT * least,
-                covered => covered != 0,
+                Element::UNPROBED => whole > PROBED_SIZE * least,
+                inside_solid => inside_solid != 0,
             })
     };
-    let (wanted, spared): (Vec<usize>, Vec<usize>) =
-        fresh.into_iter().partition(|&leaf| is_looked_at(leaf));
+    let (wanted, skipped): (Vec<usize>, Vec<usize>) =
+        fresh.into_iter().partition(|&leaf| is_probed(leaf));
     let ray_count = probe_leaves(scene, hierarchy, rays, &wanted, cancel)?;
-    for leaf in spared {
+    for leaf in skipped {
         hierarchy.mesh.elements[leaf].inside_solid = 0;
     }
     Some(ray_count)
@@ -134,8 +134,8 @@ fn probe_leaves(
         .collect();
     cancel.proceed()?;
     let mut ray_count = 0;
-    for (&leaf, (covered, shot)) in leaves.iter().zip(probed) {
-        hierarchy.mesh.elements[leaf].inside_solid = covered;
+    for (&leaf, (inside_solid, shot)) in leaves.iter().zip(probed) {
+        hierarchy.mesh.elements[leaf].inside_solid = inside_solid;
         ray_count += shot;
     }
     Some(ray_count)
@@ -182,22 +182,22 @@ fn probe(
     if rays.is_clear() {
         return (0, 0);
     }
-    let (mut covered, mut shot) = (0, 0);
+    let (mut inside_solid, mut shot) = (0, 0);
     for (place, point) in places(hierarchy, element).into_iter().enumerate() {
         let in_solid = scene.map_or((false, 0), |scene| {
             is_in_solid(scene, rays, hierarchy, element, point)
         });
-        let (is_covered, count) = match in_solid {
+        let (is_inside, count) = match in_solid {
             (true, count) => (true, count),
             (false, count) => {
                 let (is_behind, more) = is_behind_wall(rays, hierarchy, element, point);
                 (is_behind, count + more)
             }
         };
-        covered |= u8::from(is_covered) << place;
+        inside_solid |= u8::from(is_inside) << place;
         shot += count;
     }
-    (covered, shot)
+    (inside_solid, shot)
 }
 
 /// Where an element is probed: its corners, a little inside, and its centroid.
@@ -210,14 +210,14 @@ fn places(hierarchy: &Hierarchy, element: usize) -> [Vec3; 4] {
 }
 
 /// Of an element that lies within a solid in part, the probed places that do not; nothing of others.
-pub(crate) fn open_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
-    let covered = hierarchy.mesh.elements[element].inside_solid;
+pub(crate) fn outside_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
+    let inside_solid = hierarchy.mesh.elements[element].inside_solid;
     if !hierarchy.mesh.elements[element].is_contact() {
         return Vec::new();
     }
-    let is_open = |(place, _): &(usize, Vec3)| covered & (1 << place) == 0;
+    let is_outside = |(place, _): &(usize, Vec3)| inside_solid & (1 << place) == 0;
     let places = places(hierarchy, element).into_iter().enumerate();
-    places.filter(is_open).map(|(_, point)| point).collect()
+    places.filter(is_outside).map(|(_, point)| point).collect()
 }
 
 /// A unit direction off a normal, by the tangents of its angles with it along two axes of the plane.

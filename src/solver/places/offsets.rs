@@ -10,14 +10,14 @@ use crate::hierarchy::{Element, Hierarchy};
 /// Where light is evaluated for vertices that lie behind a wall.
 #[derive(Default)]
 pub(crate) struct OffsetPlaces {
-    pub(crate) moved: HashMap<u32, Moved>,
+    pub(crate) by_vertex: HashMap<u32, OffsetPlace>,
     /// The element at which a vertex was looked at last, or `u32::MAX`.
-    pub(crate) looked_at: Vec<u32>,
+    pub(crate) probed_at: Vec<u32>,
 }
 
 /// Where light is evaluated for one of them.
 #[derive(Clone, Copy)]
-pub(crate) struct Moved {
+pub(crate) struct OffsetPlace {
     pub(crate) place: Vec3,
     /// Share of the way to the centroid.
     pub(crate) inset: f32,
@@ -28,7 +28,7 @@ impl OffsetPlaces {
     pub(crate) fn places(&self, element: &Element, corners: [Vec3; 3]) -> [Vec3; 3] {
         let usual = inset(element, corners);
         [0, 1, 2].map(|side| {
-            let moved = self.moved.get(&element.vertices[side]);
+            let moved = self.by_vertex.get(&element.vertices[side]);
             let inset = moved.map_or(usual, |moved| moved.inset);
             corners[side].lerp(element.centroid, inset)
         })
@@ -43,7 +43,7 @@ impl OffsetPlaces {
     ) -> Vec<(u32, Receiver)> {
         let mut places = vertex_places(hierarchy, elements, is_wanted);
         for (vertex, receiver) in &mut places {
-            if let Some(moved) = self.moved.get(vertex) {
+            if let Some(moved) = self.by_vertex.get(vertex) {
                 receiver.point = moved.place;
             }
         }
@@ -52,6 +52,7 @@ impl OffsetPlaces {
 
     /// Bytes held, about.
     pub(crate) fn memory_bytes(&self) -> usize {
-        size_of_val(self.looked_at.as_slice()) + self.moved.len() * size_of::<(u32, Moved)>()
+        size_of_val(self.probed_at.as_slice())
+            + self.by_vertex.len() * size_of::<(u32, OffsetPlace)>()
     }
 }

@@ -72,7 +72,10 @@ pub(crate) fn vertex_places(
     /// How fit a leaf is, and which one it is.
     type Choice = ((bool, f32), u32);
     let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
-    for leaf in about_wanted.into_iter().filter(|&leaf| mesh.is_held(leaf)) {
+    for leaf in about_wanted
+        .into_iter()
+        .filter(|&leaf| mesh.is_active(leaf))
+    {
         let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
         for (side, vertex) in element.vertices.into_iter().enumerate() {
             let vertex = vertex as usize;

@@ -10,7 +10,7 @@ use crate::{
     hierarchy::{Channels as _, Cluster, Hierarchy, NodeId},
     scene::{Appearance, Scene, TriangleId},
     solver::{
-        Cancel, ClusterBox, DisplayMesh, LeftOut, Snapshot, VertexLight,
+        Cancel, ClusterBox, DisplayMesh, Omitted, Snapshot, VertexLight,
         direct::Surfaces,
         iteration::LinkedLight,
         vertices::{LeafLight, VertexMeans},
@@ -19,17 +19,17 @@ use crate::{
 };
 
 /// A triangle of the mesh that is shown: its element and its vertices.
-pub(super) type ClosedTriangle = (u32, [u32; 3]);
+pub(super) type DisplayTriangle = (u32, [u32; 3]);
 
 /// The triangles of elements and of what closes their edges, where these have changed since a mesh was made.
 pub(crate) fn changed_triangles(
     hierarchy: &mut Hierarchy,
-    held: &DisplayMesh,
-) -> Option<Vec<ClosedTriangle>> {
-    let has_changed = held.indices.is_empty()
-        || held.own_vertex_count() != hierarchy.mesh.vertices.len()
-        || hierarchy.mesh.leaves().count() != leaf_count(held);
-    has_changed.then(|| hierarchy.mesh.closed_triangles())
+    current: &DisplayMesh,
+) -> Option<Vec<DisplayTriangle>> {
+    let has_changed = current.indices.is_empty()
+        || current.own_vertex_count() != hierarchy.mesh.vertices.len()
+        || hierarchy.mesh.leaves().count() != leaf_count(current);
+    has_changed.then(|| hierarchy.mesh.crack_free_triangles())
 }
 
 /// What a snapshot is made of.
@@ -48,7 +48,7 @@ pub(crate) struct View<'a> {
     /// By what linked light at each vertex is multiplied; empty for 1.
     pub factors: &'a [Vec4],
     /// What the plan left out.
-    pub left_out: &'a Arc<Vec<LeftOut>>,
+    pub omitted: &'a Arc<Vec<Omitted>>,
     /// The step that is shown.
     pub step: u32,
 }
@@ -58,7 +58,7 @@ impl View<'_> {
     /// with that of the snapshot before. `None` when cancelled.
     pub(crate) fn show(
         &self,
-        triangles: Option<Vec<ClosedTriangle>>,
+        triangles: Option<Vec<DisplayTriangle>>,
         before: &Snapshot,
         cancel: &Cancel,
     ) -> Option<Snapshot> {
@@ -87,12 +87,16 @@ impl View<'_> {
             mesh,
             light: Arc::new(light),
             clusters: Arc::new(clusters?),
-            left_out: self.left_out.clone(),
+            omitted: self.omitted.clone(),
         })
     }
 
     /// The mesh that is shown, from elements with the triangles that close their edges.
-    fn display_mesh(&self, triangles: Vec<ClosedTriangle>, cancel: &Cancel) -> Option<DisplayMesh> {
+    fn display_mesh(
+        &self,
+        triangles: Vec<DisplayTriangle>,
+        cancel: &Cancel,
+    ) -> Option<DisplayMesh> {
         let hierarchy = self.surfaces.hierarchy;
         let mesh = &hierarchy.mesh;
         let count = mesh.vertices.len();

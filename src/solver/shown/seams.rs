@@ -24,13 +24,13 @@ impl Seams {
     /// The vertex, or the repetition of it, that has these texture coordinates; made where there is none. A vertex without
     /// coordinates, which are not numbers then, takes them.
     pub(super) fn vertex_with(&mut self, vertex: u32, uv: Vec2, mesh: &mut DisplayMesh) -> u32 {
-        let held = &mut mesh.texcoords[vertex as usize];
-        if held.is_nan() {
-            *held = uv;
+        let present = &mut mesh.texcoords[vertex as usize];
+        if present.is_nan() {
+            *present = uv;
         }
         let has_them = |vertex: u32| {
-            let held = mesh.texcoords[vertex as usize];
-            held == uv || held.abs_diff_eq(uv, SAME_PLACE)
+            let present = mesh.texcoords[vertex as usize];
+            present == uv || present.abs_diff_eq(uv, SAME_PLACE)
         };
         if has_them(vertex) {
             return vertex;
@@ -64,8 +64,8 @@ impl DisplayMesh {
 
     /// The vertex that a vertex repeats, or itself.
     pub(super) fn own_vertex(&self, vertex: u32) -> usize {
-        let beyond = (vertex as usize).checked_sub(self.own_vertex_count());
-        beyond.map_or(vertex, |place| self.repeated[place]) as usize
+        let repetition = (vertex as usize).checked_sub(self.own_vertex_count());
+        repetition.map_or(vertex, |place| self.repeated[place]) as usize
     }
 }
 

@@ -3,7 +3,7 @@
 //! A link knows of what stands between its ends only which part gets through, and it takes that part for the same all
 //! over its receiver. In the corner between a floor and what stands on it that shows: light from beyond the object
 //! leaks into the corner, however small the elements there are, and into closed rooms. So a few cosine-weighted rays from
-//! each vertex look at the radiosity of what they meet. Where vertices and their neighbours together find something else
+//! each vertex probe at the radiosity of what they meet. Where vertices and their neighbours together find something else
 //! than the links, many rays do. What rays met is remembered, so that it can be asked again once the light there has been
 //! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
 //! factor by vertex, so that it holds for other lights on the same links, too.
@@ -14,7 +14,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    gathered::{Gathered, factors},
+    gather_estimate::{GatherEstimate, factors},
     reconstruct::{LeafLight, VertexMeans},
 };
 use crate::{
@@ -31,27 +31,27 @@ use crate::{
 };
 
 /// Rays from each vertex. Fewer miss shallow corners, more cost time everywhere.
-const LOOKING: u32 = 16;
+const MOST_PROBE_RAYS: u32 = 16;
 
 /// Rays from all vertices, about: of large meshes fewer are shot from each. Fewer tell less than links do, more take longer
 /// than all steps before.
-const MOST_LOOKING: usize = 1 << 21;
+const MOST_PROBE_RAYS_IN_ALL: usize = 1 << 21;
 
 /// Rays from each vertex at least.
-const LEAST_LOOKING: u32 = 2;
+const LEAST_PROBE_RAYS: u32 = 2;
 
 /// One of so many rays may meet a back. From a vertex that lies within something what rays find is dark, and would show
 /// around it.
 const RAYS_OF_BACK: u32 = 4;
 
 /// Rays from a vertex in a corner at most. Fewer leave grain, more cost time there.
-const GATHERING: u32 = 256;
+const MOST_GATHER_RAYS: u32 = 256;
 
 /// Standard errors by which what a vertex and its neighbours find must differ from what links tell to be a corner.
 /// Smaller gathers by chance, larger misses corners.
 const DEVIATIONS: f32 = 1.5;
 
-/// Part of the light that leaves a vertex that must be indirect for rays to look at it: what a lamp reflects is not seen beside
+/// Part of the light that leaves a vertex that must be indirect for rays to probe at it: what a lamp reflects is not seen beside
 /// what it emits.
 const LEAST_INDIRECT: f32 = 0.1;
 
@@ -60,7 +60,7 @@ const MOST_ROUNDS: u32 = 64;
 
 /// Rays are asked again until that changes no vertex by more than this part of the tolerance of sweeps, times the scene's
 /// mean. Larger leaves light in closed rooms, where each round takes away what walls absorb; smaller takes time.
-const SETTLED: f32 = 0.1;
+const CONVERGED_SHARE: f32 = 0.1;
 
 /// Rounds that are remembered to accelerate them. Fewer take longer in white rooms, more gain nothing.
 const DEPTH: usize = 3;
@@ -94,8 +94,8 @@ impl Sender {
     }
 }
 
-/// A vertex that rays look at.
-struct Look {
+/// A vertex that rays probe at.
+struct VertexProbe {
     vertex: usize,
     place: Receiver,
     /// Linked irradiance.
@@ -107,14 +107,14 @@ struct Look {
     /// Variance of the luminance that one ray meets, as links tell it; 0 where they carry no emission.
     variance: f32,
     met: Vec<Met>,
-    found: Gathered,
+    found: GatherEstimate,
 }
 
-impl Look {
+impl VertexProbe {
     /// Whether noise of what was found would show.
     fn is_noisy(&self, limits: Limits) -> bool {
         let (_, variance) = self.found.gap(self.linked, self.variance);
-        limits.is_noise_seen(variance.sqrt(), self.all, self.weight)
+        limits.is_noise_visible(variance.sqrt(), self.all, self.weight)
     }
 }
 
@@ -133,13 +133,13 @@ pub(crate) struct FinalGather<'a> {
     /// Which noise shows.
     pub limits: Limits,
     /// Change of irradiance (luminance) of a vertex below which rays are not asked again.
-    pub settled: f32,
+    pub converged_change: f32,
     /// Stops it.
     pub cancel: &'a Cancel,
 }
 
 /// What a final gather finds.
-pub(crate) struct Gathering {
+pub(crate) struct GatherFactors {
     /// By vertex, what linked light is to be multiplied by; empty for 1.
     pub factors: Vec<Vec4>,
     /// Rays shot.
@@ -147,15 +147,15 @@ pub(crate) struct Gathering {
 }
 
 /// Change of irradiance of a vertex that is too small to ask rays again, for a tolerance of sweeps and the mean irradiance.
-pub(crate) fn settled_change(tolerance: f32, mean_irradiance: f32) -> f32 {
-    SETTLED * tolerance * mean_irradiance
+pub(crate) fn converged_change(tolerance: f32, mean_irradiance: f32) -> f32 {
+    CONVERGED_SHARE * tolerance * mean_irradiance
 }
 
 impl FinalGather<'_> {
     /// Find by what linked light at vertices is to be multiplied; `None` when cancelled. Where nothing blocks, links tell all.
-    pub(crate) fn run(self) -> Option<Gathering> {
+    pub(crate) fn run(self) -> Option<GatherFactors> {
         if self.rays.is_clear() {
-            return Some(Gathering {
+            return Some(GatherFactors {
                 factors: Vec::new(),
                 ray_count: 0,
             });
@@ -173,43 +173,45 @@ impl FinalGather<'_> {
         };
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         // A few rays from each vertex.
-        let mut looks = self.looks(&linked);
-        let looking = MOST_LOOKING / looks.len().max(1);
-        let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
+        let mut probes = self.probes(&linked);
+        let probe_rays = MOST_PROBE_RAYS_IN_ALL / probes.len().max(1);
+        let probe_rays = (probe_rays as u32).clamp(LEAST_PROBE_RAYS, MOST_PROBE_RAYS);
         let senders = self.senders();
-        let mut ray_count = self.shoot(&mut looks, |_| looking)?;
-        ask(&mut looks, &senders, &received);
-        looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
+        let mut ray_count = self.shoot(&mut probes, |_| probe_rays)?;
+        evaluate(&mut probes, &senders, &received);
+        probes.retain(|probe| probe.found.backs * RAYS_OF_BACK <= probe.found.rays);
         // Many where these differ from links.
         let edges = edges(hierarchy);
-        let is_corner = in_corners(&edges, hierarchy.mesh.vertices.len(), &looks, self.limits);
-        let mut most = looking;
-        while most < GATHERING {
+        let is_corner = in_corners(&edges, hierarchy.mesh.vertices.len(), &probes, self.limits);
+        let mut most = probe_rays;
+        while most < MOST_GATHER_RAYS {
             most *= 2;
-            let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(self.limits) {
+            let more = |probe: &VertexProbe| match is_corner[probe.vertex]
+                && probe.is_noisy(self.limits)
+            {
                 true => most,
-                false => look.found.rays,
+                false => probe.found.rays,
             };
-            ray_count += self.shoot(&mut looks, more)?;
-            ask(&mut looks, &senders, &received);
+            ray_count += self.shoot(&mut probes, more)?;
+            evaluate(&mut probes, &senders, &received);
         }
         // What they mean for the light, until that agrees with itself.
         let light = [&linked, &direct].map(Vec::as_slice);
-        let factors = self.settled_factors(&mut looks, &senders, &edges, light)?;
-        Some(Gathering { factors, ray_count })
+        let factors = self.converged_factors(&mut probes, &senders, &edges, light)?;
+        Some(GatherFactors { factors, ray_count })
     }
 
     /// Correct linked and direct light at the vertices by what rays found, ask them again, and so on until nothing changes.
     /// Returns factors by vertex.
-    fn settled_factors(
+    fn converged_factors(
         &self,
-        looks: &mut [Look],
+        probes: &mut [VertexProbe],
         senders: &[Sender],
         edges: &[[usize; 2]],
         [linked, direct]: [&[Vec4]; 2],
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.surfaces.hierarchy.mesh;
-        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
+        let is_known = |element: &Element, side| !element.is_inside_solid_at(side);
         let areas = mesh.areas_about_vertices();
         let mut received: Vec<Vec4> = linked.iter().zip(direct).map(|(a, b)| a + b).collect();
         let mut acceleration = Anderson::new(DEPTH);
@@ -217,11 +219,11 @@ impl FinalGather<'_> {
         loop {
             self.cancel.proceed()?;
             let mut ratios = vec![None; mesh.vertices.len()];
-            for look in &*looks {
-                ratios[look.vertex] = Some(look.found.over(look.linked, look.variance));
+            for probe in &*probes {
+                ratios[probe.vertex] = Some(probe.found.over(probe.linked, probe.variance));
             }
             let mut factors = factors(ratios, edges);
-            carry_over(mesh, tells, &mut factors);
+            carry_over(mesh, is_known, &mut factors);
             let lights = linked.iter().zip(direct).zip(&factors);
             let corrected: Vec<Vec4> = lights.map(|((l, d), factor)| l * *factor + d).collect();
             let changes = corrected.iter().zip(&received);
@@ -229,22 +231,22 @@ impl FinalGather<'_> {
                 .map(|(new, old)| luminance((new - old).abs()))
                 .fold(0.0, f32::max);
             round += 1;
-            if change <= self.settled || round >= MOST_ROUNDS {
+            if change <= self.converged_change || round >= MOST_ROUNDS {
                 return Some(factors);
             }
             received = acceleration.next(&areas, &received, &corrected);
-            ask(looks, senders, &received);
+            evaluate(probes, senders, &received);
         }
     }
 
     /// The vertices at which enough light is indirect, by linked irradiance.
-    fn looks(&self, linked: &[Vec4]) -> Vec<Look> {
+    fn probes(&self, linked: &[Vec4]) -> Vec<VertexProbe> {
         let Surfaces { hierarchy, direct } = self.surfaces;
         let mesh = &hierarchy.mesh;
         let weights = vertex_share_roots(hierarchy);
         let emitted = emitted_as_irradiance(hierarchy);
         let squares = VertexMeans::new(hierarchy, self.squares, &[]).irradiance;
-        let look = |(vertex, place): (u32, Receiver)| {
+        let probe = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
             let direct = match direct {
                 Some(field) => field.corner(vertex),
@@ -253,7 +255,7 @@ impl FinalGather<'_> {
             let all = luminance(linked + direct);
             let leaving = all + emitted[vertex as usize];
             let square = luminance(squares[vertex as usize]);
-            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| Look {
+            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| VertexProbe {
                 vertex: vertex as usize,
                 place,
                 linked,
@@ -261,7 +263,7 @@ impl FinalGather<'_> {
                 weight: weights[vertex as usize],
                 variance: (square - luminance(linked).powi(2)).max(0.0),
                 met: Vec::new(),
-                found: Gathered::default(),
+                found: GatherEstimate::default(),
             })
         };
         let all = vec![true; mesh.vertices.len()];
@@ -269,25 +271,29 @@ impl FinalGather<'_> {
         let none = OffsetPlaces::default();
         let offsets = direct.map_or(&none, |field| &field.offsets);
         let places = offsets.vertex_places(hierarchy, elements, &all);
-        places.into_iter().filter_map(look).collect()
+        places.into_iter().filter_map(probe).collect()
     }
 
     /// Shoot rays until each vertex has had as many as are wanted. Returns the rays shot; `None` when cancelled.
-    fn shoot(&self, looks: &mut [Look], wanted: impl Fn(&Look) -> u32 + Sync) -> Option<u64> {
-        let shot: Vec<u32> = looks
+    fn shoot(
+        &self,
+        probes: &mut [VertexProbe],
+        wanted: impl Fn(&VertexProbe) -> u32 + Sync,
+    ) -> Option<u64> {
+        let shot: Vec<u32> = probes
             .par_iter_mut()
             .with_min_len(16)
-            .map(|look| {
+            .map(|probe| {
                 if self.cancel.is_cancelled() {
                     return 0;
                 }
-                let mut random = Random::new(self.limits.seed, look.vertex as u64);
+                let mut random = Random::new(self.limits.seed, probe.vertex as u64);
                 let shift = random.uniform_2d();
-                let (before, rays) = (look.met.len() as u32, wanted(look));
+                let (before, rays) = (probe.met.len() as u32, wanted(probe));
                 for index in before..rays {
                     let square = low_discrepancy_2d(index, shift);
-                    let direction = cosine_direction(look.place.normal, square);
-                    look.met.push(self.meet(&look.place, direction));
+                    let direction = cosine_direction(probe.place.normal, square);
+                    probe.met.push(self.meet(&probe.place, direction));
                 }
                 rays - before
             })
@@ -358,16 +364,16 @@ fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
 }
 
 /// Count the radiosity of what rays met, of irradiance `received` at vertices.
-fn ask(looks: &mut [Look], senders: &[Sender], received: &[Vec4]) {
+fn evaluate(probes: &mut [VertexProbe], senders: &[Sender], received: &[Vec4]) {
     let radiosity = |met: &Met| match *met {
         Met::Nothing => Some(Vec4::ZERO),
         Met::Back => None,
         Met::Leaf(leaf, shares) => Some(senders[leaf as usize].radiosity(shares, received)),
     };
-    looks.par_iter_mut().with_min_len(64).for_each(|look| {
-        look.found = Gathered::default();
-        for met in &look.met {
-            look.found.count(radiosity(met));
+    probes.par_iter_mut().with_min_len(64).for_each(|probe| {
+        probe.found = GatherEstimate::default();
+        for met in &probe.met {
+            probe.found.count(radiosity(met));
         }
     });
 }
@@ -383,14 +389,14 @@ fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
 fn in_corners(
     edges: &[[usize; 2]],
     vertex_count: usize,
-    looks: &[Look],
+    probes: &[VertexProbe],
     limits: Limits,
 ) -> Vec<bool> {
     // Gap, its variance, and how many.
     let mut own = vec![(0.0f32, 0.0f32, 0.0f32); vertex_count];
-    for look in looks {
-        let (gap, variance) = look.found.gap(look.linked, look.variance);
-        own[look.vertex] = (gap, variance, 1.0);
+    for probe in probes {
+        let (gap, variance) = probe.found.gap(probe.linked, probe.variance);
+        own[probe.vertex] = (gap, variance, 1.0);
     }
     let mut pooled = own.clone();
     for &[vertex, next] in edges {
@@ -399,10 +405,10 @@ fn in_corners(
         *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
     }
     let mut differs = vec![false; vertex_count];
-    for look in looks {
-        let (gap, variance, number) = pooled[look.vertex];
-        let is_seen = limits.is_seen(gap.abs() / number.max(1.0), look.all, look.weight);
-        differs[look.vertex] = is_seen && gap * gap > DEVIATIONS * DEVIATIONS * variance;
+    for probe in probes {
+        let (gap, variance, number) = pooled[probe.vertex];
+        let is_visible = limits.is_visible(gap.abs() / number.max(1.0), probe.all, probe.weight);
+        differs[probe.vertex] = is_visible && gap * gap > DEVIATIONS * DEVIATIONS * variance;
     }
     let mut wanted = differs.clone();
     for &[a, b] in edges {

@@ -12,7 +12,7 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
     solver::{
         Cancel,
-        coverage::{Closure, Closures},
+        coverage::{CoverageMap, HemisphereCoverage},
         direct::SPREAD_SHARE,
         limits::Limits,
         places::{OffsetPlaces, carry_over, project, share_root},
@@ -50,7 +50,7 @@ pub(crate) struct LeafLight {
 pub(crate) fn gather_leaves(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    closures: &Closures,
+    coverage: &CoverageMap,
     offsets: &OffsetPlaces,
     is_coarse: bool,
     cancel: &Cancel,
@@ -67,7 +67,7 @@ pub(crate) fn gather_leaves(
             let mut walk = Walk {
                 kernel,
                 links,
-                closures,
+                coverage,
                 offsets,
                 sight_distance,
                 path: Vec::new(),
@@ -84,11 +84,11 @@ pub(crate) fn gather_leaves(
     Some(found.into_iter().flatten().collect())
 }
 
-/// Scale the light of the leaves of one cell so that their form factors add to the closure; `nearby` is the mean radiosity
+/// Scale the light of the leaves of one cell so that their form factors add to the coverage; `nearby` is the mean radiosity
 /// of the neighbourhood.
-fn scale_to_closure(
+fn scale_to_coverage(
     hierarchy: &Hierarchy,
-    closure: Closure,
+    coverage: HemisphereCoverage,
     nearby: Vec3,
     leaves: &mut [LeafLight],
 ) {
@@ -100,7 +100,7 @@ fn scale_to_closure(
     });
     for leaf in leaves {
         for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
-            *value = closure.scaled(*value, sums, nearby);
+            *value = coverage.scaled(*value, sums, nearby);
         }
     }
 }
@@ -155,7 +155,7 @@ impl<'a> Chain<'a> {
 struct Walk<'a> {
     kernel: Kernel<'a>,
     links: &'a LinkStore,
-    closures: &'a Closures,
+    coverage: &'a CoverageMap,
     offsets: &'a OffsetPlaces,
     /// See [`SIGHT_DISTANCE`].
     sight_distance: f32,
@@ -251,11 +251,11 @@ impl<'a> Walk<'a> {
         }
         self.leave(above);
         // Leaves come depth first, so those of a cell follow each other.
-        let cell = |leaf: &LeafLight| self.closures.cell(hierarchy, leaf.element as usize);
-        let nearby = self.closures.nearby(self.kernel.tables, patch);
+        let cell = |leaf: &LeafLight| self.coverage.cell(hierarchy, leaf.element as usize);
+        let nearby = self.coverage.nearby(self.kernel.tables, patch);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-            let closure = self.closures.of(cell(&leaves[0]));
-            scale_to_closure(hierarchy, closure, nearby, leaves);
+            let coverage = self.coverage.of(cell(&leaves[0]));
+            scale_to_coverage(hierarchy, coverage, nearby, leaves);
         }
     }
 
@@ -381,23 +381,23 @@ impl VertexMeans {
 
 /// Divide leaves between whose corners the light that they found over links bends, as direct light may. Returns whether there
 /// was room: else none is divided.
-pub(crate) fn divide_bent(
+pub(crate) fn divide_by_interpolation_error(
     hierarchy: &mut Hierarchy,
     found: &[LeafLight],
     limits: Limits,
     mean: f32,
 ) -> bool {
-    let is_bent = |light: &LeafLight| {
+    let has_error = |light: &LeafLight| {
         let element = &hierarchy.mesh.elements[light.element as usize];
         let corners = light.corners.map(luminance);
         let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
-        let bend = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
+        let error = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
         let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
         element.area_vector.length() * 0.25 >= limits.min_area
-            && (bend + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
+            && (error + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
     };
-    let bent = found.iter().filter(|light| is_bent(light));
-    let wanted: Vec<u32> = bent.map(|light| light.element).collect();
+    let divided = found.iter().filter(|light| has_error(light));
+    let wanted: Vec<u32> = divided.map(|light| light.element).collect();
     let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
     if fits {
         hierarchy.mesh.divide(&wanted);

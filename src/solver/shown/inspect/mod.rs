@@ -15,7 +15,7 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Reading},
     solver::{
         ClusterBox, InspectedLink, Inspection, PathNode, Place, Subject,
-        coverage::Closures,
+        coverage::CoverageMap,
         direct::Surfaces,
         iteration::LinkedLight,
         vertices::{LeafLight, link_irradiance, own_irradiance},
@@ -33,7 +33,7 @@ pub(crate) struct Inspector<'a> {
     /// How tables are read.
     pub reading: Option<Reading>,
     /// What form factors are scaled to.
-    pub closures: &'a Closures,
+    pub coverage: &'a CoverageMap,
     /// What leaves found when they gathered last.
     pub leaves: &'a [LeafLight],
     /// Boxes of the clusters after the last whole step.
@@ -58,7 +58,7 @@ impl<'a> Inspector<'a> {
                 let light: Vec3 = links.iter().map(|link| link.irradiance).sum();
                 (
                     self.surfaces.direct(leaf).color(),
-                    self.closure_scale(leaf, light.extend(row_sum)),
+                    self.coverage_scale(leaf, light.extend(row_sum)),
                 )
             }
             Kind::Cluster(_) => (Vec3::ZERO, Vec3::ONE),
@@ -132,7 +132,7 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// The links of all nodes of a path, as its end receives over them; not yet scaled to the closure.
+    /// The links of all nodes of a path, as its end receives over them; not yet scaled to the coverage.
     fn links_along(&self, path: &[NodeId], node: NodeId) -> Vec<InspectedLink> {
         let kernel = self.kernel();
         let mut found = Vec::new();
@@ -164,13 +164,13 @@ impl<'a> Inspector<'a> {
         found
     }
 
-    /// By what the light of a leaf, with the sum of its form factors, is scaled in all so that they add to the closure.
-    fn closure_scale(&self, leaf: usize, light: Vec4) -> Vec3 {
+    /// By what the light of a leaf, with the sum of its form factors, is scaled in all so that they add to the coverage.
+    fn coverage_scale(&self, leaf: usize, light: Vec4) -> Vec3 {
         if self.leaves.is_empty() {
             return Vec3::ONE;
         }
         let elements = &self.hierarchy().mesh.elements;
-        let cell_of = |element| self.closures.cell(self.hierarchy(), element);
+        let cell_of = |element| self.coverage.cell(self.hierarchy(), element);
         let cell = cell_of(leaf);
         let sums = self
             .leaves
@@ -181,8 +181,8 @@ impl<'a> Inspector<'a> {
                 (areas + area, rows + area * other.centre.form_factor_sum())
             });
         let patch = elements[leaf].patch as usize;
-        let nearby = self.closures.nearby(&self.linked.power, patch);
-        let scaled = self.closures.of(cell).scaled(light, sums, nearby);
+        let nearby = self.coverage.nearby(&self.linked.power, patch);
+        let scaled = self.coverage.of(cell).scaled(light, sums, nearby);
         let ratio = (scaled / light).color();
         Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }

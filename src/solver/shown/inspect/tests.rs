@@ -134,8 +134,8 @@ fn a_cluster_receives_over_its_own_links_and_those_above() {
             inspection.row_sum
         );
     }
-    let beyond = NodeId(solver.hierarchy.clusters.len() as u32);
-    assert!(solver.inspect(&Subject::Cluster(beyond)).is_none());
+    let missing = NodeId(solver.hierarchy.clusters.len() as u32);
+    assert!(solver.inspect(&Subject::Cluster(missing)).is_none());
 }
 
 #[test]

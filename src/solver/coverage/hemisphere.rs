@@ -1,4 +1,4 @@
-//! Closure: which part of a surface's view is filled by lit surfaces.
+//! HemisphereCoverage: which part of a surface's view is filled by lit surfaces.
 //!
 //! It is 1 in a closed room, less in an open scene or where backs are seen. The sum of form factors of each leaf must
 //! equal it, so it tells by how much the kernel and the visibility of its links err together, and scales it away.
@@ -18,11 +18,11 @@ use crate::{
     transport::luminance,
 };
 
-/// Form factors that add to less than this share of the closure are not trusted to stand for what is missing.
+/// Form factors that add to less than this share of the coverage are not trusted to stand for what is missing.
 /// Nearer to 1, and coarse links stay as wrong as they are; further, and the noise of a few rays is blown up.
 const LEAST_ROW: f32 = 0.3;
 
-/// Where more form factors are counted than there can be, by this share of the closure, half of the surplus is taken
+/// Where more form factors are counted than there can be, by this share of the coverage, half of the surplus is taken
 /// for light. Less of it may be that of dark and buried faces alone. Smaller, and light is lost about buried faces;
 /// larger, and coarse links stay too bright.
 const SURPLUS: f32 = 0.1;
@@ -38,16 +38,16 @@ const SLIGHT: f32 = 0.8;
 
 /// How much of a cell's view is filled by lit surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Closure {
+pub(crate) struct HemisphereCoverage {
     /// The part, 0…1.
     share: f32,
     /// Standard error of it: 0 in closed surroundings.
     deviation: f32,
 }
 
-impl Closure {
+impl HemisphereCoverage {
     /// Surrounded by lit surfaces.
-    pub(super) const CLOSED: Self = Self {
+    pub(super) const ENCLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
     };
@@ -59,7 +59,7 @@ impl Closure {
     };
 
     /// Within a solid, where nothing is seen.
-    pub(super) const BURIED: Self = Self {
+    pub(super) const INSIDE_SOLID: Self = Self {
         share: 0.0,
         deviation: 0.0,
     };
@@ -74,7 +74,7 @@ impl Closure {
         self.deviation == 0.0
     }
 
-    /// What irradiance must be multiplied by, given the sum of its form factors. Where the closure is only estimated,
+    /// What irradiance must be multiplied by, given the sum of its form factors. Where the coverage is only estimated,
     /// a sum that differs by no more than the estimate's error is left alone.
     fn factor(&self, row: f32) -> f32 {
         let gap = self.share - row;
@@ -90,7 +90,7 @@ impl Closure {
         if row > 0.0 { target / row } else { 1.0 }
     }
 
-    /// Light of a leaf, with the sum of its form factors, as it is if they add to the closure. Over the whole cell,
+    /// Light of a leaf, with the sum of its form factors, as it is if they add to the coverage. Over the whole cell,
     /// `sums` are the area and the sum times area; `nearby` is the mean radiosity of the neighbourhood.
     pub(crate) fn scaled(&self, light: Vec4, sums: (f32, f32), nearby: Vec3) -> Vec4 {
         multiplied(
@@ -125,18 +125,18 @@ fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
     whole.max(Vec3::ZERO).extend(row)
 }
 
-/// Closures of the cells of a mesh: of its leaves as they were before light was known.
+/// CoverageMap of the cells of a mesh: of its leaves as they were before light was known.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Closures {
+pub(crate) struct CoverageMap {
     /// By element, as many as there were then.
-    of: Vec<Closure>,
+    of: Vec<HemisphereCoverage>,
     /// By patch, the cluster that is its neighbourhood.
     near: Vec<u32>,
     /// Whether only a share of the rays was shot for them.
-    are_rough: bool,
+    is_rough: bool,
 }
 
-impl Closures {
+impl CoverageMap {
     /// The cell that an element lies in, or is.
     pub(crate) fn cell(&self, hierarchy: &Hierarchy, mut element: usize) -> usize {
         while element >= self.of.len() {
@@ -146,21 +146,17 @@ impl Closures {
     }
 
     /// Of all elements that there were when they were looked at.
-    pub(crate) fn new(hierarchy: &Hierarchy, of: Vec<Closure>, are_rough: bool) -> Self {
+    pub(crate) fn new(hierarchy: &Hierarchy, of: Vec<HemisphereCoverage>, is_rough: bool) -> Self {
         let mut near = vec![0; hierarchy.patches.len()];
         for cluster in hierarchy.groups(NEIGHBOURS) {
             near[hierarchy.clusters[cluster].patches()].fill(cluster as u32);
         }
-        Self {
-            of,
-            near,
-            are_rough,
-        }
+        Self { of, near, is_rough }
     }
 
-    /// The same closure of all patches.
-    fn even(hierarchy: &Hierarchy, closure: Closure) -> Self {
-        Self::new(hierarchy, vec![closure; hierarchy.patches.len()], false)
+    /// The same coverage of all patches.
+    fn even(hierarchy: &Hierarchy, coverage: HemisphereCoverage) -> Self {
+        Self::new(hierarchy, vec![coverage; hierarchy.patches.len()], false)
     }
 
     /// Those that need no rays: 1 on closed surfaces, and none where all form factors are exact. Elsewhere they must be
@@ -169,12 +165,12 @@ impl Closures {
         if !plan.is_clear {
             return None;
         }
-        let closure = match (plan.is_closed, plan.is_by_patch) {
-            (true, _) => Closure::CLOSED,
-            (false, true) => Closure::UNKNOWN,
+        let coverage = match (plan.is_enclosed, plan.is_by_patch) {
+            (true, _) => HemisphereCoverage::ENCLOSED,
+            (false, true) => HemisphereCoverage::UNKNOWN,
             (false, false) => return None,
         };
-        Some(Self::even(hierarchy, closure))
+        Some(Self::even(hierarchy, coverage))
     }
 
     /// Elements that there were when they were looked at, the cells among them; 0 where none was yet.
@@ -184,7 +180,7 @@ impl Closures {
 
     /// Whether they are good enough for coarse links, or for others.
     pub(crate) fn serve(&self, is_coarse: bool) -> bool {
-        !self.of.is_empty() && (is_coarse || !self.are_rough)
+        !self.of.is_empty() && (is_coarse || !self.is_rough)
     }
 
     /// Mean radiosity of the neighbourhood of a patch.
@@ -195,8 +191,8 @@ impl Closures {
         total.color() / total.area().max(f32::MIN_POSITIVE)
     }
 
-    /// The closure of a cell.
-    pub(crate) fn of(&self, cell: usize) -> Closure {
+    /// The coverage of a cell.
+    pub(crate) fn of(&self, cell: usize) -> HemisphereCoverage {
         self.of[cell]
     }
 
@@ -206,8 +202,8 @@ impl Closures {
     }
 }
 
-impl Closures {
-    /// Scale the colours of all leaves so that their form factors add to the closure, and no leaf's to more than 1 where
+impl CoverageMap {
+    /// Scale the colours of all leaves so that their form factors add to the coverage, and no leaf's to more than 1 where
     /// `bounds_rows`.
     pub(crate) fn scale(
         &self,
@@ -262,9 +258,10 @@ impl Closures {
             .with_min_len(1024)
             .map(|index| {
                 let cell = cell(index);
-                let closure = self.of(cell);
+                let coverage = self.of(cell);
                 let is_leaf = elements[index].is_leaf();
-                is_leaf.then(|| closure.factor_for(irradiance[index].form_factor_sum(), sums[cell]))
+                is_leaf
+                    .then(|| coverage.factor_for(irradiance[index].form_factor_sum(), sums[cell]))
             })
             .collect()
     }
@@ -285,10 +282,10 @@ mod tests {
         for _ in 0..200 {
             let (radiosity, row, share) =
                 (color(&mut random), 1.5 * random.uniform(), random.uniform());
-            let closure = Closure::estimated(share, 0.0);
+            let coverage = HemisphereCoverage::estimated(share, 0.0);
             let light = (radiosity * row).extend(row);
-            let scaled = closure.scaled(light, (1.0, row), radiosity);
-            let expected = radiosity * row * closure.factor(row);
+            let scaled = coverage.scaled(light, (1.0, row), radiosity);
+            let expected = radiosity * row * coverage.factor(row);
             assert!((scaled.color() - expected).abs().max_element() < 1e-5);
             assert_eq!(scaled.form_factor_sum(), row);
         }
@@ -301,7 +298,7 @@ mod tests {
             let (seen, nearby) = (color(&mut random), color(&mut random));
             let row = 0.3 + 0.7 * random.uniform();
             let light = (seen * row).extend(row);
-            let whole = Closure::CLOSED.scaled(light, (1.0, row), nearby);
+            let whole = HemisphereCoverage::ENCLOSED.scaled(light, (1.0, row), nearby);
             let luminance = |color: Vec3| luminance(color.extend(0.0));
             let lacking = luminance(whole.color() - seen * row) / (1.0 - row).max(1e-6);
             let least = luminance(seen).min(luminance(nearby));
@@ -316,7 +313,7 @@ mod tests {
     #[test]
     fn rows_that_are_far_too_large_are_scaled_as_they_are() {
         let light = Vec4::new(2.0, 1.0, 0.5, 2.0);
-        let scaled = Closure::CLOSED.scaled(light, (1.0, 2.0), Vec3::splat(9.0));
+        let scaled = HemisphereCoverage::ENCLOSED.scaled(light, (1.0, 2.0), Vec3::splat(9.0));
         assert_eq!(scaled, Vec4::new(1.0, 0.5, 0.25, 2.0));
     }
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// One thing that was left out, for people.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
+pub struct Omitted {
     /// What it is called; where it is the name of an [`Omission`](crate::solver::Omission), it can be kept.
     pub name: &'static str,
     /// How many of it.
@@ -17,7 +17,7 @@ pub struct LeftOut {
     pub bound: &'static str,
 }
 
-impl std::fmt::Display for LeftOut {
+impl std::fmt::Display for Omitted {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             name,

@@ -28,7 +28,12 @@ const PLACES: [Vec3; 7] = [
 impl Lights {
     /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
     /// emitters are not sampled, so that it is not known.
-    pub(super) fn bend_over(&self, hierarchy: &Hierarchy, element: usize, limits: Limits) -> bool {
+    pub(super) fn has_interpolation_error(
+        &self,
+        hierarchy: &Hierarchy,
+        element: usize,
+        limits: Limits,
+    ) -> bool {
         if !self.are_all(hierarchy) {
             return true;
         }
@@ -46,12 +51,12 @@ impl Lights {
             luminance(self.unoccluded(&receiver, None, &mut sums))
         };
         let corners = Vec3::from_array(Vec3::AXES.map(&mut light));
-        let bend = PLACES
+        let error = PLACES
             .map(|place| (light(place) - corners.dot(place)).abs())
             .into_iter()
             .fold(0.0, f32::max);
         let spread = corners.max_element() - corners.min_element();
         let mean = self.mean_power(hierarchy).max(f32::MIN_POSITIVE);
-        (bend + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
+        (error + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
     }
 }

@@ -27,7 +27,7 @@ const MOST_RATIO: f32 = 4.0;
 
 /// What rays from a vertex found.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Gathered {
+pub(super) struct GatherEstimate {
     /// Sum of the radiosities met.
     sum: Vec4,
     /// Sum of the squares of their luminances.
@@ -38,7 +38,7 @@ pub(super) struct Gathered {
     pub backs: u32,
 }
 
-impl Gathered {
+impl GatherEstimate {
     /// Count a ray by the radiosity that it met: `None` for a back.
     pub(super) fn count(&mut self, met: Option<Vec4>) {
         self.rays += 1;
@@ -108,11 +108,15 @@ pub(crate) fn factors(mut ratios: Vec<Option<Ratio>>, edges: &[[usize; 2]]) -> V
         .filter(|edge| edge.iter().all(|&vertex| ratios[vertex].is_some()))
         .collect();
     pool(&mut ratios, &edges);
-    let trusts = trusts(&ratios, &edges);
+    let shrinkage_factors = shrinkage_factors(&ratios, &edges);
     let factor = |(ratio, trust): (Option<Ratio>, f32)| {
         ratio.map_or(Vec4::ONE, |ratio| Vec4::ONE.lerp(ratio.color, trust))
     };
-    ratios.into_iter().zip(trusts).map(factor).collect()
+    ratios
+        .into_iter()
+        .zip(shrinkage_factors)
+        .map(factor)
+        .collect()
 }
 
 /// Take neighbours together, as far as noise explains how they differ.
@@ -162,7 +166,7 @@ fn pool(ratios: &mut [Option<Ratio>], edges: &[[usize; 2]]) {
 }
 
 /// How far each ratio is to be trusted, 0…1.
-fn trusts(ratios: &[Option<Ratio>], edges: &[[usize; 2]]) -> Vec<f32> {
+fn shrinkage_factors(ratios: &[Option<Ratio>], edges: &[[usize; 2]]) -> Vec<f32> {
     // Squares of differences, and of their noise.
     let square = |ratio: &Option<Ratio>| {
         ratio.map_or((0.0, 0.0), |ratio| {
@@ -205,7 +209,7 @@ mod tests {
     }
 
     fn ratio_over(linked: Vec4, met: &[f32], rays: u32) -> Ratio {
-        let mut found = Gathered::default();
+        let mut found = GatherEstimate::default();
         for ray in 0..rays {
             let seen = met[ray as usize % met.len()];
             found.count(Some(Vec3::splat(seen).extend(0.0)));

@@ -29,7 +29,7 @@ const PROBING_SHARE: f32 = 0.25;
 impl DirectField {
     /// Sample the corners of leaves for the first picture, by `samples` rays or fewer where there are many. Returns the rays
     /// shot; `None` when cancelled.
-    pub(crate) fn cover_first(
+    pub(crate) fn sample_vertices_first(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -38,7 +38,7 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let most = (FIRST_RAYS / hierarchy.mesh.vertices.len().max(1)).max(1);
-        self.cover(rays, hierarchy, samples.min(most as u32), seed, cancel)
+        self.sample_vertices(rays, hierarchy, samples.min(most as u32), seed, cancel)
     }
 
     /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.
@@ -46,7 +46,7 @@ impl DirectField {
     /// A share of the rays comes first. Where those of all other vertices of the same elements agree there is no shadow
     /// border, and they are enough, unless the vertex itself differs beyond chance. (To count its own rays, too, would be
     /// biased: where a hundredth of the light arrives, only what few vertices saw would be thinned by more rays.)
-    pub(crate) fn cover(
+    pub(crate) fn sample_vertices(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -58,7 +58,7 @@ impl DirectField {
         let first = if samples > self.samples {
             0
         } else {
-            self.covered
+            self.sampled_elements
         };
         let elements = first..hierarchy.mesh.elements.len();
         if elements.is_empty() {
@@ -94,13 +94,13 @@ impl DirectField {
             return None;
         }
         // All are sampled.
-        self.covered = elements.end;
+        self.sampled_elements = elements.end;
         self.samples = self.samples.max(samples);
         Some(self.shot(&receivers) - before)
     }
 
     /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
-    pub(super) fn settle(
+    pub(super) fn reduce_noise(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -179,7 +179,7 @@ impl DirectField {
         for &(vertex, _) in receivers {
             self.vertices[vertex as usize] = None;
         }
-        self.covered = 0;
+        self.sampled_elements = 0;
     }
 
     /// Rays shot from some vertices.
