@@ -43,8 +43,8 @@ pub struct Element {
     pub parent: u32,
     /// Halvings between the patch and this; a division into four counts two.
     pub level: u8,
-    /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that is
-    /// not known.
+    /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that
+    /// is not known.
     pub inside_solid: u8,
     /// Number of children: 0, 2 or 4.
     pub child_count: u8,
@@ -435,7 +435,8 @@ impl Mesh {
     }
 
     /// The leaves as triangles without T-junctions between those that light is computed for, each with the element that
-    /// it lies on: where a neighbour divided an edge, the vertex in its middle is used on this side, too. Vertices that this side of a crease lacks are made.
+    /// it lies on: where a neighbour divided an edge, the vertex in its middle is used on this side, too. Vertices that
+    /// this side of a crease lacks are made.
     pub fn crack_free_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
         let mut triangles = Vec::with_capacity(self.elements.len());
         for index in 0..self.elements.len() {
@@ -490,8 +491,8 @@ fn close([a, b, c]: [u32; 3], middles: [Option<u32>; 3], mut emit: impl FnMut([u
     }
 }
 
-/// Faces that are looked at across an edge to find the smoothest way on. Fewer, and the right one of a fan of sheets may
-/// be missed; all, and thousands of faces on one edge take the square of their number.
+/// Faces that are looked at across an edge to find the smoothest way on. Fewer, and the right one of a fan of sheets
+/// may be missed; all, and thousands of faces on one edge take the square of their number.
 const MOST_NEIGHBOURS: usize = 64;
 
 /// Vertices of the patches: corners at one point are one vertex where a chain of smooth edges joins their patches.
@@ -566,8 +567,8 @@ fn share_vertices(
     Some((vertices, vertex_of))
 }
 
-/// Of the patches at an edge the first that is met when one of them is turned about it towards its lit side; `None` where
-/// that is the back of a one-sided surface.
+/// Of the patches at an edge the first that is met when one of them is turned about it towards its lit side; `None`
+/// where that is the back of a one-sided surface.
 fn next_around<'a>(
     scene: &Scene,
     patches: &[Patch],

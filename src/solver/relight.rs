@@ -1,4 +1,4 @@
-//! The light of changed emitters and materials, solved anew on the links that there are (see `relighting`).
+//! Entry points of `Solver` for changed emitters and materials, solved on the existing links (see `relighting`).
 
 use std::sync::Arc;
 
@@ -10,19 +10,19 @@ use super::{
 use crate::scene::Appearance;
 
 impl Solver {
-    /// Light the scene with materials that look so, one for each: see [`Scene::allowed`](crate::scene::Scene::allowed). On
-    /// the links, elements and coverage that there are; a step that follows refines them. Returns `None` when cancelled on
-    /// the way: to be asked for again before the next step.
+    /// Light the scene with these appearances, one for each material (see
+    /// [`Scene::allowed`](crate::scene::Scene::allowed)), on the existing links, elements and coverage; the next step
+    /// refines them. Returns `None` when cancelled: it must then be called again before the next step.
     pub fn relight(&mut self, wished: &[Appearance], cancel: &Cancel) -> Option<Relit> {
         cancel.proceed()?;
         let appearances = self.scene.allowed(wished);
         let active = self.scene.active_materials(&appearances);
         let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
-        // Keep the light from before, while it is as it was.
+        // Store the present light before it changes.
         let factor =
             self.relighting
                 .keep_solved(&appearances, &self.hierarchy, &self.linked, &self.leaves);
-        // Direct light, as far as new rays are needed for it.
+        // Direct light, with new rays where they are needed.
         if let Some(field) = &mut self.direct {
             let shooting = Shooting {
                 scene: &self.scene,
@@ -37,7 +37,7 @@ impl Solver {
         let emitted_before = relighting::emitted(&self.hierarchy);
         self.hierarchy.paint(&self.scene, &appearances);
         self.relighting.appearances = appearances;
-        // Light over links: scaled where that is all, else iterated anew.
+        // Light over links: scaled where all light changes by one factor, else iterated.
         let mut report = self.relighting.unrefined_report();
         match factor.and_then(|factor| self.relighting.scaled(factor)) {
             Some((irradiance, leaves)) => {
@@ -72,7 +72,7 @@ impl Solver {
         })
     }
 
-    /// Let each leaf gather the light that [`Self::relight`] has solved. Returns `None` when cancelled on the way.
+    /// Gather the light that [`Self::relight`] has solved for each leaf. Returns `None` when cancelled.
     pub fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
         self.gather_relit(cancel)?;
         let mut report = self.relighting.unrefined_report();

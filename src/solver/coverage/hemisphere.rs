@@ -1,13 +1,14 @@
-//! HemisphereCoverage: which part of a surface's view is filled by lit surfaces.
+//! Hemisphere coverage: the cosine-weighted part of a surface's hemisphere that lit surfaces fill.
 //!
-//! It is 1 in a closed room, less in an open scene or where backs are seen. The sum of form factors of each leaf must
-//! equal it, so it tells by how much the kernel and the visibility of its links err together, and scales it away.
+//! It is 1 in an enclosed room, and less where rays leave the scene or meet backs. The sum of form factors of each leaf
+//! must equal it, so their ratio gives the joint error of the kernel and the visibility of its links, by which light is
+//! scaled.
 //!
-//! What the sum lacks is mostly near by: coarse links see a whole cluster from its centre, and tables see edge-on what
-//! lies beside it. Scaled like the rest, it would count as bright as what is far, and folds and undersides would glow. So
-//! it is taken for as bright as the neighbourhood of the leaf, if that is darker. (Trimmed error after the second step of
-//! `normal`: `room-42879` 5.8 → 4.7 %, `room-8621` 5.6 → 4.7 %; as bright as the neighbourhood whatever it sees: 5.0 %
-//! both, and lit hilltops up to twice too bright.)
+//! Form factors that are missing from the sum mostly belong to near surfaces: coarse links see a whole cluster from its
+//! centre, and tables see surfaces beside it edge-on. Simple scaling would take these surfaces for as bright as the far
+//! ones, and folds and undersides would glow. So the missing light has the radiosity of the neighbourhood of the leaf,
+//! if that is darker. (Trimmed error after the second step of `normal`: `room-42879` 5.8 → 4.7 %, `room-8621` 5.6 → 4.7
+//! %; always with that of the neighbourhood: 5.0 % both, and lit hilltops up to twice too bright.)
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -18,66 +19,66 @@ use crate::{
     transport::luminance,
 };
 
-/// Form factors that add to less than this share of the coverage are not trusted to stand for what is missing.
-/// Nearer to 1, and coarse links stay as wrong as they are; further, and the noise of a few rays is blown up.
+/// Smallest sum of form factors by which light is scaled up, as a share of the coverage. Larger, and the errors of
+/// coarse links remain; smaller, and the noise of a few rays is amplified.
 const LEAST_ROW: f32 = 0.3;
 
-/// Where more form factors are counted than there can be, by this share of the coverage, half of the surplus is taken
-/// for light. Less of it may be that of dark and buried faces alone. Smaller, and light is lost about buried faces;
-/// larger, and coarse links stay too bright.
+/// Excess of the sum of form factors over an estimated coverage, as a share of it, of which half is scaled away; of a
+/// smaller excess less, since it may come from dark faces and faces inside solids alone. Smaller, and light is lost
+/// about faces inside solids; larger, and coarse links stay too bright.
 const SURPLUS: f32 = 0.1;
 
-/// Patches of a neighbourhood at most. With 4 errors are alike, with 64 a little larger; fewer tell only of the leaf's own
-/// colour, more of what lies far off.
+/// Most patches of a neighbourhood. With 4 the errors are equal, with 64 a little larger. Smaller, and the
+/// neighbourhood has the colour of the leaf itself; larger, and it includes far surfaces.
 const NEIGHBOURS: u32 = 16;
 
-/// Sums of form factors that are too large by so little that they must be multiplied by more than this are treated as
-/// those that are too small: both are noise. Smaller, and what counts too much is taken for dark; larger, and light is
-/// lost on average (halls of sheets 3.5 % too dark at `draft` with 1, 2.4 % with 0.8).
+/// Factors above this, up to 1, count as noise: like missing light, surplus light has the radiosity of the
+/// neighbourhood if that is darker. Smaller, and real surplus is scaled too little; larger, and light is lost on
+/// average (halls of sheets 3.5 % too dark at `draft` with 1, 2.4 % with 0.8).
 const SLIGHT: f32 = 0.8;
 
-/// How much of a cell's view is filled by lit surfaces.
+/// The part of a cell's hemisphere that lit surfaces fill, cosine-weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HemisphereCoverage {
     /// The part, 0…1.
     share: f32,
-    /// Standard error of it: 0 in closed surroundings.
+    /// Standard error of the part; 0 if it is exact.
     deviation: f32,
 }
 
 impl HemisphereCoverage {
-    /// Surrounded by lit surfaces.
+    /// Enclosed by lit surfaces.
     pub(super) const ENCLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
     };
 
-    /// Anything between nothing and all: form factors are left as they are.
+    /// Unknown: light is not scaled.
     pub(super) const UNKNOWN: Self = Self {
         share: 0.0,
         deviation: f32::INFINITY,
     };
 
-    /// Within a solid, where nothing is seen.
+    /// Inside a solid, where no light arrives.
     pub(super) const INSIDE_SOLID: Self = Self {
         share: 0.0,
         deviation: 0.0,
     };
 
-    /// This part, known up to a standard error.
+    /// An estimate of the part, with its standard error.
     pub(super) fn estimated(share: f32, deviation: f32) -> Self {
         Self { share, deviation }
     }
 
-    /// Whether it is known without doubt, and so for every part of the cell.
+    /// Whether the part is exact, and so the same for all elements of the cell.
     fn is_certain(&self) -> bool {
         self.deviation == 0.0
     }
 
-    /// What irradiance must be multiplied by, given the sum of its form factors. Where the coverage is only estimated,
-    /// a sum that differs by no more than the estimate's error is left alone.
-    fn factor(&self, row: f32) -> f32 {
-        let gap = self.share - row;
+    /// Factor of an irradiance with this sum of form factors, at least 0. Where the coverage is an estimate, a sum
+    /// within its error is changed little.
+    fn factor(&self, row_sum: f32) -> f32 {
+        let gap = self.share - row_sum;
         let doubt = 2.0 * self.deviation;
         let trust = if self.is_certain() {
             1.0
@@ -85,13 +86,14 @@ impl HemisphereCoverage {
             let surplus = if gap < 0.0 { SURPLUS * self.share } else { 0.0 };
             gap * gap / (gap * gap + doubt * doubt + surplus * surplus)
         };
-        let target = row + trust * gap;
-        let row = row.max(LEAST_ROW * self.share);
-        if row > 0.0 { target / row } else { 1.0 }
+        let target = row_sum + trust * gap;
+        let row_sum = row_sum.max(LEAST_ROW * self.share);
+        if row_sum > 0.0 { target / row_sum } else { 1.0 }
     }
 
-    /// Light of a leaf, with the sum of its form factors, as it is if they add to the coverage. Over the whole cell,
-    /// `sums` are the area and the sum times area; `nearby` is the mean radiosity of the neighbourhood.
+    /// Irradiance of a leaf, with the sum of its form factors in the fourth channel, scaled so that these add to the
+    /// coverage. `sums` are the area of the cell and the sum of form factors times area over the cell; `nearby` is the
+    /// mean radiosity of the neighbourhood.
     pub(crate) fn scaled(&self, light: Vec4, sums: (f32, f32), nearby: Vec3) -> Vec4 {
         multiplied(
             light,
@@ -100,44 +102,44 @@ impl HemisphereCoverage {
         )
     }
 
-    /// The factor for one leaf, from the sum of its form factors. An estimate stands for the cell as a whole only: its
-    /// parts may rightly differ.
-    fn factor_for(&self, row: f32, (area, weighted): (f32, f32)) -> f32 {
+    /// The factor for one leaf with this sum of form factors. An estimate holds for the mean over the cell, whose
+    /// elements may differ.
+    fn factor_for(&self, row_sum: f32, (area, weighted): (f32, f32)) -> f32 {
         if self.is_certain() || area <= 0.0 {
-            self.factor(row)
+            self.factor(row_sum)
         } else {
             self.factor(weighted / area)
         }
     }
 }
 
-/// Light with its form factors, in the fourth channel and left as they are, times a factor; what it lacks comes from `nearby` if that is
-/// darker.
+/// Irradiance times a factor; the missing light has the radiosity `nearby` if that is darker. The sum of form factors
+/// in the fourth channel is unchanged.
 fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
-    let (color, row) = (light.color(), light.form_factor_sum());
-    if factor <= SLIGHT || row <= 0.0 {
-        return (color * factor).extend(row);
+    let (color, row_sum) = (light.color(), light.form_factor_sum());
+    if factor <= SLIGHT || row_sum <= 0.0 {
+        return (color * factor).extend(row_sum);
     }
-    let seen = color / row;
-    let is_darker = luminance(nearby.extend(0.0)) < luminance(seen.extend(0.0));
-    let missing = if is_darker { nearby } else { seen };
-    let whole = color + missing * ((factor - 1.0) * row);
-    whole.max(Vec3::ZERO).extend(row)
+    let mean = color / row_sum;
+    let is_darker = luminance(nearby.extend(0.0)) < luminance(mean.extend(0.0));
+    let missing = if is_darker { nearby } else { mean };
+    let complete = color + missing * ((factor - 1.0) * row_sum);
+    complete.max(Vec3::ZERO).extend(row_sum)
 }
 
-/// CoverageMap of the cells of a mesh: of its leaves as they were before light was known.
+/// Coverage by cell of a mesh. The cells are the leaves of the first mesh.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CoverageMap {
-    /// By element, as many as there were then.
+    /// By element of the first mesh.
     of: Vec<HemisphereCoverage>,
     /// By patch, the cluster that is its neighbourhood.
     near: Vec<u32>,
-    /// Whether only a share of the rays was shot for them.
+    /// Whether only a share of the rays was shot.
     is_rough: bool,
 }
 
 impl CoverageMap {
-    /// The cell that an element lies in, or is.
+    /// The cell that contains an element.
     pub(crate) fn cell(&self, hierarchy: &Hierarchy, mut element: usize) -> usize {
         while element >= self.of.len() {
             element = hierarchy.mesh.elements[element].parent as usize;
@@ -145,7 +147,7 @@ impl CoverageMap {
         element
     }
 
-    /// Of all elements that there were when they were looked at.
+    /// From the coverage of all elements of the first mesh.
     pub(crate) fn new(hierarchy: &Hierarchy, of: Vec<HemisphereCoverage>, is_rough: bool) -> Self {
         let mut near = vec![0; hierarchy.patches.len()];
         for cluster in hierarchy.groups(NEIGHBOURS) {
@@ -159,8 +161,9 @@ impl CoverageMap {
         Self::new(hierarchy, vec![coverage; hierarchy.patches.len()], false)
     }
 
-    /// Those that need no rays: 1 on closed surfaces, and none where all form factors are exact. Elsewhere they must be
-    /// probed: where walls are white, a leak that is seen by one ray in a thousand decides.
+    /// The coverage that is known without rays: 1 in enclosed scenes, and unknown where all form factors are exact.
+    /// `None` elsewhere: it must be probed, since with white walls even a leak that one ray in a thousand finds
+    /// matters.
     pub(crate) fn without_rays(plan: &Plan, hierarchy: &Hierarchy) -> Option<Self> {
         if !plan.is_clear {
             return None;
@@ -173,19 +176,19 @@ impl CoverageMap {
         Some(Self::even(hierarchy, coverage))
     }
 
-    /// Elements that there were when they were looked at, the cells among them; 0 where none was yet.
+    /// Number of elements of the first mesh; 0 before the coverage is known.
     pub(super) fn count(&self) -> usize {
         self.of.len()
     }
 
-    /// Whether they are good enough for coarse links, or for others.
+    /// Whether it is precise enough for a coarse step or another one.
     pub(crate) fn serve(&self, is_coarse: bool) -> bool {
         !self.of.is_empty() && (is_coarse || !self.is_rough)
     }
 
     /// Mean radiosity of the neighbourhood of a patch.
     pub(crate) fn nearby(&self, tables: &Tables, patch: usize) -> Vec3 {
-        // Where nothing is lit there is no cluster.
+        // A scene without active patches has no cluster.
         let cluster = tables.clusters.get(self.near[patch] as usize);
         let total = cluster.map_or(Vec4::ZERO, Moments::total);
         total.color() / total.area().max(f32::MIN_POSITIVE)
@@ -196,15 +199,15 @@ impl CoverageMap {
         self.of[cell]
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.of.as_slice()) + size_of_val(self.near.as_slice())
     }
 }
 
 impl CoverageMap {
-    /// Scale the colours of all leaves so that their form factors add to the coverage, and no leaf's to more than 1 where
-    /// `bounds_rows`.
+    /// Scale the irradiance of all leaves so that their form factors add to the coverage; if `bounds_rows`, those of
+    /// each leaf to at most 1.
     pub(crate) fn scale(
         &self,
         hierarchy: &Hierarchy,
@@ -230,19 +233,19 @@ impl CoverageMap {
             });
     }
 
-    /// What irradiance of each leaf must be multiplied by, given the sums of their form factors; `None` for other elements.
+    /// Factor of the irradiance by leaf, given the sums of form factors; `None` for other elements.
     pub(crate) fn factors(&self, hierarchy: &Hierarchy, irradiance: &[Vec4]) -> Vec<Option<f32>> {
         let elements = &hierarchy.mesh.elements;
         let cell_count = self.of.len();
         let cell = |index| self.cell(hierarchy, index);
         // Area and sum of form factors times area, by cell.
         let part = |index: usize| {
-            let (area, row) = (
+            let (area, row_sum) = (
                 elements[index].area_vector.length(),
                 irradiance[index].form_factor_sum(),
             );
             if elements[index].is_leaf() {
-                (area, area * row)
+                (area, area * row_sum)
             } else {
                 (0.0, 0.0)
             }
@@ -277,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn in_even_light_the_scale_is_all_that_counts() {
+    fn light_is_multiplied_by_the_factor_where_all_radiosities_are_equal() {
         let mut random = Random::new(3, 0);
         for _ in 0..200 {
             let (radiosity, row, share) =
@@ -292,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_lacking_is_never_brighter_than_the_neighbourhood_or_than_what_is_seen() {
+    fn missing_light_is_as_bright_as_the_darker_of_the_neighbourhood_and_the_mean() {
         let mut random = Random::new(4, 0);
         for _ in 0..200 {
             let (seen, nearby) = (color(&mut random), color(&mut random));
@@ -311,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_far_too_large_are_scaled_as_they_are() {
+    fn light_with_far_too_large_form_factors_is_scaled_as_a_whole() {
         let light = Vec4::new(2.0, 1.0, 0.5, 2.0);
         let scaled = HemisphereCoverage::ENCLOSED.scaled(light, (1.0, 2.0), Vec3::splat(9.0));
         assert_eq!(scaled, Vec4::new(1.0, 0.5, 0.25, 2.0));

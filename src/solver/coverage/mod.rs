@@ -1,4 +1,4 @@
-//! CoverageMap: which part of a view lit surfaces fill, and the rays that find it.
+//! Hemisphere coverage: the part of a surface's hemisphere that lit surfaces fill, and the rays that estimate it.
 
 mod hemisphere;
 mod prober;

@@ -1,4 +1,4 @@
-//! How coverage are found: rays from groups of cells, and from each cell of those groups that are open.
+//! Estimation of the coverage: rays from groups of cells, and from each cell of the groups that are not enclosed.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -11,89 +11,93 @@ use crate::{
     solver::{Cancel, places::outside_places},
 };
 
-/// Share of all rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and open places
-/// take light that is not theirs until the other rays are shot.
+/// Share of the rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and cells that
+/// are not enclosed are too bright until the other rays are shot.
 const ROUGH_SHARE: f32 = 0.125;
 
-/// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
+/// Patches that are probed together first. If every ray of a group meets a lit side, so do nearly all others. Smaller,
+/// and more rays are needed; larger, and one leak makes many cells be probed one by one.
 const GROUP_PATCHES: u32 = 64;
 
-/// Boxes of triangles that a ray crosses in usual scenes. Where it crosses many more, rays are saved, and patches share
-/// them in larger groups.
+/// Bounding boxes of triangles that a ray crosses in usual scenes. Where it crosses more, fewer rays are shot, from
+/// larger groups. Smaller, and the coverage is noisier; larger, and scenes of overlapping triangles take long.
 const USUAL_CROSSINGS: f32 = 64.0;
 
-/// Rays per group, at least.
+/// Fewest rays per group. Fewer, and leaks are missed; more cost time in all scenes.
 const GROUP_RAYS: usize = 24;
 
-/// More rays for groups with more cells than these times [`GROUP_RAYS`].
+/// Cells per ray of a group, if that gives more rays than [`GROUP_RAYS`]. Fewer cost time; more, and leaks are missed.
 const CELLS_PER_RAY: usize = 2;
 
-/// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
-/// `GROUP_RAYS` find enclosed may yet see a few holes, and where walls are white these few decide.
+/// Rays of the second pass over all groups, made if one group is not enclosed: in such a scene, groups that
+/// `GROUP_RAYS` found enclosed may have small leaks, which matter where walls are white. Fewer miss leaks; more cost
+/// time.
 const SECOND_RAYS: usize = 100_000;
 
-/// Rays of the second look per group at most.
+/// Most rays of the second pass per group. Fewer miss leaks in small scenes; more cost time there.
 const MOST_SECOND_RAYS: usize = 1024;
 
-/// Rays spent on all cells together where the rays of a group did not all meet a lit side, as long as that leaves each
-/// cell between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
+/// Rays of all cells of groups that are not enclosed, within the limits per cell below. More delay the first picture;
+/// fewer leave noise in scenes with openings.
 const CELL_RAYS: usize = 100_000;
 
-/// Rays per cell at least.
+/// Fewest rays per cell. Fewer leave noise; more delay the first picture of large scenes.
 const LEAST_CELL_RAYS: usize = 16;
 
-/// Open cells that are probed one by one. Beyond, neighbours share their rays: a large open scene would wait long for its
-/// first picture, and where all its triangles cross each other, each ray takes long, too.
+/// Most cells that are probed one by one; if there are more, neighbours share their rays. Smaller, and small
+/// differences between neighbours are lost; larger, and large scenes with openings wait long for their first picture.
 const MOST_PROBED_CELLS: usize = 60_000;
 
-/// Groups of neighbours that share their rays, about.
+/// Approximate number of groups of neighbours that share their rays. Fewer blur the coverage; more delay the first
+/// picture.
 const MOST_SHARES: usize = 15_000;
 
-/// Rays per cell at most.
+/// Most rays per cell. Fewer leave noise in small scenes; more cost time there.
 const MOST_CELL_RAYS: usize = 8192;
 
-/// Neighbouring cells of open groups count as enclosed if that many rays from them met nothing but lit sides. Fewer, and
-/// what leaks goes unseen; more, and few cells of small open scenes are known to be enclosed.
+/// Neighbouring cells count as enclosed if at least this many rays from them met only lit sides. Fewer, and leaks are
+/// missed; more, and few cells of small scenes with openings count as enclosed.
 const ENCLOSED_RAYS: f32 = 512.0;
 
-/// What the rays of a cell met.
+/// Counts of what the rays of a cell met.
 #[derive(Clone, Copy, Debug, Default)]
 struct Met {
     /// Rays that met a lit side.
     hits: f32,
-    /// Rays that count.
+    /// Rays that began outside solids.
     rays: f32,
-    /// Rays that began within a solid.
+    /// Rays that began inside a solid.
     within: f32,
 }
 
 impl Met {
-    /// Half a hit and half a miss more, so that no finite number of rays proves a certainty.
+    /// Share of hits, with half a hit and half a miss added, so that no finite number of rays gives 0 or 1.
     fn share(self) -> f32 {
         (self.hits + 0.5) / (self.rays + 1.0)
     }
 
-    /// Standard error of the share, if it is that of so many rays.
+    /// Standard error of the share for this many rays.
     fn deviation(self, rays: f32) -> f32 {
         (self.share() * (1.0 - self.share()) / (rays + 1.0)).sqrt()
     }
 
-    /// The coverage of each of `sharing` cells, by what their rays met and what those of their neighbourhood did.
+    /// The coverage of each of `sharing` cells, from their rays and those of their neighbourhood `around`.
     fn coverage(self, around: Self, sharing: usize) -> HemisphereCoverage {
         if self.rays == 0.0 {
             return HemisphereCoverage::INSIDE_SOLID;
         }
-        // Of cells that share their rays it is known no better than by a few of their own.
+        // Cells that share their rays may differ: their coverage counts as that of a few rays.
         let rays = if sharing > 1 {
             LEAST_CELL_RAYS as f32
         } else {
             self.rays
         };
-        // One ray more that met what those about it do on average: few rays say little.
+        // One more ray has the mean result of the neighbourhood.
         let share = (self.hits + around.share()) / (self.rays + 1.0);
         HemisphereCoverage::estimated(share, self.deviation(rays))
     }
 
+    /// The counts of both.
     fn and(self, other: Self) -> Self {
         Self {
             hits: self.hits + other.hits,
@@ -103,8 +107,9 @@ impl Met {
     }
 }
 
-/// The coverage of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of
-/// whose rays met lit sides are enclosed if these are enough to tell; the others are halved for as long as they are several.
+/// Append the coverage of cells in the order of the tree, of which each `sharing` cells share one count. Neighbours are
+/// enclosed if all their rays met lit sides and are at least [`ENCLOSED_RAYS`]; others are halved down to single
+/// counts.
 fn pooled(cells: &[Met], around: Met, sharing: usize, coverage: &mut Vec<HemisphereCoverage>) {
     let met = cells.iter().copied().fold(Met::default(), Met::and);
     if met.hits >= met.rays && met.rays >= ENCLOSED_RAYS {
@@ -118,16 +123,16 @@ fn pooled(cells: &[Met], around: Met, sharing: usize, coverage: &mut Vec<Hemisph
     }
 }
 
-/// What is found about the cells of a mesh.
+/// The result of probing.
 pub(crate) struct Probed {
     pub coverage: CoverageMap,
-    /// Cells that lie within a solid, in part or as a whole, so far as rays told.
+    /// Cells some of whose rays began inside a solid.
     pub within: Vec<usize>,
     pub ray_count: u64,
 }
 
-/// CoverageMap of all cells for coarse links or for others; `None` when cancelled. The cells are those of what is `known`, or,
-/// where nothing is, the leaves of the mesh as it is now.
+/// Estimate the coverage of all cells for a coarse step or another one; `None` when cancelled. The cells are those of
+/// the `known` coverage, or the present leaves of the mesh if none is known.
 pub(crate) fn probe(
     scene: &Scene,
     hierarchy: &Hierarchy,
@@ -137,7 +142,7 @@ pub(crate) fn probe(
     seed: u64,
     cancel: &Cancel,
 ) -> Option<Probed> {
-    // In the clear a tree is needed for this alone.
+    // In a clear scene only this needs a ray tree.
     let own_tree = rays.is_clear().then(|| RayTree::new(scene));
     let rays = own_tree.as_ref().unwrap_or(rays);
     let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
@@ -160,11 +165,11 @@ pub(crate) fn probe(
         .map(|group| cells(hierarchy, group, count))
         .filter(|cells| !cells.is_empty())
         .collect();
-    // Rays from groups, and from each cell of those that are open.
+    // Rays from groups, and from each cell of those that are not enclosed.
     let (unenclosed, tested) = prober.unenclosed_groups(&groups);
     let (found, probed) = prober.probe_groups(&unenclosed);
     cancel.proceed()?;
-    // All others are enclosed, or lie within solids.
+    // All others are enclosed, or inside solids.
     let elements = &hierarchy.mesh.elements[..count];
     let unprobed = |element: &Element| match element.is_inside_solid() {
         true => HemisphereCoverage::INSIDE_SOLID,
@@ -186,29 +191,29 @@ pub(crate) fn probe(
     })
 }
 
-/// Shoots the rays of coverage. When cancelled, what it finds is incomplete.
+/// Shoots the rays that estimate the coverage. When cancelled, its results are incomplete.
 struct Prober<'a> {
     scene: &'a Scene,
     hierarchy: &'a Hierarchy,
     rays: &'a RayTree,
     seed: u64,
     cancel: &'a Cancel,
-    /// Rays that are shot, of all that would be if each cost what usual ones do.
+    /// Share of the rays that is shot, by the step and by the cost of a ray.
     share: f32,
 }
 
 impl Prober<'_> {
-    /// What is shot of so many rays.
+    /// That share of a number of rays.
     fn budget(&self, rays: usize) -> usize {
         (rays as f32 * self.share) as usize
     }
 
-    /// What one ray from a cell meets.
+    /// One ray from a cell, by its number.
     fn probe_once(&self, cell: usize, number: usize) -> Met {
         self.probe(cell, 1, number as u32)
     }
 
-    /// The groups of cells that are not surrounded by lit surfaces, and the rays spent on finding them.
+    /// The groups of cells that are not enclosed by lit surfaces, and the number of rays.
     fn unenclosed_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
         let all_hit = |group: &[usize], first: usize, count: usize| {
             (0..count).all(|ray| {
@@ -246,10 +251,10 @@ impl Prober<'_> {
         )
     }
 
-    /// The coverage of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
-    /// them. Where there are many cells, neighbours share their rays.
+    /// By group, the coverage of each cell and whether some of its rays began inside a solid; and the number of rays.
+    /// Where there are many cells, neighbours share their rays.
     fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(HemisphereCoverage, bool)>>, usize) {
-        // How many cells share their rays, and how many rays a part of a group gets.
+        // The number of cells that share their rays, and the number of rays of a part of a group.
         let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
         let cells = || groups.iter().copied().flatten();
         let (cell_count, whole): (usize, f32) = (cells().count(), cells().map(area).sum());
@@ -265,7 +270,7 @@ impl Prober<'_> {
             let count = self.budget(CELL_RAYS) as f32 * 0.5 * (even + share);
             (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
         };
-        // What the rays of a part meet.
+        // The counts of a part.
         let probe_part = |part: &[usize]| match part {
             [cell] => self.probe(*cell, count(part) as u32, 0),
             _ => {
@@ -275,7 +280,7 @@ impl Prober<'_> {
                 met.fold(Met::default(), Met::and)
             }
         };
-        // By group, from the parts: halved for as long as it pays, then the same for all cells of a part.
+        // The coverage of each part, and the same for all its cells.
         let found = groups.par_iter().map(|group| {
             if self.cancel.is_cancelled() {
                 return Vec::new();
@@ -297,9 +302,9 @@ impl Prober<'_> {
         (found.collect(), shot)
     }
 
-    /// What some cosine-weighted rays from an element meet; `first` numbers them within the element. Of an element that
-    /// lies within a solid in part it is what its open places see: its links are scaled to that. A ray that meets the
-    /// inside of a solid began there, and does not count.
+    /// Counts of `count` cosine-weighted rays from an element; `first` is the number of the first within the element.
+    /// Rays of a contact element start at its places outside solids, to whose coverage its links are scaled. A ray that
+    /// meets the inside of a solid began there and is not counted in `rays`.
     fn probe(&self, element: usize, count: u32, first: u32) -> Met {
         let mut random = Random::new(self.seed, (u64::from(first) << 32) | element as u64);
         let shift = random.uniform_2d();
@@ -308,7 +313,7 @@ impl Prober<'_> {
         let places = outside_places(self.hierarchy, element);
         let mut met = Met::default();
         for index in 0..count {
-            // Only the directions are stratified: a point from the same sequence would go with its direction.
+            // Only directions are stratified: points of the same sequence would correlate with them.
             let at = triangle_point(random.uniform_2d());
             let place = (random.uniform() * places.len() as f32) as usize;
             let origin: Vec3 = match places.get(place) {
@@ -334,8 +339,8 @@ impl Prober<'_> {
     }
 }
 
-/// The elements of a cluster that are not buried and were leaves when there were `count` elements, in the order of its
-/// patches.
+/// The elements of a cluster that are outside solids and were leaves when the mesh had `count` elements, in the order
+/// of its patches.
 fn cells(hierarchy: &Hierarchy, cluster: usize, count: usize) -> Vec<usize> {
     let mut cells = Vec::new();
     let mut pending: Vec<usize> = hierarchy.clusters[cluster].patches().rev().collect();
@@ -362,7 +367,7 @@ mod tests {
     };
 
     #[test]
-    fn coarse_steps_shoot_a_share_of_the_rays_and_fine_ones_look_at_the_same_cells_again() {
+    fn coarse_steps_shoot_a_share_of_the_rays_and_fine_ones_probe_the_same_cells_again() {
         let scene = find_builtin("room-1022").unwrap().builder();
         let scene = Arc::new(scene.finish(&SceneOptions::default()).unwrap());
         let cancel = Cancel::default();
@@ -377,7 +382,7 @@ mod tests {
             assert!(solver.coverage.serve(is_coarse(threshold_scale)));
             assert_eq!(solver.coverage.count(), cells);
             probed.push(solver.ray_count - before);
-            // Elements that are divided since are no cells.
+            // Elements made by later divisions are not cells.
             let leaf = solver.hierarchy.mesh.leaves().next().unwrap();
             solver.hierarchy.mesh.divide(&[leaf as u32]);
         }

@@ -1,7 +1,7 @@
-//! Over which elements the light of sampled emitters is as good as linear, where nothing casts a shadow.
+//! Interpolation error of the unoccluded light of sampled emitters.
 //!
-//! Elements are divided where their corners do not tell what lies between. Shadows could hide from all of them, and so
-//! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
+//! All corners of an element may miss a shadow, and so large elements are divided whatever light they get. Without
+//! shadows it is enough to evaluate the unoccluded light at several places.
 
 use glam::Vec3;
 
@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Places on a triangle, barycentric: the middles of its sides and those of its quarters.
+/// Places on a triangle, barycentric: the midpoints of its sides and the centroids of its quarters.
 const PLACES: [Vec3; 7] = [
     Vec3::new(0.5, 0.5, 0.0),
     Vec3::new(0.0, 0.5, 0.5),
@@ -26,8 +26,8 @@ const PLACES: [Vec3; 7] = [
 ];
 
 impl Lights {
-    /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
-    /// emitters are not sampled, so that it is not known.
+    /// Whether linear interpolation of the unoccluded light between the corners of an element errs by more than the
+    /// tolerance, or the light is unknown because some emitters are not sampled.
     pub(super) fn has_interpolation_error(
         &self,
         hierarchy: &Hierarchy,

@@ -1,4 +1,4 @@
-//! Light straight from emitters.
+//! Direct light: irradiance straight from emitters.
 
 mod adapt;
 mod before_walls;

@@ -1,23 +1,23 @@
-//! When the noise of shadow rays calls for more of them.
+//! Noise of shadow rays, and when more of them are shot.
 
 use super::samples::{DirectLight, Tally};
 use crate::{hierarchy::luminance, solver::limits::Limits};
 
-/// Noise of a point, times the root of its share of the area, that is let be: this share of the tolerance. Larger leaves
-/// blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
+/// Tolerated noise of a point, times the square root of its share of the area, as a share of the tolerance. Larger
+/// leaves blotches, which are taken for shadow borders and divided; smaller costs rays, as one over its square.
 const NOISE_SHARE: f32 = 0.25;
 
-/// Shadow rays of a point at most, in multiples of the usual number.
+/// Most shadow rays of a point, in multiples of the usual number. Fewer leave noise; more cost time.
 const MOST_SAMPLES: u32 = 16;
 
 impl Limits {
-    /// Shadow rays of a point at most.
+    /// Most shadow rays of a point.
     pub(super) fn most_samples(&self) -> u32 {
         MOST_SAMPLES * self.shadow_samples
     }
 
-    /// Whether more rays should be shot from a point that stands for a part of the area, of which `weight` is the root, by
-    /// what the rays of its neighbours found.
+    /// Whether the noise of a point is not tolerated and more rays may be shot, by the tally of its neighbours;
+    /// `weight` is the square root of its share of the area.
     pub(super) fn is_noisy(
         &self,
         light: &DirectLight,
@@ -31,7 +31,7 @@ impl Limits {
                 || self.is_grainy(light, error, weight, mean))
     }
 
-    /// Whether the noise of the rays of a point can be seen, by its standard error.
+    /// Whether the noise of a point with this standard error is visible.
     pub(super) fn is_grainy(
         &self,
         light: &DirectLight,
@@ -43,8 +43,7 @@ impl Limits {
         self.is_noise_visible(error, beside, weight)
     }
 
-    /// Whether the rays of a point are too few where those of its neighbours had another outcome: though all of them
-    /// agree, others might not.
+    /// Whether a point whose neighbours differ from it has too few rays, though all of them have the same outcome.
     pub(super) fn is_doubtful(&self, light: &DirectLight, weight: f32, mean: f32) -> bool {
         let beside = mean.max(luminance(light.irradiance()));
         light.tried < self.most_samples() && self.is_noise_visible(light.doubt(), beside, weight)
@@ -92,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn what_gets_no_light_has_no_noise_to_be_seen() {
+    fn points_without_light_have_no_visible_noise() {
         let limits = limits(1e-3);
         assert!(!limits.is_grainy(&DirectLight::default(), 0.0, 1.0, 1.0));
         assert!(!limits.is_doubtful(&DirectLight::default(), 1.0, 1.0));

@@ -1,4 +1,4 @@
-//! Plain data handed out: what a solve shows and tells of itself.
+//! Plain data that a solve hands out: snapshots, reports, inspections, omissions.
 
 mod inspection;
 mod omitted;

@@ -1,14 +1,15 @@
-//! Values at vertices: carried over to those that nothing tells of, and moved until they add to what elements receive.
+//! Values at vertices: carried over to vertices without a value, and projected to the means of elements.
 
 use glam::Vec4;
 
 use crate::hierarchy::{Element, Hierarchy, Mesh};
 
-/// Elements over which light is carried at most: vertices under an object and those beside them.
+/// Most elements over which light is carried: to vertices under an object, and to those beside them. Fewer leave dark
+/// vertices; more cost time for vertices that are not visible.
 const CARRIED: u32 = 2;
 
-/// Give vertices of elements that lie within a solid in part, at which no leaf `is_known` what its corner there receives,
-/// the mean of those of these elements at which one does.
+/// Give vertices of contact elements whose value is unknown the mean of the known vertices of these elements. The value
+/// of a vertex is known if `is_known` holds for an element and its corner there (0…2).
 pub(crate) fn carry_over(
     mesh: &Mesh,
     is_known: impl Fn(&Element, usize) -> bool,
@@ -19,7 +20,7 @@ pub(crate) fn carry_over(
     if contacts.is_empty() {
         return;
     }
-    // Vertices that some leaf tells of.
+    // Vertices whose value some leaf knows.
     let mut known = vec![false; values.len()];
     for leaf in mesh.active_leaves() {
         let element = &mesh.elements[leaf];
@@ -27,7 +28,7 @@ pub(crate) fn carry_over(
             known[vertex as usize] |= is_known(element, side);
         }
     }
-    // Means over the elements in contact, from vertices that are known to those that are not.
+    // Means over the contact elements, from known vertices to unknown ones.
     for _ in 0..CARRIED {
         let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
         for &leaf in &contacts {
@@ -53,12 +54,13 @@ pub(crate) fn carry_over(
     }
 }
 
-/// Share of an element's mean that its centroid tells by the rule of degree 2; the corners tell the rest.
+/// Weight of the centroid in the quadrature rule of degree 2 over a triangle; the corners share the rest.
 const CENTRE_SHARE: f32 = 0.75;
 
-/// Move the values of vertices so that, taken linearly between them, they add to what the elements receive. Vertices lie
-/// in corners and at contacts, where light is less: as they are, they would show all surfaces too dark. Of each element
-/// with a known centroid: index and value there. Values stay between those around them.
+/// Change the values of vertices so that their linear interpolation has the means of the elements. Vertices lie in
+/// corners and at contacts, where light is less: without the change all surfaces would be too dark. `centres` has the
+/// index of each element with a value at its centroid, and that value. Values stay within the range of those about
+/// them.
 pub(crate) fn project(
     hierarchy: &Hierarchy,
     values: &mut [Vec4],

@@ -1,4 +1,4 @@
-//! Where light is evaluated, and what counts how much there.
+//! The places at which light is evaluated, and their weights.
 
 mod agreement;
 mod carry;

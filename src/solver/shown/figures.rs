@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// Fill in what can be read off the light after a step.
+/// Fill in the figures that follow from links and light.
 pub(crate) fn fill(
     report: &mut StepReport,
     surfaces: Surfaces<'_>,
@@ -30,7 +30,7 @@ pub(crate) fn fill(
     fill_row_sums(report, hierarchy, linked);
 }
 
-/// Power that arrives at all leaves relative to power that left: emission and reflection.
+/// Power that arrives at all leaves relative to the emitted and reflected power.
 fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let hierarchy = surfaces.hierarchy;
     let arrived = area_total(hierarchy, |leaf| linked.total(surfaces, leaf));
@@ -64,7 +64,7 @@ fn estimated_error(surfaces: Surfaces<'_>, linked: &LinkedLight, leaves: &[LeafL
     }
 }
 
-/// Sums of form factors: what leaves receive when everything sends 1.
+/// Fill in the sums of form factors: the irradiance of leaves if every radiosity were 1.
 fn fill_row_sums(report: &mut StepReport, hierarchy: &Hierarchy, linked: &LinkedLight) {
     let (mut least, mut most) = (f32::INFINITY, 0.0f32);
     let (mut sum, mut whole) = (0.0f64, 0.0f64);

@@ -1,12 +1,12 @@
-//! Indirect light at vertices, gathered once more by rays where links are found to be wrong.
+//! Final gather: indirect light at vertices from rays, where the linked light is wrong.
 //!
-//! A link knows of what stands between its ends only which part gets through, and it takes that part for the same all
-//! over its receiver. In the corner between a floor and what stands on it that shows: light from beyond the object
-//! leaks into the corner, however small the elements there are, and into closed rooms. So a few cosine-weighted rays from
-//! each vertex probe at the radiosity of what they meet. Where vertices and their neighbours together find something else
-//! than the links, many rays do. What rays met is remembered, so that it can be asked again once the light there has been
-//! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
-//! factor by vertex, so that it holds for other lights on the same links, too.
+//! A link has one visibility for all of its receiver. In the corner between a floor and an object this is visible:
+//! light from behind the object leaks into the corner, however small its elements are, and likewise into enclosed
+//! rooms. So a few cosine-weighted rays from each vertex read the radiosity of the surfaces that they meet. Where
+//! vertices and their neighbours together differ from the linked light, many rays are shot. The hits are stored, so
+//! that their radiosity can be evaluated again after the light there has been corrected, too: in a dark enclosed room
+//! into which links leak light, nothing remains in the end. The result is a factor by vertex, which also applies to
+//! other light on the same links.
 
 use std::f32::consts::PI;
 
@@ -30,53 +30,53 @@ use crate::{
     transport::luminance,
 };
 
-/// Rays from each vertex. Fewer miss shallow corners, more cost time everywhere.
+/// Rays from each vertex at first. Fewer miss shallow corners; more cost time everywhere.
 const MOST_PROBE_RAYS: u32 = 16;
 
-/// Rays from all vertices, about: of large meshes fewer are shot from each. Fewer tell less than links do, more take longer
-/// than all steps before.
+/// Approximate limit of the first rays from all vertices, for large meshes. Fewer are less precise than links; more
+/// take longer than all steps before.
 const MOST_PROBE_RAYS_IN_ALL: usize = 1 << 21;
 
-/// Rays from each vertex at least.
+/// Fewest rays from each vertex. Fewer find nothing; more take long for large meshes.
 const LEAST_PROBE_RAYS: u32 = 2;
 
-/// One of so many rays may meet a back. From a vertex that lies within something what rays find is dark, and would show
-/// around it.
+/// Fewest rays per ray that meets a back; vertices with more backs are inside an object, and have no estimate, since it
+/// would darken their surroundings. Fewer leave dark spots; more exclude vertices near one-sided surfaces.
 const RAYS_OF_BACK: u32 = 4;
 
-/// Rays from a vertex in a corner at most. Fewer leave grain, more cost time there.
+/// Most rays from a vertex in a corner. Fewer leave grain; more cost time there.
 const MOST_GATHER_RAYS: u32 = 256;
 
-/// Standard errors by which what a vertex and its neighbours find must differ from what links tell to be a corner.
-/// Smaller gathers by chance, larger misses corners.
+/// Difference from which the estimates of a vertex and its neighbours make a corner, in standard errors. Smaller shoots
+/// many rays by chance; larger misses corners.
 const DEVIATIONS: f32 = 1.5;
 
-/// Part of the light that leaves a vertex that must be indirect for rays to probe at it: what a lamp reflects is not seen beside
-/// what it emits.
+/// Smallest indirect part of the light that leaves a vertex for which rays are shot: the light that a lamp reflects is
+/// not visible beside its emission. Smaller costs rays; larger leaves errors of links on bright surfaces.
 const LEAST_INDIRECT: f32 = 0.1;
 
-/// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
+/// Most rounds of evaluation. Fewer leave light in enclosed white rooms; more change nothing visible.
 const MOST_ROUNDS: u32 = 64;
 
-/// Rays are asked again until that changes no vertex by more than this part of the tolerance of sweeps, times the scene's
-/// mean. Larger leaves light in closed rooms, where each round takes away what walls absorb; smaller takes time.
+/// Largest change of a vertex at which rounds end, in multiples of the tolerance of sweeps times the scene's mean.
+/// Larger leaves light in enclosed rooms, where each round removes what walls absorb; smaller takes time.
 const CONVERGED_SHARE: f32 = 0.1;
 
-/// Rounds that are remembered to accelerate them. Fewer take longer in white rooms, more gain nothing.
+/// Rounds that acceleration remembers. Fewer take longer in white rooms; more gain nothing.
 const DEPTH: usize = 3;
 
 /// What a ray met.
 #[derive(Clone, Copy)]
 enum Met {
-    /// Nothing that sends light.
+    /// Nothing, or an inactive surface.
     Nothing,
     /// The back of a one-sided surface.
     Back,
-    /// A leaf, with the shares that its first two corners have in the light there.
+    /// A leaf, with the first two barycentric coordinates of the point.
     Leaf(u32, [f32; 2]),
 }
 
-/// What a leaf sends, from the light at its corners.
+/// A leaf as a source: its radiosity follows from the irradiance at its corners.
 #[derive(Clone, Copy, Default)]
 struct Sender {
     vertices: [u32; 3],
@@ -85,8 +85,7 @@ struct Sender {
 }
 
 impl Sender {
-    /// Radiosity where the first two corners have these shares, of irradiance `received` at vertices and linear between
-    /// them.
+    /// Radiosity at these barycentric coordinates for the irradiance `received` at vertices, interpolated linearly.
     fn radiosity(&self, [a, b]: [f32; 2], received: &[Vec4]) -> Vec4 {
         let [first, second, third] = self.vertices.map(|vertex| received[vertex as usize]);
         let irradiance = first * a + second * b + third * (1.0 - a - b);
@@ -94,65 +93,65 @@ impl Sender {
     }
 }
 
-/// A vertex that rays probe at.
+/// A vertex from which rays are shot.
 struct VertexProbe {
     vertex: usize,
     place: Receiver,
     /// Linked irradiance.
     linked: Vec4,
-    /// Luminance of all irradiance.
+    /// Luminance of the total irradiance.
     all: f32,
-    /// Root of the vertex's share of the area.
+    /// Square root of the vertex's share of the area.
     weight: f32,
-    /// Variance of the luminance that one ray meets, as links tell it; 0 where they carry no emission.
+    /// Variance of the radiosity (luminance) that one ray meets, known from links; 0 where links carry no emission.
     variance: f32,
     met: Vec<Met>,
     found: GatherEstimate,
 }
 
 impl VertexProbe {
-    /// Whether noise of what was found would show.
+    /// Whether noise of the estimate is visible.
     fn is_noisy(&self, limits: Limits) -> bool {
         let (_, variance) = self.found.gap(self.linked, self.variance);
         limits.is_noise_visible(variance.sqrt(), self.all, self.weight)
     }
 }
 
-/// What a final gather needs.
+/// Input of a final gather.
 #[derive(Clone, Copy)]
 pub(crate) struct FinalGather<'a> {
-    /// What rays meet, with its direct light.
+    /// The elements, with their direct light.
     pub surfaces: Surfaces<'a>,
-    /// What leaves found over links.
+    /// Linked light of the leaves.
     pub leaves: &'a [LeafLight],
-    /// The same for the square of the luminance, where links carry emission: a few rays do not find a small lamp, and only links
-    /// tell how much it counts. Empty elsewhere.
+    /// The same for the square of the luminance, if links carry emission: a few rays miss a small lamp, so that only
+    /// links give their variance. Empty otherwise.
     pub squares: &'a [LeafLight],
-    /// What blocks.
+    /// The occluders.
     pub rays: &'a RayTree,
-    /// Which noise shows.
+    /// The visibility of errors and noise.
     pub limits: Limits,
-    /// Change of irradiance (luminance) of a vertex below which rays are not asked again.
+    /// Change of irradiance (luminance) of a vertex at which rounds end.
     pub converged_change: f32,
-    /// Stops it.
+    /// The request to stop.
     pub cancel: &'a Cancel,
 }
 
-/// What a final gather finds.
+/// Result of a final gather.
 pub(crate) struct GatherFactors {
-    /// By vertex, what linked light is to be multiplied by; empty for 1.
+    /// Factor of the linked light by vertex; empty for 1.
     pub factors: Vec<Vec4>,
     /// Rays shot.
     pub ray_count: u64,
 }
 
-/// Change of irradiance of a vertex that is too small to ask rays again, for a tolerance of sweeps and the mean irradiance.
+/// Change of irradiance (luminance) of a vertex at which rounds end, for a tolerance of sweeps and a mean irradiance.
 pub(crate) fn converged_change(tolerance: f32, mean_irradiance: f32) -> f32 {
     CONVERGED_SHARE * tolerance * mean_irradiance
 }
 
 impl FinalGather<'_> {
-    /// Find by what linked light at vertices is to be multiplied; `None` when cancelled. Where nothing blocks, links tell all.
+    /// Find the factors of the linked light; `None` when cancelled. In a clear scene they are 1.
     pub(crate) fn run(self) -> Option<GatherFactors> {
         if self.rays.is_clear() {
             return Some(GatherFactors {
@@ -161,7 +160,7 @@ impl FinalGather<'_> {
             });
         }
         let hierarchy = self.surfaces.hierarchy;
-        // Light at vertices as links and shadow rays tell it.
+        // Light at vertices from links and from shadow rays.
         let linked = VertexMeans::new(hierarchy, self.leaves, &[]).irradiance;
         let direct: Vec<Vec4> = match self.surfaces.direct {
             Some(field) => field
@@ -180,7 +179,7 @@ impl FinalGather<'_> {
         let mut ray_count = self.shoot(&mut probes, |_| probe_rays)?;
         evaluate(&mut probes, &senders, &received);
         probes.retain(|probe| probe.found.backs * RAYS_OF_BACK <= probe.found.rays);
-        // Many where these differ from links.
+        // Many where these differ from the linked light.
         let edges = edges(hierarchy);
         let is_corner = in_corners(&edges, hierarchy.mesh.vertices.len(), &probes, self.limits);
         let mut most = probe_rays;
@@ -195,14 +194,14 @@ impl FinalGather<'_> {
             ray_count += self.shoot(&mut probes, more)?;
             evaluate(&mut probes, &senders, &received);
         }
-        // What they mean for the light, until that agrees with itself.
+        // The factors for which the light is consistent.
         let light = [&linked, &direct].map(Vec::as_slice);
         let factors = self.converged_factors(&mut probes, &senders, &edges, light)?;
         Some(GatherFactors { factors, ray_count })
     }
 
-    /// Correct linked and direct light at the vertices by what rays found, ask them again, and so on until nothing changes.
-    /// Returns factors by vertex.
+    /// Correct the linked light at the vertices by the estimates and evaluate the rays again, until the light
+    /// converges. Returns factors by vertex.
     fn converged_factors(
         &self,
         probes: &mut [VertexProbe],
@@ -239,7 +238,7 @@ impl FinalGather<'_> {
         }
     }
 
-    /// The vertices at which enough light is indirect, by linked irradiance.
+    /// The vertices at which enough light is indirect, given the linked irradiance.
     fn probes(&self, linked: &[Vec4]) -> Vec<VertexProbe> {
         let Surfaces { hierarchy, direct } = self.surfaces;
         let mesh = &hierarchy.mesh;
@@ -274,7 +273,7 @@ impl FinalGather<'_> {
         places.into_iter().filter_map(probe).collect()
     }
 
-    /// Shoot rays until each vertex has had as many as are wanted. Returns the rays shot; `None` when cancelled.
+    /// Shoot rays until each vertex has had the wanted number. Returns the rays shot; `None` when cancelled.
     fn shoot(
         &self,
         probes: &mut [VertexProbe],
@@ -325,7 +324,7 @@ impl FinalGather<'_> {
         Met::Leaf(leaf as u32, [a, b])
     }
 
-    /// What each element sends over links if it is a leaf.
+    /// All leaves outside solids as sources, by element.
     fn senders(&self) -> Vec<Sender> {
         let hierarchy = self.surfaces.hierarchy;
         let elements = &hierarchy.mesh.elements;
@@ -349,7 +348,7 @@ impl FinalGather<'_> {
     }
 }
 
-/// By vertex, the irradiance (luminance) of which the elements about it would reflect as much light as they emit.
+/// By vertex, the irradiance (luminance) for which the elements about it would reflect as much light as they emit.
 fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
     let mesh = &hierarchy.mesh;
     let power = |leaf: usize, radiosity: Vec3| {
@@ -363,7 +362,7 @@ fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
         .collect()
 }
 
-/// Count the radiosity of what rays met, of irradiance `received` at vertices.
+/// Evaluate the estimates from the hits of all rays, for the irradiance `received` at vertices.
 fn evaluate(probes: &mut [VertexProbe], senders: &[Sender], received: &[Vec4]) {
     let radiosity = |met: &Met| match *met {
         Met::Nothing => Some(Vec4::ZERO),
@@ -378,21 +377,22 @@ fn evaluate(probes: &mut [VertexProbe], senders: &[Sender], received: &[Vec4]) {
     });
 }
 
-/// Vertices at the ends of the edges of leaves; inner edges come twice.
+/// The edges of leaves, as pairs of vertices; inner edges come twice.
 fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
     let mesh = &hierarchy.mesh;
     let of = |leaf: usize| mesh.elements[leaf].edges();
     mesh.active_leaves().flat_map(of).collect()
 }
 
-/// Vertices that find something else than links tell, together with their neighbours, and these neighbours.
+/// Whether the estimates of a vertex and its neighbours differ from the linked light, or those of a neighbour do; by
+/// vertex.
 fn in_corners(
     edges: &[[usize; 2]],
     vertex_count: usize,
     probes: &[VertexProbe],
     limits: Limits,
 ) -> Vec<bool> {
-    // Gap, its variance, and how many.
+    // The difference, its variance, and the number of vertices.
     let mut own = vec![(0.0f32, 0.0f32, 0.0f32); vertex_count];
     for probe in probes {
         let (gap, variance) = probe.found.gap(probe.linked, probe.variance);
@@ -400,7 +400,7 @@ fn in_corners(
     }
     let mut pooled = own.clone();
     for &[vertex, next] in edges {
-        // An inner edge comes once from each end, so each neighbour is taken once, but at borders.
+        // An inner edge comes once from each end, so each neighbour is added once, except at borders.
         let (sum, next) = (&mut pooled[vertex], own[next]);
         *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
     }

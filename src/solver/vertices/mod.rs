@@ -1,4 +1,4 @@
-//! Light at vertices: from links, and from rays in the last step.
+//! Light at vertices: from links, and in the last step from rays.
 
 mod final_gather;
 mod gather_estimate;
