@@ -1,15 +1,33 @@
-//! Entry points of `Solver` for changed emitters and materials, solved on the existing links (see `relighting`).
+//! Entry points of `Solver` on its existing links, without a step: changed emitters and materials (see `relighting`), and
+//! an early final gather.
 
 use std::sync::Arc;
 
 use super::{
     Cancel, Relit, Solver, StepReport,
     direct::{Shooting, Surfaces},
-    relighting, shown,
+    relighting,
+    schedule::threshold_scale,
+    shown,
 };
 use crate::scene::Appearance;
 
 impl Solver {
+    /// Run the final gather on the existing links, as the last step does: for when no further step can end in time. The
+    /// report is that of the last step. `None` when cancelled; the light is then that of the last step.
+    pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        let scale = threshold_scale(self.step, self.settings.step_count());
+        let found = self.final_gather(scale, cancel)?;
+        let before = std::mem::replace(&mut self.vertex_factors, found);
+        let mut report = self.relighting.last_report();
+        self.fill(&mut report);
+        if self.show(self.step, cancel).is_none() {
+            self.vertex_factors = before;
+            return None;
+        }
+        Some(report)
+    }
+
     /// Light the scene with these appearances, one for each material (see
     /// [`Scene::allowed`](crate::scene::Scene::allowed)), on the existing links, elements and coverage; the next step
     /// refines them. Returns `None` when cancelled: it must then be called again before the next step.

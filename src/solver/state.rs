@@ -11,7 +11,7 @@ use super::{
     direct::{self, DirectField, Lights, Surfaces},
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
-    places::{self, OffsetPlaces},
+    places,
     plan::Plan,
     refine::Refining,
     relighting::Relighting,
@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    hierarchy::{Hierarchy, SheetSides},
+    hierarchy::{Hierarchy, SheetSides, Tables},
     scene::{ActiveMaterials, Appearance, Scene},
     transport::Kernel,
 };
@@ -50,7 +50,7 @@ pub struct Solver {
     /// Linked light of the leaves when they gathered last.
     pub(super) leaves: Vec<LeafLight>,
     /// Factor of the linked light by vertex, from the final gather; empty for 1.
-    vertex_factors: Vec<Vec4>,
+    pub(super) vertex_factors: Vec<Vec4>,
     /// Mean irradiance (luminance), to which the thresholds of the last step relate.
     pub(super) mean_irradiance: f32,
     // Progress.
@@ -213,21 +213,6 @@ impl Solver {
         Some(report)
     }
 
-    /// Run the final gather on the existing links, as the last step does: for when no further step can end in time. The
-    /// report is that of the last step. `None` when cancelled; the light is then that of the last step.
-    pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        let scale = threshold_scale(self.step, self.settings.step_count());
-        let found = self.final_gather(scale, cancel)?;
-        let before = std::mem::replace(&mut self.vertex_factors, found);
-        let mut report = self.relighting.last_report();
-        self.fill(&mut report);
-        if self.show(self.step, cancel).is_none() {
-            self.vertex_factors = before;
-            return None;
-        }
-        Some(report)
-    }
-
     pub(super) fn surfaces(&self) -> Surfaces<'_> {
         Surfaces::new(&self.hierarchy, &self.direct)
     }
@@ -381,35 +366,37 @@ impl Solver {
 
     /// Gather once more for each leaf, at its own corners.
     pub(super) fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
-        let reading = self.settings.method.reading();
-        let kernel = self.linked.kernel(&self.hierarchy, reading);
-        let none = OffsetPlaces::default();
-        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
-        let (links, coverage) = (&self.linked.links, &self.coverage);
-        self.leaves = vertices::gather_leaves(kernel, links, coverage, offsets, is_coarse, cancel)?;
+        self.leaves = self.gathered(&self.linked.power, is_coarse, cancel)?;
         Some(())
     }
 
-    /// As [`Self::gather_for_leaves`], for the square of the luminance.
-    fn gather_squares(&self, cancel: &Cancel) -> Option<Vec<LeafLight>> {
-        let tables = self.linked.squares(&self.hierarchy);
+    /// Light of the leaves, gathered over the links from these source tables.
+    fn gathered(
+        &self,
+        tables: &Tables,
+        is_coarse: bool,
+        cancel: &Cancel,
+    ) -> Option<Vec<LeafLight>> {
         let kernel = Kernel {
-            tables: &tables,
-            ..self
-                .linked
-                .kernel(&self.hierarchy, self.settings.method.reading())
+            hierarchy: &self.hierarchy,
+            tables,
+            reading: self.settings.method.reading(),
         };
-        let none = OffsetPlaces::default();
-        let offsets = self.direct.as_ref().map_or(&none, |field| &field.offsets);
-        let (links, coverage) = (&self.linked.links, &self.coverage);
-        vertices::gather_leaves(kernel, links, coverage, offsets, false, cancel)
+        let (surfaces, links) = (self.surfaces(), &self.linked.links);
+        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, is_coarse, cancel)
     }
 
     /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.
-    fn final_gather(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<Vec<Vec4>> {
+    pub(super) fn final_gather(
+        &mut self,
+        threshold_scale: f32,
+        cancel: &Cancel,
+    ) -> Option<Vec<Vec4>> {
         let tolerance = threshold_scale * self.settings.tolerance;
         let squares = match self.settings.direct {
-            Direct::Linked => self.gather_squares(cancel)?,
+            Direct::Linked => {
+                self.gathered(&self.linked.squares(&self.hierarchy), false, cancel)?
+            }
             Direct::Sampled => Vec::new(),
         };
         let gather = FinalGather {
@@ -433,10 +420,7 @@ impl Solver {
         report.shadow_rays = self.ray_count;
         report.memory_bytes = budget.used_bytes(surfaces, &self.linked);
         if self.is_full || budget.is_exceeded(surfaces, &self.linked) {
-            report.is_full = true;
-            report.notes.push(
-                "the memory limit is reached; refinement stops here with what fits".to_owned(),
-            );
+            shown::note_full(report);
         }
     }
 

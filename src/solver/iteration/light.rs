@@ -72,7 +72,7 @@ impl LinkedLight {
         let mut squares = Tables::default();
         squares.pull(hierarchy, |leaf| {
             let sent = self.power.elements[leaf];
-            Vec3::splat(luminance(sent).powi(2)).extend(sent.w)
+            Vec3::splat(luminance(sent).powi(2)).extend(sent.active_share())
         });
         squares
     }

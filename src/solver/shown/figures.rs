@@ -30,6 +30,13 @@ pub(crate) fn fill(
     fill_row_sums(report, hierarchy, linked);
 }
 
+/// Note that the memory limit prevented finer links or elements.
+pub(crate) fn note_full(report: &mut StepReport) {
+    report.is_full = true;
+    let note = "the memory limit is reached; refinement stops here with what fits";
+    report.notes.push(note.to_owned());
+}
+
 /// Power that arrives at all leaves relative to the emitted and reflected power.
 fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let hierarchy = surfaces.hierarchy;

@@ -6,5 +6,5 @@ mod inspect;
 mod seams;
 
 pub(crate) use display::{View, changed_triangles, color};
-pub(crate) use figures::fill;
+pub(crate) use figures::{fill, note_full};
 pub(crate) use inspect::Inspector;

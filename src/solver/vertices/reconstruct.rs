@@ -13,7 +13,7 @@ use crate::{
     solver::{
         Cancel,
         coverage::{CoverageMap, HemisphereCoverage},
-        direct::SPREAD_SHARE,
+        direct::{SPREAD_SHARE, Surfaces},
         limits::Limits,
         places::{OffsetPlaces, carry_over, project, share_root},
     },
@@ -47,16 +47,18 @@ pub(crate) struct LeafLight {
     pub error: f32,
 }
 
-/// Linked light of all leaves, in the order of the tree; `None` when cancelled.
+/// Linked light of all leaves, in the order of the tree, at the places of their direct light; `None` when cancelled.
 pub(crate) fn gather_leaves(
     kernel: Kernel<'_>,
+    surfaces: Surfaces<'_>,
     links: &LinkStore,
     coverage: &CoverageMap,
-    offsets: &OffsetPlaces,
     is_coarse: bool,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
     let hierarchy = kernel.hierarchy;
+    let none = OffsetPlaces::default();
+    let offsets = surfaces.direct.map_or(&none, |field| &field.offsets);
     let sight_distance = match is_coarse {
         true => COARSE_SIGHT_DISTANCE,
         false => SIGHT_DISTANCE,
