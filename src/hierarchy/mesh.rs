@@ -43,8 +43,8 @@ pub struct Element {
     pub parent: u32,
     /// Halvings between the patch and this; a division into four counts two.
     pub level: u8,
-    /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that
-    /// is not known.
+    /// Bit k: whether corner k lies inside a solid or behind a wall; bit 3: whether the centroid does.
+    /// [`Element::UNPROBED`] if that is unknown.
     pub inside_solid: u8,
     /// Number of children: 0, 2 or 4.
     pub child_count: u8,
@@ -60,28 +60,28 @@ impl Element {
     /// Stands for missing children.
     pub const LEAF: u32 = u32::MAX;
 
-    /// Stands for [`Element::inside_solid`] where it is not known.
+    /// Value of [`Element::inside_solid`] before it is known.
     pub const UNPROBED: u8 = u8::MAX;
 
-    /// [`Element::inside_solid`] where all of it lies within a solid.
+    /// Value of [`Element::inside_solid`] if all of it lies inside a solid.
     const ALL_INSIDE: u8 = 0b1111;
 
-    /// Whether it lies within a solid in part.
+    /// Whether it is a contact: partly inside a solid or behind a wall.
     pub fn is_contact(&self) -> bool {
         !matches!(self.inside_solid, 0 | Self::ALL_INSIDE | Self::UNPROBED)
     }
 
-    /// Whether all of it lies within a solid.
+    /// Whether all of it lies inside a solid.
     pub fn is_inside_solid(&self) -> bool {
         self.inside_solid == Self::ALL_INSIDE
     }
 
-    /// Whether none of it is known to lie within a solid.
+    /// Whether none of it is known to lie inside a solid.
     pub fn is_outside_solids(&self) -> bool {
         matches!(self.inside_solid, 0 | Self::UNPROBED)
     }
 
-    /// Whether a corner is known to lie within a solid.
+    /// Whether a corner is known to lie inside a solid.
     pub fn is_inside_solid_at(&self, side: usize) -> bool {
         self.inside_solid != Self::UNPROBED && self.inside_solid & (1 << side) != 0
     }
@@ -434,9 +434,8 @@ impl Mesh {
             .any(|key| self.is_quartered(key))
     }
 
-    /// The leaves as triangles without T-junctions between those that light is computed for, each with the element that
-    /// it lies on: where a neighbour divided an edge, the vertex in its middle is used on this side, too. Vertices that
-    /// this side of a crease lacks are made.
+    /// The leaves as triangles without T-junctions between active ones, each with its element: where a neighbour divided
+    /// an edge, its midpoint is used on this side, too. Vertices that are missing on this side of a crease are added.
     pub fn crack_free_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
         let mut triangles = Vec::with_capacity(self.elements.len());
         for index in 0..self.elements.len() {
