@@ -29,8 +29,8 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, InspectedLink, Inspection, Omitted, PathNode, Place, Relit, Snapshot,
-    StepReport, Subject, VertexLight,
+    ClusterBox, DisplayMesh, InspectedLink, Inspection, Note, Omitted, PathNode, Place, Relit,
+    Snapshot, StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

@@ -25,7 +25,9 @@ use super::{
 };
 use crate::{
     hierarchy::Hierarchy,
-    solver::{Cancel, SolveSettings, coverage::CoverageMap, direct::Surfaces, sums::area_total},
+    solver::{
+        Cancel, Note, SolveSettings, coverage::CoverageMap, direct::Surfaces, sums::area_total,
+    },
 };
 
 /// Iterates that acceleration remembers, with 24 bytes each for every element (see above). Smaller than 3, and white
@@ -80,8 +82,8 @@ pub(crate) struct Convergence {
     pub residual: f32,
     /// Largest contraction (see [`Anderson::contraction`]); 0 if none was measured.
     pub contraction: f32,
-    /// Measures to stay stable, one sentence each.
-    pub notes: Vec<String>,
+    /// Measures to stay stable.
+    pub notes: Vec<Note>,
 }
 
 /// Result of one sweep.
@@ -120,21 +122,19 @@ pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Opt
         match converge(linked, iteration, bounds_rows, &mut convergence)? {
             Ending::Converged => break,
             Ending::NotConverged => {
-                convergence.notes.push(format!(
-                    "the iteration has not converged after {} sweeps: the residual is {:.1e}",
-                    convergence.sweeps, convergence.residual
-                ));
+                convergence.notes.push(Note::NotConverged {
+                    sweeps: convergence.sweeps,
+                    residual: convergence.residual,
+                });
                 break;
             }
             Ending::Growing => {
                 linked.irradiance.clone_from(&before);
                 linked.pull(iteration.surfaces);
                 linked.links.level(iteration.surfaces.hierarchy);
-                convergence.notes.push(if bounds_rows {
-                    "the light still grows from sweep to sweep: the light of the last step stays".to_owned()
-                } else {
-                    "the light grows from sweep to sweep: the sum of form factors of each element is bounded by 1"
-                        .to_owned()
+                convergence.notes.push(match bounds_rows {
+                    false => Note::GrowthBounded,
+                    true => Note::GrowthUnbounded,
                 });
             }
         }
@@ -267,10 +267,7 @@ fn leaf_areas(hierarchy: &Hierarchy) -> Vec<f32> {
 /// Add a note if only the scaling to the coverage prevents growth.
 fn note_unscaled_growth(convergence: &mut Convergence, gain: f64) {
     if gain > 1.0 + UNSCALED_SLACK {
-        convergence.notes.push(format!(
-            "the links are too coarse to conserve energy: unscaled, they would return {gain:.2} times the light that \
-             is sent in each sweep; scaled to the hemisphere coverage, they do not"
-        ));
+        convergence.notes.push(Note::CoarseLinks { gain });
     }
 }
 

@@ -1,12 +1,14 @@
 //! Plain data that a solve hands out: snapshots, reports, inspections, omissions.
 
 mod inspection;
+mod note;
 mod omitted;
 mod relit;
 mod snapshot;
 mod step_report;
 
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
+pub use note::Note;
 pub use omitted::Omitted;
 pub use relit::Relit;
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, VertexLight};

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::note::Note;
+
 /// Figures of one step. Quantities in world units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StepReport {
@@ -46,6 +48,6 @@ pub struct StepReport {
     pub is_final: bool,
     /// Whether the memory limit prevented finer links or elements; further steps would be limited alike.
     pub is_full: bool,
-    /// Measures to stay stable or within the memory limit, one sentence each.
-    pub notes: Vec<String>,
+    /// Measures to stay stable or within the memory limit.
+    pub notes: Vec<Note>,
 }

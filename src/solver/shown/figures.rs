@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use crate::{
     hierarchy::{Channels as _, Hierarchy, luminance},
     solver::{
-        StepReport,
+        Note, StepReport,
         direct::Surfaces,
         iteration::LinkedLight,
         sums::{area_total, mean},
@@ -33,8 +33,7 @@ pub(crate) fn fill(
 /// Note that the memory limit prevented finer links or elements.
 pub(crate) fn note_full(report: &mut StepReport) {
     report.is_full = true;
-    let note = "the memory limit is reached; refinement stops here with what fits";
-    report.notes.push(note.to_owned());
+    report.notes.push(Note::MemoryLimit);
 }
 
 /// Power that arrives at all leaves relative to the emitted and reflected power.
