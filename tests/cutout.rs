@@ -51,7 +51,7 @@ fn lit(scene: &Scene, irradiance: f32) -> Snapshot {
     let irradiance = vec![Vec3::splat(irradiance); count];
     Snapshot {
         step: 1,
-        left_out: Arc::default(),
+        omitted: Arc::default(),
         mesh: Arc::new(mesh),
         light: Arc::new(VertexLight {
             direct: irradiance.clone(),

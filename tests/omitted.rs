@@ -40,7 +40,7 @@ fn solve(scene: &Arc<Scene>, settings: SolveSettings) -> (Snapshot, StepReport) 
 }
 
 fn names(snapshot: &Snapshot) -> Vec<&'static str> {
-    snapshot.left_out.iter().map(|left| left.name).collect()
+    snapshot.omitted.iter().map(|left| left.name).collect()
 }
 
 /// Power that arrives (red) at the display triangles that `counts`, by index.
@@ -151,7 +151,7 @@ fn on_the_outside_of_a_hull_no_element_is_spent() {
     };
     let (lean, report) = solve(&scene, settings);
     let unlit: Vec<_> = lean
-        .left_out
+        .omitted
         .iter()
         .filter(|left| left.name == "unlit")
         .collect();

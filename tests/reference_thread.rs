@@ -47,7 +47,7 @@ fn snapshot(scene: &Scene, step: u32, irradiance: f32) -> Arc<Snapshot> {
         mesh: Arc::new(mesh),
         light: Arc::new(light),
         clusters: Arc::default(),
-        left_out: Arc::default(),
+        omitted: Arc::default(),
     })
 }
 

@@ -77,7 +77,7 @@ fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
             uncertainty: vec![0.25; count],
         }),
         clusters: Arc::new(vec![root]),
-        left_out: Arc::default(),
+        omitted: Arc::default(),
     }
 }
 

@@ -75,7 +75,7 @@ fn irradiance(scene: &Scene, snapshot: &Snapshot, material: usize) -> f32 {
 fn light_that_reaches_what_was_omitted_asks_for_a_new_solve() {
     let scene = scene();
     let mut lean = finished(solver(&scene, None));
-    let unlit = lean.snapshot().left_out[0].clone();
+    let unlit = lean.snapshot().omitted[0].clone();
     assert_eq!((unlit.name, unlit.count), ("unlit", 2), "the target");
     let white = with(&scene, WALL, |wall| wall.reflectance = Vec3::splat(0.8));
     let relit = lean.relight(&white, &Cancel::default()).unwrap();

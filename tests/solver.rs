@@ -13,7 +13,9 @@ use vecrad::{
     metrics::{ErrorMeasures, MeshLookup, measure_error},
     reference::{PathSettings, PathTraced, PathTracer},
     scene::{Scene, SceneBuilder, SceneOptions, Sides, builtin},
-    solver::{Cancel, Direct, Method, Oracle, Push, Snapshot, SolveSettings, Solver, StepReport},
+    solver::{
+        Cancel, Direct, Method, Note, Oracle, Push, Snapshot, SolveSettings, Solver, StepReport,
+    },
 };
 
 fn scene(name: &str) -> Arc<Scene> {
@@ -203,7 +205,10 @@ fn growth_at_coarse_links_is_named_and_held() {
         let (reports, ratio) =
             solve_furnace(builtin::sphere_furnace(0.98, 1.0, 14), 0.98, &settings);
         let report = &reports[0];
-        let is_named = report.notes.iter().any(|note| note.contains("keep energy"));
+        let is_named = report
+            .notes
+            .iter()
+            .any(|note| matches!(note, Note::CoarseLinks { .. }));
         assert_eq!(is_named, grows, "{method:?}: {report:?}");
         assert_close(ratio, 1.0, 1e-2, format_args!("{method:?}"));
     }
@@ -371,12 +376,7 @@ fn a_memory_limit_holds_and_keeps_what_fits() {
         };
         let (report, light) = solve(1);
         assert!(report.is_full && report.links > 0, "{report:?}");
-        assert!(
-            report
-                .notes
-                .iter()
-                .any(|note| note.contains("memory limit"))
-        );
+        assert!(report.notes.contains(&Note::MemoryLimit));
         assert!(
             light
                 .irradiance

@@ -10,7 +10,7 @@ use common::solve;
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
     scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_obj, write_builtin},
-    solver::{Cancel, LeftOut, Snapshot, SolveSettings},
+    solver::{Cancel, Omitted, Snapshot, SolveSettings},
 };
 
 /// A triangle whose material names a picture.
@@ -326,7 +326,7 @@ fn coordinates_far_from_the_origin_keep_their_digits_and_their_neighbours() {
 
 /// Names and counts of what is omitted.
 fn omissions(scene: &Scene) -> Vec<(&'static str, u64)> {
-    let omitted = LeftOut::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
+    let omitted = Omitted::of(scene, &SolveSettings::draft(), &Cancel::default()).unwrap();
     omitted.iter().map(|left| (left.name, left.count)).collect()
 }
 

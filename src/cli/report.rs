@@ -7,7 +7,7 @@ use crate::{
     metrics::ErrorMeasures,
     reference::SampledSurfaces,
     scene::{Frame, Scene, Warning},
-    solver::{LeftOut, SolveSettings, StepReport},
+    solver::{Omitted, SolveSettings, StepReport},
     worker::StopReason,
 };
 
@@ -19,7 +19,7 @@ pub(super) struct SolveReport {
     pub(super) settings: SolveSettings,
     pub(super) color: ColorOptions,
     /// Omissions, since this scene does not need the omitted parts, with their reasons.
-    pub(super) left_out: Vec<LeftOut>,
+    pub(super) left_out: Vec<Omitted>,
     pub(super) warnings: Vec<WarningFacts>,
     /// The reference of the errors of the steps.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -345,10 +345,10 @@ fn drain(
 
 /// Say what is omitted, one line each.
 fn explain(snapshot: &Snapshot) {
-    if snapshot.left_out.is_empty() {
+    if snapshot.omitted.is_empty() {
         output::say("omitted: nothing, this scene needs all of it");
     }
-    for omission in snapshot.left_out.iter() {
+    for omission in snapshot.omitted.iter() {
         output::say(format_args!("omitted: {omission}"));
     }
 }
@@ -414,7 +414,7 @@ fn report(
             .run_flags
             .export(arguments.scene_flags.up, scene.radiance_unit)
             .color,
-        left_out: run.snapshot.left_out.to_vec(),
+        left_out: run.snapshot.omitted.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),
         reference: measured.reference.clone(),
         stop_reason: run.stop_reason,

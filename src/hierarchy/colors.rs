@@ -121,18 +121,18 @@ impl Hierarchy {
         is_even.then_some(emission)
     }
 
-    /// Look at the textures of some elements more closely than at their patches.
-    pub fn look_at_textures(
+    /// Measure the means and deviations of the textures on some elements.
+    pub fn measure_textures(
         &mut self,
         scene: &Scene,
         appearances: &[Appearance],
         elements: &[usize],
     ) {
-        let looked: Vec<Varied> = elements
+        let measured: Vec<Varied> = elements
             .par_iter()
             .map(|&element| self.look(scene, appearances, element))
             .collect();
-        for (&element, varied) in elements.iter().zip(looked) {
+        for (&element, varied) in elements.iter().zip(measured) {
             self.colors.insert(element, varied);
             self.show_textures(scene, appearances, element);
         }
@@ -151,7 +151,7 @@ impl Hierarchy {
         if fresh.is_empty() {
             return;
         }
-        self.look_at_textures(scene, appearances, &fresh);
+        self.measure_textures(scene, appearances, &fresh);
         self.pull_textures(scene, appearances);
     }
 

@@ -1,8 +1,9 @@
 //! Which patches face each other: tests of planes against the boxes of the light tree, before any light is computed.
 //!
-//! Two patches exchange light only where each has a part before the plane of the other. Patches that no chain of such pairs
-//! joins to an emitter stays dark, whatever stands between. And where everything that light is computed for lies on one
-//! side of the plane of each triangle, nothing stands between anything: the triangle can at most touch a line of sight.
+//! Two patches exchange light only where each has a part before the plane of the other. Patches that no chain of such
+//! pairs joins to an emitter stays dark, whatever stands between. And where everything that light is computed for lies
+//! on one side of the plane of each triangle, nothing stands between anything: the triangle can at most touch a line of
+//! sight.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -13,14 +14,14 @@ use crate::{
     scene::{ActiveMaterials, Scene},
 };
 
-/// What is nearer to a plane than this lies in it, in frame units. Positions are rounded to 4e-6 there and normals tilted
-/// by 6e-8, over 100 units: below 2e-5 flat walls would rise over themselves. Rays start at twice this distance, so they
-/// cannot tell either. What it omits is the light between surfaces that rise over each other by less than a
+/// What is nearer to a plane than this lies in it, in frame units. Positions are rounded to 4e-6 there and normals
+/// tilted by 6e-8, over 100 units: below 2e-5 flat walls would rise over themselves. Rays start at twice this distance,
+/// so they cannot tell either. What it omits is the light between surfaces that rise over each other by less than a
 /// two-millionth of the scene.
 const IN_PLANE: f32 = 5e-5;
 
-/// Nodes of the tree that are looked at for one patch. Fewer, and patches that nothing lights are kept; more, and scenes of
-/// many sheets wait.
+/// Nodes of the tree that are looked at for one patch. Fewer, and patches that nothing lights are kept; more, and
+/// scenes of many sheets wait.
 const MAX_NODES: u32 = 128;
 
 /// Rounds of the flood. Light that needs more chained pairs is taken to reach everything: usual scenes need three.
@@ -74,9 +75,9 @@ struct Marked {
 }
 
 impl PatchTree {
-    /// Which patches light may be exchanged with: those that no chain of patches that face each other joins to an emitter
-    /// are false, and so are emitters that nothing faces. Conservative: true where it takes long to tell. Materials that are
-    /// active count as if they emitted or reflected.
+    /// Which patches light may be exchanged with: those that no chain of patches that face each other joins to an
+    /// emitter are false, and so are emitters that nothing faces. Conservative: true where it takes long to tell.
+    /// Materials that are active count as if they emitted or reflected.
     pub fn lit(&self, scene: &Scene, active: &ActiveMaterials) -> Vec<bool> {
         let material = |patch: &Patch| scene.triangles[patch.triangle.index()].material;
         let emits = |patch: &Patch| patch.emission != Vec3::ZERO || active.emits(material(patch));
@@ -190,7 +191,8 @@ impl PatchTree {
         false
     }
 
-    /// Whether no triangle of the scene can stand between two patches of the tree: none has parts of them on both sides.
+    /// Whether no triangle of the scene can stand between two patches of the tree: none has parts of them on both
+    /// sides.
     pub fn is_clear(&self, scene: &Scene) -> bool {
         let blocks = |&triangle: &u32| {
             let corners = scene.corners(crate::scene::TriangleId(triangle));
@@ -226,9 +228,9 @@ impl PatchTree {
         false
     }
 
-    /// Whether the active patches close a surface: each edge between two points belongs to two of them that run along it in
-    /// opposite senses.
-    pub fn is_closed(&self, scene: &Scene) -> bool {
+    /// Whether the active patches close a surface: each edge between two points belongs to two of them that run along
+    /// it in opposite senses.
+    pub fn is_enclosed(&self, scene: &Scene) -> bool {
         let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(self.active_patches().len() * 3);
         for patch in &self.patches[self.active_patches()] {
             let [a, b, c] = scene.triangles[patch.triangle.index()].corners;
@@ -340,14 +342,14 @@ mod tests {
         for (patch, &is_dark) in both.patches.iter().zip(&dark) {
             assert_eq!(patch.is_back, is_dark);
         }
-        assert!(!both.is_closed(&room), "two sides share each edge");
+        assert!(!both.is_enclosed(&room), "two sides share each edge");
         let inside = both.without(&room, None, &dark, &|| false).unwrap();
         assert_eq!(inside.active_patches(), 0..12);
         assert_eq!(inside.patches.len(), 24);
-        assert!(inside.is_clear(&room) && inside.is_closed(&room));
+        assert!(inside.is_clear(&room) && inside.is_enclosed(&room));
 
         let open = scene(Sides::One, &walls[1..]);
-        assert!(tree(&open).is_clear(&open) && !tree(&open).is_closed(&open));
+        assert!(tree(&open).is_clear(&open) && !tree(&open).is_enclosed(&open));
 
         // A speck in the middle has parts of the room on both sides.
         let speck = (BLACK, [0.5, 0.5, 0.5], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]);

@@ -43,8 +43,8 @@ pub struct Element {
     pub parent: u32,
     /// Halvings between the patch and this; a division into four counts two.
     pub level: u8,
-    /// Bit k: whether corner k lies within a solid; bit 3: whether the centroid does. [`Element::UNPROBED`] where that is
-    /// not known.
+    /// Bit k: whether corner k lies inside a solid or behind a wall; bit 3: whether the centroid does.
+    /// [`Element::UNPROBED`] if that is unknown.
     pub inside_solid: u8,
     /// Number of children: 0, 2 or 4.
     pub child_count: u8,
@@ -60,28 +60,28 @@ impl Element {
     /// Stands for missing children.
     pub const LEAF: u32 = u32::MAX;
 
-    /// Stands for [`Element::inside_solid`] where it is not known.
+    /// Value of [`Element::inside_solid`] before it is known.
     pub const UNPROBED: u8 = u8::MAX;
 
-    /// [`Element::inside_solid`] where all of it lies within a solid.
+    /// Value of [`Element::inside_solid`] if all of it lies inside a solid.
     const ALL_INSIDE: u8 = 0b1111;
 
-    /// Whether it lies within a solid in part.
+    /// Whether it is a contact: partly inside a solid or behind a wall.
     pub fn is_contact(&self) -> bool {
         !matches!(self.inside_solid, 0 | Self::ALL_INSIDE | Self::UNPROBED)
     }
 
-    /// Whether all of it lies within a solid.
+    /// Whether all of it lies inside a solid.
     pub fn is_inside_solid(&self) -> bool {
         self.inside_solid == Self::ALL_INSIDE
     }
 
-    /// Whether none of it is known to lie within a solid.
+    /// Whether none of it is known to lie inside a solid.
     pub fn is_outside_solids(&self) -> bool {
         matches!(self.inside_solid, 0 | Self::UNPROBED)
     }
 
-    /// Whether a corner is known to lie within a solid.
+    /// Whether a corner is known to lie inside a solid.
     pub fn is_inside_solid_at(&self, side: usize) -> bool {
         self.inside_solid != Self::UNPROBED && self.inside_solid & (1 << side) != 0
     }
@@ -263,11 +263,11 @@ impl Mesh {
 
     /// The leaves for which light is computed, in order.
     pub fn active_leaves(&self) -> impl Iterator<Item = usize> + '_ {
-        self.leaves().filter(|&leaf| self.is_held(leaf))
+        self.leaves().filter(|&leaf| self.is_active(leaf))
     }
 
     /// Whether light is computed for an element.
-    pub fn is_held(&self, element: usize) -> bool {
+    pub fn is_active(&self, element: usize) -> bool {
         self.elements[element].patch < self.active_count
     }
 
@@ -295,7 +295,7 @@ impl Mesh {
             .collect();
         while let Some(index) = pending.pop() {
             let element = self.elements[index as usize];
-            if !element.is_leaf() || !self.is_held(index as usize) {
+            if !element.is_leaf() || !self.is_active(index as usize) {
                 continue;
             }
             self.divide_one(index);
@@ -434,16 +434,16 @@ impl Mesh {
             .any(|key| self.is_quartered(key))
     }
 
-    /// The leaves as triangles without T-junctions between those that light is computed for, each with the element that
-    /// it lies on: where a neighbour divided an edge, the vertex in its middle is used on this side, too. Vertices that this side of a crease lacks are made.
-    pub fn closed_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
+    /// The leaves as triangles without T-junctions between active ones, each with its element: where a neighbour divided
+    /// an edge, its midpoint is used on this side, too. Vertices that are missing on this side of a crease are added.
+    pub fn crack_free_triangles(&mut self) -> Vec<(u32, [u32; 3])> {
         let mut triangles = Vec::with_capacity(self.elements.len());
         for index in 0..self.elements.len() {
             if !self.elements[index].is_leaf() {
                 continue;
             }
             let corners = self.elements[index].vertices;
-            if !self.is_held(index) {
+            if !self.is_active(index) {
                 // No light, and so none that could differ beside a vertex in the middle of an edge.
                 triangles.push((index as u32, corners));
                 continue;
@@ -490,8 +490,8 @@ fn close([a, b, c]: [u32; 3], middles: [Option<u32>; 3], mut emit: impl FnMut([u
     }
 }
 
-/// Faces that are looked at across an edge to find the smoothest way on. Fewer, and the right one of a fan of sheets may
-/// be missed; all, and thousands of faces on one edge take the square of their number.
+/// Faces that are looked at across an edge to find the smoothest way on. Fewer, and the right one of a fan of sheets
+/// may be missed; all, and thousands of faces on one edge take the square of their number.
 const MOST_NEIGHBOURS: usize = 64;
 
 /// Vertices of the patches: corners at one point are one vertex where a chain of smooth edges joins their patches.
@@ -566,8 +566,8 @@ fn share_vertices(
     Some((vertices, vertex_of))
 }
 
-/// Of the patches at an edge the first that is met when one of them is turned about it towards its lit side; `None` where
-/// that is the back of a one-sided surface.
+/// Of the patches at an edge the first that is met when one of them is turned about it towards its lit side; `None`
+/// where that is the back of a one-sided surface.
 fn next_around<'a>(
     scene: &Scene,
     patches: &[Patch],

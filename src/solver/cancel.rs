@@ -5,22 +5,22 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-/// A request to stop, seen by everything that runs long. Clones share one flag.
+/// A request to stop, checked by everything that runs long. Clones share one flag.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Ask to stop.
+    /// Request to stop.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether stopping was asked for.
+    /// Whether stopping was requested.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// `None` where stopping was asked for.
+    /// `None` if stopping was requested, to return early by `?`.
     pub(super) fn proceed(&self) -> Option<()> {
         (!self.is_cancelled()).then_some(())
     }

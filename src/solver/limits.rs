@@ -1,37 +1,38 @@
-//! What is tolerated in a step: when elements are divided, which errors are seen, how many shadow rays are shot.
+//! Tolerances of a step: when elements are divided, which errors are visible, how many shadow rays are shot.
 
 use super::{schedule::is_coarse, settings::SolveSettings};
 use crate::hierarchy::Hierarchy;
 
-/// Tolerated contrast, in multiples of the tolerance of the mesh, of an error on an element whose share of the area has
-/// a fourth root of 1. Smaller costs elements and rays in all penumbrae; larger draws their borders as saw teeth.
+/// Tolerated contrast of an error, times the fourth root of the element's share of the area, in multiples of the
+/// tolerance of the mesh. Smaller costs elements and rays in all penumbrae; larger draws their borders as saw teeth.
 pub(super) const CONTRAST_TOLERANCE: f32 = 4.0;
 
-/// Contrast that noise of a point may have, as a share of what a border may have. Larger leaves blotches in penumbrae;
+/// Tolerated contrast of the noise of a point, as a share of that of an error. Larger leaves blotches in penumbrae;
 /// smaller costs rays, as one over its square.
 const NOISE_SHARE: f32 = 0.5;
 
-/// When to divide.
+/// Tolerances and limits of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Error of interpolation, times the root of the element's share of the area, relative to the mean.
+    /// Interpolation error, times the square root of the element's share of the area, relative to the mean.
     pub tolerance: f32,
     /// The same in the last step.
     pub finest_tolerance: f32,
-    /// Contrast of an error, times the fourth root of the element's share of the area; infinite where it does not count.
+    /// Contrast of an error, times the fourth root of the element's share of the area; infinite where contrast is
+    /// ignored.
     pub contrast: f32,
-    /// Children are not smaller, frame units.
+    /// Children of elements are not smaller than this, square frame units.
     pub min_area: f32,
     /// Shadow rays per point.
     pub shadow_samples: u32,
     /// Seed of the rays.
     pub seed: u64,
-    /// Elements that there may be.
+    /// Most elements that the mesh may have.
     pub most_elements: u64,
 }
 
 impl Limits {
-    /// Those of a step of some threshold scale; `most_elements` there may be.
+    /// The limits of a step with this threshold scale and element limit.
     pub(super) fn new(
         settings: &SolveSettings,
         hierarchy: &Hierarchy,
@@ -42,7 +43,7 @@ impl Limits {
         Self {
             tolerance,
             finest_tolerance: settings.mesh_tolerance,
-            // Coarse steps are seen for a moment.
+            // Coarse steps are displayed only briefly.
             contrast: match is_coarse(threshold_scale) {
                 true => f32::INFINITY,
                 false => CONTRAST_TOLERANCE * tolerance,
@@ -54,19 +55,19 @@ impl Limits {
         }
     }
 
-    /// Whether an error of luminance (of which the part above noise counts) is seen on an element, or about a point, of
-    /// which `weight` is the root of the share of the area, beside light of luminance `beside`.
-    pub(super) fn is_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
+    /// Whether an error (luminance, without its noise) is visible beside light of luminance `beside`, on an element or
+    /// about a point; `weight` is the square root of its share of the area.
+    pub(super) fn is_visible(&self, error: f32, beside: f32, weight: f32) -> bool {
         error * weight.sqrt() > self.contrast * beside
     }
 
-    /// As [`Self::is_seen`] for noise of a point, by its standard error.
-    pub(super) fn is_noise_seen(&self, error: f32, beside: f32, weight: f32) -> bool {
-        self.is_seen(error / NOISE_SHARE, beside, weight)
+    /// As [`Self::is_visible`], for the standard error of a point.
+    pub(super) fn is_noise_visible(&self, error: f32, beside: f32, weight: f32) -> bool {
+        self.is_visible(error / NOISE_SHARE, beside, weight)
     }
 }
 
-/// Smallest element area that may be divided off, frame units.
+/// Smallest area of an element that a division may make, square frame units.
 pub(super) fn min_area(settings: &SolveSettings, hierarchy: &Hierarchy) -> f32 {
     (f64::from(settings.min_area) * hierarchy.importance.area) as f32
 }

@@ -1,8 +1,8 @@
 //! The solve as a value: [`Solver::new`], [`Solver::step`], [`Solver::snapshot`].
 //! No threads of its own, no channel, no clock, no global.
 //!
-//! A step lowers the threshold, divides elements where direct light bends, refines the links that exist, iterates
-//! gathering and pushing until the light settles, and gathers once more for the vertices.
+//! A step lowers the threshold, divides elements where linear interpolation of the light errs, refines the existing
+//! links, iterates gathering and pushing until the light converges, and gathers once more for the vertices.
 
 mod budget;
 mod cancel;
@@ -29,8 +29,8 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, InspectedLink, Inspection, LeftOut, PathNode, Place, Relit, Snapshot,
-    StepReport, Subject, VertexLight,
+    ClusterBox, DisplayMesh, InspectedLink, Inspection, Note, Omitted, PathNode, Place, Relit,
+    Snapshot, StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

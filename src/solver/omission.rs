@@ -1,26 +1,26 @@
-//! What a solve may omit, and what settings say of it.
+//! Omissions: the parts that a solve may omit, and the setting that requires them.
 
 use serde::{Deserialize, Serialize};
 
-/// What may be left out of a solve.
+/// A part that a solve may omit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Omission {
-    /// Patches that no light can reach, and emitters that nothing sees.
+    /// Patches that no light can reach, and emitters that light nothing.
     Unlit,
-    /// Rays, where nothing can stand between two surfaces.
+    /// Rays, where nothing can occlude.
     Rays,
-    /// Elements where light does not bend, where nothing casts a shadow.
+    /// Elements where light varies linearly, in scenes without shadows.
     Elements,
-    /// Clusters, where there are few patches and nothing stands between them.
+    /// Clusters, where there are few patches and nothing can occlude.
     Clusters,
 }
 
 impl Omission {
-    /// All of them, in the order of the plan.
+    /// All omissions, in the order of the plan.
     pub const ALL: [Self; 4] = [Self::Unlit, Self::Rays, Self::Elements, Self::Clusters];
 
-    /// As flags and reports call it.
+    /// The name in flags and reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unlit => "unlit",
@@ -31,35 +31,35 @@ impl Omission {
     }
 }
 
-/// What must not be left out. As a list of names in files.
+/// The parts that must not be omitted. Serialised as a list of names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(from = "Vec<Omission>", into = "Vec<Omission>")]
 pub struct Keep(u8);
 
 impl Keep {
-    /// Everything: nothing is left out.
+    /// Every part: nothing is omitted.
     pub const ALL: Self = Self((1 << Omission::ALL.len()) - 1);
 
-    /// Nothing: all is left out that can be.
+    /// No part: everything is omitted that the scene does not need.
     pub const NONE: Self = Self(0);
 
-    /// Whether this is kept.
+    /// Whether this part must not be omitted.
     pub const fn has(self, omission: Omission) -> bool {
         self.0 & (1 << omission as u8) != 0
     }
 }
 
 impl From<Vec<Omission>> for Keep {
-    fn from(kept: Vec<Omission>) -> Self {
+    fn from(required: Vec<Omission>) -> Self {
         let add = |bits: u8, omission: Omission| bits | (1 << omission as u8);
-        Self(kept.into_iter().fold(0, add))
+        Self(required.into_iter().fold(0, add))
     }
 }
 
 impl From<Keep> for Vec<Omission> {
     fn from(keep: Keep) -> Self {
-        let kept = Omission::ALL.into_iter();
-        kept.filter(|&omission| keep.has(omission)).collect()
+        let required = Omission::ALL.into_iter();
+        required.filter(|&omission| keep.has(omission)).collect()
     }
 }
 
@@ -68,14 +68,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_survives_a_file_and_unknown_names_do_not() {
-        for kept in [vec![], vec![Omission::Rays], Omission::ALL.to_vec()] {
-            let keep = Keep::from(kept.clone());
-            assert_eq!(Vec::from(keep), kept);
+    fn required_parts_survive_a_file_and_unknown_names_are_refused() {
+        for required in [vec![], vec![Omission::Rays], Omission::ALL.to_vec()] {
+            let keep = Keep::from(required.clone());
+            assert_eq!(Vec::from(keep), required);
             let text = serde_json::to_string(&keep).unwrap();
             assert_eq!(serde_json::from_str::<Keep>(&text).unwrap(), keep);
             for omission in Omission::ALL {
-                assert_eq!(keep.has(omission), kept.contains(&omission));
+                assert_eq!(keep.has(omission), required.contains(&omission));
             }
         }
         assert_eq!(Keep::from(Omission::ALL.to_vec()), Keep::ALL);

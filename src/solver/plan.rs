@@ -1,75 +1,75 @@
-//! The plan of a solve: what this scene does not need, and why.
+//! The plan of a solve: the parts that this scene does not need, and why.
 //!
-//! Made once, between loading and solving, by looking at the scene. What is decided here is data that the rooms obey:
-//! the tree holds no patch that is left out, the ray tree of a clear scene blocks nothing, and so on.
-//! In the order of the list:
+//! It is made once from the scene, between loading and solving. Its decisions are data that the other rooms obey:
+//! omitted patches are inactive in the tree, the ray tree of a clear scene occludes nothing, and so on. In the order of
+//! the list:
 //!
-//! | name | left out | where | harm |
+//! | name | omitted | where | error |
 //! |---|---|---|---|
-//! | `unlit` | patches | no chain of patches that face each other leads to an emitter | none: they stay as dark as they are |
-//! | `rays` | the ray tree and all rays | no triangle has parts of the scene on both sides | none: no ray would be blocked |
-//! | `elements` | elements, links | as `rays`: light has no shadows, and bends only where it is seen to | that of the tolerances |
-//! | `clusters` | links of clusters | as `rays`, and few patches: all pairs of them are exact and cheap | that of the tolerances |
+//! | `unlit` | patches | no chain of patches that face each other leads to an emitter | none: they stay dark |
+//! | `rays` | the ray tree and all rays | no triangle has parts of the scene on both sides | none: no ray would be occluded |
+//! | `elements` | elements, links | as `rays`: light has no shadows, so its interpolation error is known | within the tolerances |
+//! | `clusters` | links of clusters | as `rays`, and few patches: all pairs of them are exact and cheap | within the tolerances |
 //!
-//! The last two are for the default method and oracle: whoever asks for others wants to see what they do.
+//! The last two apply to the default method and oracle only, since the others are chosen to be studied.
 //!
-//! Looked at and not left out, since it does not pay: rays of single pairs whose shaft is empty, clusters of small scenes
-//! with shadows, and
+//! Considered and not omitted, since the gain is small: rays of single pairs whose shaft is empty, clusters of small
+//! scenes with shadows, and
 //! * channels of grey scenes: all channels of a quantity are one vector in one register. A sweep over links between elements
-//!   takes 0.7 to 0.8 of the time with one channel, 0.6 with links packed anew for it, and all sweeps of a solve are 3 to
-//!   6 % of it: the rest is geometry, which has no colour;
-//! * links of black sources: form factors of all sources must add to the closure, and since they are judged by little light
-//!   they are few, a twentieth of the links and a hundredth of the rays where the blocks or the floor of the Cornell box are
-//!   black;
-//! * tables of clusters with one normal or along the axes: a sixth of the clusters in rooms and soups at most, and so a
+//!   takes 0.7 to 0.8 of the time with one channel, 0.6 with links repacked for it, and all sweeps of a solve take 3 to
+//!   6 % of its time: the rest is geometry, which has no colour;
+//! * links of black sources: form factors of all sources must add to the coverage, and these links are few, since they are
+//!   judged by the ambient radiosity alone: a twentieth of the links and a hundredth of the rays where the blocks or the
+//!   floor of the Cornell box are black;
+//! * tables of clusters with one normal or along the axes: at most a sixth of the clusters in rooms and soups, and so a
 //!   fiftieth of the memory.
 //!
-//! Beside these, some things are left out by loading, whatever is kept; they are listed after the plan.
+//! Loading omits further parts, whatever `--keep` says; they are listed after the plan.
 
 use std::sync::Arc;
 
-use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::LeftOut};
+use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::Omitted};
 use crate::{
     hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
     scene::{ActiveMaterials, Scene},
 };
 
-/// Patches of a scene that is solved patch by patch, at most: their pairs are fewer than the links of usual scenes.
-/// Fewer, and open rooms probe closures by rays, at 160 patches for a sixth more time and a fifth more error; more, and
-/// all pairs are too many: a sphere of 320 patches would take a quarter more time.
+/// Most patches of a scene that is solved without clusters: their pairs are fewer than the links of usual scenes.
+/// Smaller, and rooms with openings probe their coverage by rays, which at 160 patches takes a sixth more time and has
+/// a fifth more error; larger, and there are too many pairs: a sphere of 320 patches would take a quarter more time.
 const FEW_PATCHES: usize = 256;
 
-impl LeftOut {
-    /// What a solve of a scene would leave out: the plan alone, without the solve. `None` when cancelled.
+impl Omitted {
+    /// The parts that a solve of a scene would omit, without solving it. `None` when cancelled.
     pub fn of(scene: &Scene, settings: &SolveSettings, cancel: &Cancel) -> Option<Vec<Self>> {
         let active = ActiveMaterials::default();
         let sheets = SheetSides::of(scene, &mut None);
         let is_cancelled = || cancel.is_cancelled();
         let (plan, _) = Plan::make(scene, sheets.as_ref(), settings, active, &is_cancelled)?;
-        Some(Arc::unwrap_or_clone(plan.left_out))
+        Some(Arc::unwrap_or_clone(plan.omitted))
     }
 }
 
-/// What a solve obeys.
+/// Decisions for a scene, which the solve obeys.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plan {
-    /// Nothing blocks: there is no ray to shoot.
+    /// Nothing occludes: no ray is needed.
     pub(super) is_clear: bool,
-    /// The patches fill the view of each other, so that form factors add to 1.
-    pub(super) is_closed: bool,
-    /// Elements are divided where light bends, and nowhere else.
+    /// The patches enclose each other, so that the form factors of each add to 1.
+    pub(super) is_enclosed: bool,
+    /// Elements are divided only where linear interpolation of the light errs.
     pub(super) follows_light: bool,
-    /// Only elements exchange light.
+    /// Only elements are linked.
     pub(super) is_by_patch: bool,
-    /// Materials that it is made for as if they emitted or reflected.
+    /// Materials that count as emitting or reflecting, beside those that do.
     active: ActiveMaterials,
-    /// The list.
-    pub(super) left_out: Arc<Vec<LeftOut>>,
+    /// The list of omissions.
+    pub(super) omitted: Arc<Vec<Omitted>>,
 }
 
 impl Plan {
-    /// Look at a scene, and plant the tree that is needed; `None` when cancelled. What is left out need not be added where
-    /// the active materials emit or reflect.
+    /// The plan of a scene and the tree of its active patches; `None` when cancelled. The plan also holds when the
+    /// `active` materials emit or reflect.
     pub(super) fn make(
         scene: &Scene,
         sheets: Option<&SheetSides>,
@@ -87,20 +87,21 @@ impl Plan {
             tree = plan.omit_unlit(scene, sheets, tree, cancelled)?;
         }
         if may_omit(Omission::Rays) && tree.is_clear(scene) {
-            // Who asks for the paper's way wants to see what it does.
+            // The paper's methods are chosen to be studied, so nothing of them is omitted.
             let is_exact_wanted =
                 settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
             let has_few = tree.active_patches().len() <= FEW_PATCHES;
             plan.is_clear = true;
-            plan.is_closed = tree.is_closed(scene);
+            plan.is_enclosed = tree.is_enclosed(scene);
             plan.follows_light = is_exact_wanted && may_omit(Omission::Elements);
             plan.is_by_patch = is_exact_wanted && has_few && may_omit(Omission::Clusters);
             plan.note_clear(scene, &tree);
         }
-        Arc::make_mut(&mut plan.left_out).extend(left_out_by_loading(scene));
+        Arc::make_mut(&mut plan.omitted).extend(omitted_by_loading(scene));
         Some((plan, tree))
     }
 
+    /// Deactivate the patches that no light can reach. Returns the tree without them; `None` when cancelled.
     fn omit_unlit(
         &mut self,
         scene: &Scene,
@@ -109,7 +110,7 @@ impl Plan {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Option<PatchTree> {
         let lit = tree.lit(scene, &self.active);
-        // Without any light there is nothing to spare.
+        // Without any light nothing is omitted.
         if lit.iter().all(|&is_lit| is_lit) || !lit.contains(&true) {
             return Some(tree);
         }
@@ -126,21 +127,21 @@ impl Plan {
                 tree.patches.len()
             ),
             "no chain of surfaces that face each other leads from an emitter to them",
-            "nothing changes: they are as dark with it",
+            "nothing changes: they stay dark",
         );
         if unseen > 0 {
             self.note(
                 Omission::Unlit,
                 unseen,
                 format!("{unseen} emitting sides light nothing"),
-                "no surface lies before them that faces them",
-                "nothing changes: they shine as they are",
+                "no surface in front of them faces them",
+                "nothing changes: their own emission is displayed",
             );
         }
         tree.without(scene, sheets, &dark, cancelled)
     }
 
-    /// Whether what was left out of a hierarchy stays dark where these materials are active, too. If so, the plan holds
+    /// Whether the inactive patches of a hierarchy stay dark if these materials are active, too. If so, the plan holds
     /// for them from now on.
     pub(super) fn holds_for(
         &mut self,
@@ -154,42 +155,42 @@ impl Plan {
         }
         let all = self.active.joined(active);
         let side = |patch: &Patch| 2 * patch.triangle.index() + usize::from(patch.is_back);
-        let mut is_held = vec![false; 2 * scene.triangles.len()];
+        let mut is_active = vec![false; 2 * scene.triangles.len()];
         for patch in &hierarchy.patches[hierarchy.active_patches()] {
-            is_held[side(patch)] = true;
+            is_active[side(patch)] = true;
         }
         let Some(tree) = PatchTree::build(scene, None, &|| false) else {
             return false;
         };
         let mut lit = tree.lit(scene, &all).into_iter().zip(&tree.patches);
-        let holds = lit.all(|(is_lit, patch)| !is_lit || is_held[side(patch)]);
+        let holds = lit.all(|(is_lit, patch)| !is_lit || is_active[side(patch)]);
         if holds {
             self.active = all;
         }
         holds
     }
 
-    /// List what is left out where nothing blocks.
+    /// List the omissions of a scene without occlusion.
     fn note_clear(&mut self, scene: &Scene, tree: &PatchTree) {
-        let (triangles, held) = (scene.triangles.len(), tree.active_patches().len());
-        let exception = if self.is_closed || self.is_by_patch {
+        let (triangles, active) = (scene.triangles.len(), tree.active_patches().len());
+        let exception = if self.is_enclosed || self.is_by_patch {
             ""
         } else {
-            ", but for those that look how open the scene is"
+            ", except those that estimate the coverage of hemispheres"
         };
         self.note(
             Omission::Rays,
             triangles,
             format!("the ray tree of {triangles} triangles and every ray{exception}"),
-            "all that is lit lies on one side of each triangle's plane, so nothing can stand between two surfaces",
+            "all lit surfaces lie on one side of each triangle's plane, so nothing can stand between two of them",
             "light differs by no more than the noise of those rays",
         );
         if self.follows_light {
             self.note(
                 Omission::Elements,
-                held,
-                format!("elements of {held} patches where light does not bend, and links between them"),
-                "nothing casts a shadow, and between elements in full view form factors are known exactly",
+                active,
+                format!("elements of {active} patches where light varies linearly, and links between them"),
+                "nothing casts a shadow, and unoccluded form factors between elements are known exactly",
                 "light differs by no more than the tolerances of mesh and links",
             );
         }
@@ -201,12 +202,13 @@ impl Plan {
                     "links of clusters, of which there would be {}",
                     tree.clusters.len()
                 ),
-                "there are so few patches, all in full view, that all pairs of them can be linked",
+                "there are so few patches, without occlusion, that all pairs of them can be linked",
                 "light differs by no more than the tolerance of links",
             );
         }
     }
 
+    /// Add an omission to the list.
     fn note(
         &mut self,
         omission: Omission,
@@ -215,7 +217,7 @@ impl Plan {
         reason: &str,
         bound: &'static str,
     ) {
-        Arc::make_mut(&mut self.left_out).push(LeftOut {
+        Arc::make_mut(&mut self.omitted).push(Omitted {
             name: omission.name(),
             count: count as u64,
             what,
@@ -225,48 +227,48 @@ impl Plan {
     }
 }
 
-/// What the reader of the scene left out already.
-fn left_out_by_loading(scene: &Scene) -> Vec<LeftOut> {
-    // Count it.
+/// The parts that loading omitted already.
+fn omitted_by_loading(scene: &Scene) -> Vec<Omitted> {
+    // Count the backs.
     let backs = scene
         .triangles
         .iter()
         .filter(|face| !face.two_sided)
         .count();
-    // What it is called and why it is not needed.
+    // Name, count, description, reason and effect of each.
     let entries = [
         (
             "backs",
             backs,
             "backs of triangles",
-            "they belong to closed shells or have a twin that looks the other way, or --sides one was asked for",
-            "nothing changes: nobody is inside",
+            "they belong to closed shells or have a twin that faces the other way, or --sides one was requested",
+            "nothing changes: no view is from the inside",
         ),
         (
             "doubles",
             scene.doubled_faces,
             "triangles",
-            "each lies on another one that looks the same way",
-            "light would be there twice",
+            "each lies on another one that faces the same way",
+            "the light would count twice",
         ),
         (
             "constant-textures",
             scene.omitted_textures.constant_textures,
             "textures of one colour",
-            "where faces show them all their pixels are alike, so the materials have that colour instead",
+            "all their pixels on faces are alike, so the materials have that colour instead",
             "nothing changes but rounding",
         ),
         (
             "unused-textures",
             scene.omitted_textures.unused_textures,
             "textures",
-            "no face shows them",
+            "no face uses them",
             "nothing changes",
         ),
     ];
     let found = entries.into_iter().filter(|entry| entry.1 > 0);
     found
-        .map(|(name, count, what, reason, bound)| LeftOut {
+        .map(|(name, count, what, reason, bound)| Omitted {
             name,
             count: count as u64,
             what: format!("{count} {what}"),

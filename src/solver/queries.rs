@@ -1,4 +1,4 @@
-//! What a solve tells of itself, and what may change on the way.
+//! Further entry points of `Solver`: queries, and a change of settings.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use crate::{
 };
 
 impl Solver {
-    /// What the solve knows of a node, or `None` where there is no such node.
+    /// Links, path and sums of form factors of a node; `None` if there is no such node.
     pub fn inspect(&self, subject: &Subject) -> Option<Inspection> {
         let inspector = Inspector {
             surfaces: self.surfaces(),
             linked: &self.linked,
             reading: self.settings.method.reading(),
-            closures: &self.closures,
+            coverage: &self.coverage,
             leaves: &self.leaves,
             boxes: &self.snapshot.clusters,
             step: self.step,
@@ -24,23 +24,23 @@ impl Solver {
         inspector.inspect(subject)
     }
 
-    /// The state as it stands. Cheap: parts are shared.
+    /// The snapshot of the last whole step. Cheap: its parts are shared.
     pub fn snapshot(&self) -> Snapshot {
         self.snapshot.clone()
     }
 
-    /// Go on under other settings; what is computed stays. Only for changes that do not call for a new start: the
-    /// threshold, the tolerances, the smallest area and the number of steps.
+    /// Continue with other settings; results stay. Only for changes that do not need a new solve: the threshold, the
+    /// tolerances, the smallest area and the number of steps.
     pub fn change_settings(&mut self, settings: SolveSettings) {
         self.settings = settings;
     }
 
-    /// The scene being lit.
+    /// The scene that is solved.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// How materials look, by material: as the scene says, or as was last wished.
+    /// Appearance by material: that of the scene, or the one last relit with.
     pub fn appearances(&self) -> &[Appearance] {
         &self.relighting.appearances
     }

@@ -1,4 +1,5 @@
-//! The refinement stage of a step: links, and elements for them, until their errors are below the threshold of the step.
+//! The refinement stage of a step: links, and elements for them, until their errors are below the threshold of the
+//! step.
 
 use std::f32::consts::PI;
 
@@ -23,56 +24,59 @@ use crate::{
     },
 };
 
-/// Where not even the links of the first step fit into memory, the threshold is raised by this factor, as often as
-/// `MOST_RAISES`: then the root's exchange with itself is left.
+/// Factor by which the threshold is raised where the links of the first step do not fit into memory, up to
+/// `MOST_RAISES` times: then only the root's exchange with itself remains. Smaller, and many passes are in vain;
+/// larger, and links are coarser than memory requires.
 const RAISE_FACTOR: f32 = 4.0;
 
-/// Thresholds below this are raised to it first: a threshold of 0 would stay.
+/// Least threshold after a raise: a threshold of 0 would stay 0. Smaller, and more passes are in vain; larger, and
+/// links are coarser than memory requires.
 const LEAST_RAISED: f32 = 1e-4;
 
 /// See [`RAISE_FACTOR`].
 const MOST_RAISES: u32 = 16;
 
-/// Refinement passes of one step at most: elements divided in one pass take their links over in the next.
+/// Most refinement passes of one step: elements that one pass divides get their links in the next. Fewer, and links
+/// stay coarse; more, and time goes into ever fewer elements.
 const MOST_PASSES: u32 = 4;
 
-/// Share of the mean irradiance that links are judged by even where their sources are dark. Smaller, and light is lost
-/// wherever bright surfaces see dark ones; larger, and links are spent on what sends nothing.
+/// Ambient radiosity by which links are judged, as a share of the mean irradiance. Smaller, and light is lost wherever
+/// bright surfaces see dark ones; larger, and links are spent on dark sources.
 const AMBIENT_SHARE: f32 = 0.1;
 
-/// What refinement goes by.
+/// Input of the refinement stage.
 #[derive(Clone, Copy)]
 pub(super) struct Refining<'a> {
     pub settings: &'a SolveSettings,
     pub plan: &'a Plan,
     /// Limits of the step.
     pub limits: Limits,
-    /// What blocks.
+    /// The occluders.
     pub rays: &'a RayTree,
-    /// How textures look.
+    /// Textures and appearances.
     pub painted: Painted<'a>,
-    /// What leaves found over links in the last step.
+    /// Linked light of the leaves after the last step.
     pub leaves: &'a [LeafLight],
     /// Mean irradiance (luminance), to which thresholds relate.
     pub mean_irradiance: f32,
-    /// How many links and elements fit into memory.
+    /// The memory limit.
     pub budget: Budget,
     pub cancel: &'a Cancel,
 }
 
-/// What came of refinement.
+/// Result of the refinement stage.
 pub(super) struct Refined {
-    /// The threshold that the links have.
+    /// The threshold that the links meet.
     pub epsilon: f32,
     /// Rays shot.
     pub ray_count: u64,
-    /// Whether memory kept links or elements from being finer.
+    /// Whether the memory limit prevented finer links or elements.
     pub is_full: bool,
 }
 
 impl Refining<'_> {
-    /// Bring the links to a threshold; source tables are up to date before and after. Where links do not fit into memory,
-    /// those from before stay, and the first ones are made coarser. `None` when cancelled.
+    /// Refine the links to a threshold; source tables are up to date before and after. Where the new links do not fit
+    /// into memory, the present ones stay; the first ones are made coarser. `None` when cancelled.
     pub(super) fn refine(
         &self,
         hierarchy: &mut Hierarchy,
@@ -92,7 +96,7 @@ impl Refining<'_> {
             let surfaces = Surfaces::new(hierarchy, direct);
             let found = self.pass(surfaces, linked, judged, refined.epsilon);
             self.cancel.proceed()?;
-            // Where links do not fit, begin again with fewer, or leave those that there are.
+            // Where links do not fit, start again with fewer, or leave the present ones.
             if !found.fits {
                 refined.is_full = true;
                 if !is_first || raises >= MOST_RAISES {
@@ -103,14 +107,14 @@ impl Refining<'_> {
                 continue;
             }
             passes += 1;
-            // Where links did not fit, threads stopped at different places: their rays are not counted.
+            // Rays of a pass that did not fit depend on the threads, so they are not counted.
             if !self.plan.is_clear {
                 refined.ray_count += found.ray_count;
             }
             let node_count = hierarchy.node_count();
             linked.links = LinkStore::from_runs(node_count, &found.runs, &found.links);
             judged = Some(node_count);
-            // Divide the elements on which links err, as far as memory allows.
+            // Divide the elements whose links err, if memory allows.
             let surfaces = Surfaces::new(hierarchy, direct);
             let most_elements = self.budget.most_elements(surfaces, linked);
             let fits = hierarchy.mesh.fits(&found.wanted, most_elements);
@@ -130,8 +134,8 @@ impl Refining<'_> {
         Some(refined)
     }
 
-    /// Judge all links and replace those that err too much; `judged` nodes were there when they were last judged by this
-    /// threshold. Incomplete when cancelled.
+    /// Judge all links and replace those whose errors exceed the threshold. `judged` is the number of nodes when they
+    /// were last judged by it. Incomplete when cancelled.
     fn pass(
         &self,
         surfaces: Surfaces<'_>,
@@ -140,12 +144,12 @@ impl Refining<'_> {
         epsilon: f32,
     ) -> Refinement {
         let (hierarchy, settings) = (surfaces.hierarchy, self.settings);
-        // How uneven sources are, where elements are divided for that.
+        // Variation of the sources, where elements are divided by it.
         let spreads = match self.plan.follows_light {
             true => self.radiosity_spreads(surfaces, linked),
             false => Vec::new(),
         };
-        // What points of clusters are chosen by.
+        // Sums by which points of clusters are sampled.
         let areas = PatchSums::of_area(hierarchy, &linked.power);
         let powers = PatchSums::of_power(hierarchy, &linked.power);
         // The judge of pairs, and the walk over all of them.
@@ -179,9 +183,9 @@ impl Refining<'_> {
         refiner.refine(linked.links.is_empty())
     }
 
-    /// By how much the radiosity of each leaf varies over it (half the range of its corners, luminance), as direct light is
-    /// now and linked light was when it was last gathered, and by its textures. Of leaves divided since, the parts vary by
-    /// half.
+    /// By element, the variation of the radiosity of a leaf (half the range of its corners, luminance), from the
+    /// present direct light, the linked light when it was last gathered, and the textures. A child of an element that
+    /// was divided since varies by half as much.
     fn radiosity_spreads(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> Vec<f32> {
         let hierarchy = surfaces.hierarchy;
         let elements = &hierarchy.mesh.elements;
@@ -216,7 +220,7 @@ impl Refining<'_> {
         .collect()
     }
 
-    /// By how much the radiosity of a leaf varies over it since its textures do (luminance).
+    /// Variation of the radiosity of a leaf due to its textures (luminance).
     fn texture_spread(&self, surfaces: Surfaces<'_>, linked: &LinkedLight, leaf: usize) -> f32 {
         let Some(deviation) = self.painted.deviation(surfaces.hierarchy, leaf) else {
             return 0.0;
@@ -263,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn links_that_later_passes_leave_as_they_are_would_be_kept_if_they_were_judged_anew() {
+    fn links_that_later_passes_skip_would_stay_if_they_were_judged_again() {
         let cornell = find_builtin("cornell").unwrap().builder();
         for builder in [empty_cornell(), cornell] {
             let scene = Arc::new(builder.finish(&SceneOptions::default()).unwrap());
@@ -271,7 +275,7 @@ mod tests {
             let mut solver = Solver::new(scene, SolveSettings::draft(), None, &cancel).unwrap();
             solver.step(&cancel).unwrap();
             solver.step(&cancel).unwrap();
-            // The links of another step, and what judging all of them anew by the same threshold makes of them.
+            // The links of another step, and the links after judging all of them again by the same threshold.
             let surfaces = Surfaces::new(&solver.hierarchy, &solver.direct);
             solver.mean_irradiance = solver.linked.mean_irradiance(surfaces);
             let elements = solver.hierarchy.mesh.elements.len();

@@ -1,5 +1,5 @@
-//! What is made of the links that there are, without a step: the light of changed emitters and materials (see `relighting`),
-//! and the final gather before its time.
+//! Entry points of `Solver` on its existing links, without a step: changed emitters and materials (see `relighting`), and
+//! an early final gather.
 
 use std::sync::Arc;
 
@@ -13,9 +13,8 @@ use super::{
 use crate::scene::Appearance;
 
 impl Solver {
-    /// Find the light at the vertices by the final gather, as the last step does, on the links that there are: where no further
-    /// step can end in time. The report is that of the last step once more. `None` when cancelled on the way; the light is then
-    /// that of the last step.
+    /// Run the final gather on the existing links, as the last step does: for when no further step can end in time. The
+    /// report is that of the last step. `None` when cancelled; the light is then that of the last step.
     pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
         let scale = threshold_scale(self.step, self.settings.step_count());
         let found = self.final_gather(scale, cancel)?;
@@ -29,19 +28,19 @@ impl Solver {
         Some(report)
     }
 
-    /// Light the scene with materials that look so, one for each: see [`Scene::allowed`](crate::scene::Scene::allowed). On
-    /// the links, elements and closures that there are; a step that follows refines them. Returns `None` when cancelled on
-    /// the way: to be asked for again before the next step.
+    /// Light the scene with these appearances, one for each material (see
+    /// [`Scene::allowed`](crate::scene::Scene::allowed)), on the existing links, elements and coverage; the next step
+    /// refines them. Returns `None` when cancelled: it must then be called again before the next step.
     pub fn relight(&mut self, wished: &[Appearance], cancel: &Cancel) -> Option<Relit> {
         cancel.proceed()?;
         let appearances = self.scene.allowed(wished);
         let active = self.scene.active_materials(&appearances);
         let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
-        // Keep the light from before, while it is as it was.
+        // Store the present light before it changes.
         let factor =
             self.relighting
                 .keep_solved(&appearances, &self.hierarchy, &self.linked, &self.leaves);
-        // Direct light, as far as new rays are needed for it.
+        // Direct light, with new rays where they are needed.
         if let Some(field) = &mut self.direct {
             let shooting = Shooting {
                 scene: &self.scene,
@@ -56,7 +55,7 @@ impl Solver {
         let emitted_before = relighting::emitted(&self.hierarchy);
         self.hierarchy.paint(&self.scene, &appearances);
         self.relighting.appearances = appearances;
-        // Light over links: scaled where that is all, else iterated anew.
+        // Light over links: scaled where all light changes by one factor, else iterated.
         let mut report = self.relighting.unrefined_report();
         match factor.and_then(|factor| self.relighting.scaled(factor)) {
             Some((irradiance, leaves)) => {
@@ -91,7 +90,7 @@ impl Solver {
         })
     }
 
-    /// Let each leaf gather the light that [`Self::relight`] has solved. Returns `None` when cancelled on the way.
+    /// Gather the light that [`Self::relight`] has solved for each leaf. Returns `None` when cancelled.
     pub fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
         self.gather_relit(cancel)?;
         let mut report = self.relighting.unrefined_report();

@@ -1,12 +1,12 @@
-//! What relighting remembers: the light of changed emitters and materials is found on the links that there are.
+//! State of relighting: the light of changed emitters and materials is computed on the existing links.
 //!
-//! Nothing is refined or divided, and no closure is probed again. Direct light is put together from parts (see
-//! `light_parts`). Where all that emits changes alike and nothing else does, all light is scaled with it: from the light
-//! that was solved last, so that what was switched off comes back as it was. Else the iteration begins from the light
-//! before, and corners of elements take their share as they did in the light that was solved last, until
-//! [`Solver::finish_relighting`](super::Solver::finish_relighting) gathers for each of them: that takes several times as long as all sweeps together.
-//! Links stay those that the light before asked for: a step that follows refines them for the new one.
-//! What the plan left out stays out, also where a surface that is painted or begins to shine lights it: then the light is
+//! Nothing is refined or divided, and no coverage is probed again. Direct light is combined from parts (see
+//! `light_parts`). If all emission changes by one factor and nothing else changes, all light is scaled from the light
+//! that was solved last, so that a lamp that was off comes back exactly. Otherwise the iteration starts from the
+//! present light, and the light within each element varies as it did in the light that was solved last, until
+//! [`Solver::finish_relighting`](super::Solver::finish_relighting) gathers for each leaf, which takes several times as
+//! long as all sweeps together. The links were refined for the light before; the next step refines them for the new
+//! one. Omitted patches stay inactive, even where a surface that now reflects or emits would light them: the light is
 //! wrong there, and [`Relit::needs_restart`](super::Relit::needs_restart) says that a new solve is needed.
 
 use glam::{DVec3, Vec3, Vec4};
@@ -24,37 +24,37 @@ use crate::{
     scene::{Appearance, Scene},
 };
 
-/// Corners of elements are lit by at most this many times the mean of the element, where that is told by the light before.
-/// Smaller flattens corners near what is bright, larger shows bright corners where an element was all but dark before.
+/// Most light at a corner, in multiples of the new mean of its element, where it is derived from the light before.
+/// Smaller flattens corners near bright surfaces; larger makes bright corners where an element was almost dark before.
 const MOST_AT_CORNERS: f32 = 4.0;
 
-/// Light that was solved when materials looked so.
+/// Light that was solved for some appearances.
 struct Solved {
     appearances: Vec<Appearance>,
     linked: Vec<Vec4>,
     leaves: Vec<LeafLight>,
-    /// Power emitted then, by colour.
+    /// Emitted power for these appearances, by colour.
     emitted: DVec3,
 }
 
-/// What relighting remembers.
+/// State of relighting.
 pub(super) struct Relighting {
-    /// How materials look, by material.
+    /// Present appearance by material.
     pub(super) appearances: Vec<Appearance>,
-    /// Direct light in parts, from the first relighting after a step on.
+    /// Direct light in parts; made by the first relighting after a step.
     parts: Option<LightParts>,
-    /// The light that others are scaled from.
+    /// The light from which other light is scaled.
     solved: Option<Solved>,
     /// Whether all leaves have gathered the present light.
     is_solved: bool,
-    /// Whether the last step came to its end, so that links and samples fit the mesh.
+    /// Whether the last step was completed, so that links and samples match the mesh.
     is_whole: bool,
     /// The figures of the last step.
     last: StepReport,
 }
 
 impl Relighting {
-    /// Materials look as the scene says.
+    /// State for the appearances of the scene.
     pub(super) fn new(scene: &Scene) -> Self {
         Self {
             appearances: scene.appearances(),
@@ -66,14 +66,14 @@ impl Relighting {
         }
     }
 
-    /// A step changes links and samples.
+    /// Begin a step, which changes links and samples.
     pub(super) fn begin_step(&mut self) {
         self.parts = None;
         self.solved = None;
         (self.is_solved, self.is_whole) = (false, false);
     }
 
-    /// A step has come to its end.
+    /// End a completed step.
     pub(super) fn end_step(&mut self, report: &StepReport) {
         (self.is_solved, self.is_whole) = (true, true);
         self.last = report.clone();
@@ -87,8 +87,7 @@ impl Relighting {
         }
     }
 
-    /// The figures of the last step, as a beginning. Its threshold is that of links which were judged by other light, so
-    /// it is never the last word.
+    /// The figures of the last step, to be updated. The links were judged by other light, so the report is not final.
     pub(super) fn unrefined_report(&self) -> StepReport {
         StepReport {
             sweeps: 0,
@@ -98,8 +97,8 @@ impl Relighting {
         }
     }
 
-    /// What the solved light is to be multiplied by for other appearances, where that is all there is to do. Sees to it
-    /// that the light which is multiplied is kept.
+    /// Factor of the solved light for other appearances, if all light changes by one factor. Stores the present light
+    /// if it is solved and not stored yet.
     pub(super) fn keep_solved(
         &mut self,
         appearances: &[Appearance],
@@ -118,8 +117,8 @@ impl Relighting {
         factor_between(&self.solved.as_ref()?.appearances, appearances)
     }
 
-    /// Bring direct light to other appearances. Returns the rays shot, or `None` when cancelled: the light has not changed
-    /// then.
+    /// Change direct light to other appearances. Returns the rays shot; `None` when cancelled, with the light
+    /// unchanged.
     pub(super) fn mix_direct(
         &mut self,
         field: &mut DirectField,
@@ -128,7 +127,7 @@ impl Relighting {
     ) -> Option<u64> {
         let mut shot = 0;
         if !self.is_whole {
-            // A step that was cancelled may have left vertices without samples.
+            // After a cancelled step, vertices may be without samples.
             let Shooting {
                 hierarchy,
                 rays,
@@ -136,7 +135,7 @@ impl Relighting {
                 cancel,
                 ..
             } = shooting;
-            shot += field.cover(rays, hierarchy, field.samples, seed, cancel)?;
+            shot += field.sample_vertices(rays, hierarchy, field.samples, seed, cancel)?;
         }
         let parts = self
             .parts
@@ -145,22 +144,22 @@ impl Relighting {
         Some(shot)
     }
 
-    /// The light that was solved last, multiplied by a factor: over links by element, and of the leaves.
+    /// The solved light times a factor: over links by element, and of the leaves.
     pub(super) fn scaled(&self, factor: Vec3) -> Option<(Vec<Vec4>, Vec<LeafLight>)> {
         Some(self.solved.as_ref()?.scaled(factor))
     }
 
-    /// The leaves when their elements receive other light over links, where light was solved before.
+    /// Light of the leaves for other light over links; `None` if no light is stored.
     pub(super) fn leaves_under(&self, linked: &[Vec4]) -> Option<Vec<LeafLight>> {
         Some(self.solved.as_ref()?.leaves_under(linked))
     }
 
-    /// Note whether all leaves have gathered the present light.
+    /// Set whether all leaves have gathered the present light.
     pub(super) fn set_solved(&mut self, is_solved: bool) {
         self.is_solved = is_solved;
     }
 
-    /// Note that all leaves have gathered the present light anew: nothing is scaled from the light before.
+    /// Discard the stored light after all leaves have gathered the present light.
     pub(super) fn forget_solved(&mut self) {
         self.solved = None;
         self.is_solved = true;
@@ -171,7 +170,7 @@ impl Relighting {
         self.is_solved
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub(super) fn memory_bytes(&self) -> usize {
         let solved = self.solved.as_ref().map_or(0, |solved| {
             size_of_val(solved.linked.as_slice()) + size_of_val(solved.leaves.as_slice())
@@ -181,7 +180,7 @@ impl Relighting {
 }
 
 impl Solved {
-    /// All of it, multiplied by a factor.
+    /// This light times a factor.
     fn scaled(&self, factor: Vec3) -> (Vec<Vec4>, Vec<LeafLight>) {
         let factor_w = factor.extend(1.0);
         let of_luminance = {
@@ -208,8 +207,8 @@ impl Solved {
         )
     }
 
-    /// The leaves when their elements receive other light over links: within each it varies as before. Errors stay those
-    /// of the links.
+    /// Light of the leaves for other light over links: within each leaf it varies as in the stored light. Errors are
+    /// unchanged.
     fn leaves_under(&self, linked: &[Vec4]) -> Vec<LeafLight> {
         self.leaves
             .par_iter()
@@ -237,8 +236,8 @@ impl Solved {
     }
 }
 
-/// Begin with the light before, in proportion to what is emitted now; without any where that is more than there can be,
-/// which would be taken for light that grows.
+/// Start the iteration from the present light, in proportion to the emitted power; from no light where that exceeds the
+/// largest possible power, which the iteration would take for growth.
 pub(super) fn begin_from(linked: &mut LinkedLight, surfaces: Surfaces<'_>, emitted_before: DVec3) {
     let ratio = emitted(surfaces.hierarchy) / emitted_before;
     let ratio = ratio.map(|x| if x.is_finite() { x } else { 0.0 }).as_vec3();
@@ -262,7 +261,7 @@ pub(super) fn emitted(hierarchy: &Hierarchy) -> DVec3 {
         .sum()
 }
 
-/// What all light changes by from some appearances to others, where it changes by the same everywhere.
+/// Factor by which all light changes from some appearances to others, if there is one.
 fn factor_between(before: &[Appearance], after: &[Appearance]) -> Option<Vec3> {
     let reflect_alike = before
         .iter()

@@ -1,11 +1,11 @@
-//! What to compute: every setting that changes the result, each default written once.
+//! Settings: everything that changes the result, each default defined once.
 
 use serde::{Deserialize, Serialize};
 
 use super::{omission::Keep, schedule::THRESHOLD_FACTOR};
 use crate::hierarchy::Reading;
 
-/// How a cluster's directional power and area are represented.
+/// Representation of a cluster's directional power and area.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -35,27 +35,27 @@ impl Method {
     }
 }
 
-/// How the error of a link is judged.
+/// Estimate of the error of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Oracle {
-    /// Bounds of the transfer over both boxes.
+    /// Bounds of the transfer over both nodes.
     #[default]
     Interval,
     /// Largest minus smallest transfer over p sample vectors (the paper's EstimateEnergy).
     Samples,
 }
 
-/// How light that comes straight from emitters is computed.
+/// Computation of direct light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Direct {
-    /// Shadow rays from every vertex, spread over all emitters by the light that they give there. It was once chosen by
-    /// emitter; reports of then say `auto`.
+    /// Shadow rays from every vertex, distributed over all emitters in proportion to their irradiance there. Old
+    /// reports call it `auto`.
     #[default]
     #[serde(alias = "auto")]
     Sampled,
-    /// Through links, as all other light (the paper's way).
+    /// Over links, as all other light (the paper's way).
     Linked,
 }
 
@@ -63,7 +63,7 @@ pub enum Direct {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Push {
-    /// Kept in the method's own representation and pushed once per sweep (the paper's second way).
+    /// Summed in the representation of the method and pushed once per sweep (the paper's second way).
     #[default]
     Combined,
     /// Every link's vector pushed to every face at once (the paper's first way); slow on large clusters.
@@ -82,32 +82,32 @@ pub struct SolveSettings {
     pub direct: Direct,
     /// How irradiance is pushed down.
     pub push: Push,
-    /// Link threshold at the last step: error of one link's irradiance, weighted by the square root of the receiver's
-    /// share of the area, relative to the scene's mean. Above 0 (0 refines until another limit stops it).
-    /// Lower is better and slower: links grow about as 1/ε. Start at 0.005.
+    /// Link threshold of the last step: error of one link's irradiance, weighted by the square root of the receiver's
+    /// share of the area, relative to the scene's mean. At least 0 (0 refines until another limit stops it).
+    /// Smaller is more accurate and slower: the number of links grows about as 1/ε. Start at 0.005.
     pub epsilon: f32,
     /// Sample pairs p of a link in the `samples` oracle; 1…4096. Cost per link grows with p.
     pub samples: u32,
-    /// Shadow rays per vertex towards the lights, 1…1024; half of them in coarse steps. Where their noise counts for more
-    /// than a part of `mesh_tolerance`, up to 16 times as many are shot. Noise in penumbrae falls as one over the root
-    /// or better.
+    /// Shadow rays per vertex, 1…1024; half as many in coarse steps. Where their noise exceeds a share of
+    /// `mesh_tolerance`, up to 16 times as many are shot. Noise in penumbrae falls at least as one over the square root
+    /// of their number.
     pub shadow_samples: u32,
-    /// Elements are not divided below this area, as a fraction of the scene's area; at least 0.
+    /// Smallest area of divided elements, as a fraction of the scene's area; at least 0.
     pub min_area: f32,
-    /// Tolerance of the mesh: elements are divided where linear interpolation of light errs by more, relative to the
-    /// scene's mean and weighted as `epsilon` is; above 0.
+    /// Tolerance of the mesh: elements are divided where the error of linear interpolation exceeds it, relative to the
+    /// scene's mean and weighted like `epsilon`; above 0.
     pub mesh_tolerance: f32,
-    /// Edges with a larger angle between their faces are creases, in degrees; 0…180.
+    /// Largest angle between faces that are shaded smoothly across their edge, degrees; 0…180.
     pub crease_degrees: f32,
-    /// Steps at most; at least 1. The threshold falls geometrically to `epsilon` over this many, or over fewer where the
+    /// Most steps; at least 1. The threshold falls geometrically to `epsilon` over this many, or over fewer where the
     /// first ones would refine nothing (see [`Self::step_count`]).
     pub max_steps: u32,
-    /// Sweeps stop when what a sweep changes, and what it leaves to be changed, fall below this fraction of the total
+    /// Sweeps stop when the residual, and the step to the accelerated solution, are below this fraction of the total
     /// power; above 0.
     pub tolerance: f32,
     /// Seed of every random choice.
     pub seed: u64,
-    /// What is computed even where the scene does not need it.
+    /// Parts that are computed even where the scene does not need them.
     pub keep: Keep,
 }
 
@@ -144,7 +144,7 @@ impl SolveSettings {
         }
     }
 
-    /// For the bake that is kept: about 2 % error.
+    /// For a final bake: about 2 % error.
     pub const fn finest() -> Self {
         Self {
             epsilon: 0.002,
@@ -158,33 +158,33 @@ impl SolveSettings {
     }
 }
 
-/// Thresholds above this are not tried: an error of one link as large as the scene's mean irradiance is left alone by
-/// hardly any link, so the step before would refine nothing. Smaller, and the first picture of a fine solve comes late;
-/// larger, and steps pass in which nothing changes. The presets start at 0.06 to 0.12.
+/// Largest threshold of a step: hardly any link has an error as large as the scene's mean irradiance, so a step with a
+/// larger threshold would refine nothing. Smaller, and the first picture of a fine solve comes late; larger, and
+/// nothing changes in some steps. The presets start at 0.06 to 0.12.
 const COARSEST_THRESHOLD: f32 = 1.0;
 
-/// Thresholds below this count as this where steps are counted: from `COARSEST_THRESHOLD` a threshold of 0 is never
-/// reached by halving.
+/// Smallest threshold by which steps are counted: halving `COARSEST_THRESHOLD` never reaches 0. Smaller, and a
+/// threshold of 0 takes more steps; larger, and small thresholds are reached by one large decrease.
 const FINEST_THRESHOLD: f32 = 1e-4;
 
 impl SolveSettings {
-    /// Steps of a solve from its beginning: `max_steps`, or as many as lead from `COARSEST_THRESHOLD` to `epsilon`
-    /// where these are fewer.
+    /// Number of steps of a solve: `max_steps`, or as many as lead from `COARSEST_THRESHOLD` to `epsilon` if these are
+    /// fewer.
     pub fn step_count(&self) -> u32 {
         let span = COARSEST_THRESHOLD / self.epsilon.max(FINEST_THRESHOLD);
         let halvings = span.log(THRESHOLD_FACTOR).ceil().max(0.0) as u32;
         self.max_steps.min(halvings + 1)
     }
 
-    /// The first setting out of its range, as one sentence.
+    /// Check that all settings are in their ranges.
     ///
     /// # Errors
-    /// Where there is one.
+    /// Names the first setting out of its range, as one sentence.
     pub fn check(&self) -> Result<(), String> {
         let sentence = |name: &str, value: &dyn std::fmt::Display, range: &str| {
             Err(format!("{name} is {value}, but must be {range}"))
         };
-        // Any value of these will do.
+        // Any value of the first ones is valid.
         let Self {
             method: _,
             oracle: _,
@@ -201,7 +201,7 @@ impl SolveSettings {
             max_steps,
             tolerance,
         } = self;
-        // Written so that a NaN is out of every range.
+        // A NaN is out of every range.
         for (name, value) in [("epsilon", *epsilon), ("min_area", *min_area)] {
             if !(0.0..=f32::MAX).contains(&value) {
                 return sentence(name, &value, "a number of at least 0");
@@ -243,7 +243,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_as_many_as_asked_for_but_none_refines_nothing() {
+    fn steps_are_as_many_as_requested_without_those_that_refine_nothing() {
         for preset in [
             SolveSettings::draft(),
             SolveSettings::normal(),

@@ -7,7 +7,7 @@ use glam::Vec4;
 use super::{
     Cancel, Direct, Snapshot, SolveSettings, StepReport,
     budget::Budget,
-    coverage::{self, Closures},
+    coverage::{self, CoverageMap},
     direct::{self, DirectField, Lights, Surfaces},
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
@@ -29,42 +29,42 @@ use crate::{
 
 /// A solve in progress.
 ///
-/// Between two calls: `linked` and `direct` hold light for every element and every sampled vertex of `hierarchy`, source
-/// tables are those of that light, and `snapshot` shows the last whole step. A call that is cancelled leaves light that the
-/// next one brings up to date.
+/// Between two calls, `linked` and `direct` have light for every element and every sampled vertex of `hierarchy`, the
+/// source tables match that light, and `snapshot` is that of the last whole step. After a cancelled call the light may
+/// be out of date; the next call updates it.
 pub struct Solver {
     // What is solved, and how.
     pub(super) scene: Arc<Scene>,
     pub(super) settings: SolveSettings,
     pub(super) plan: Plan,
     memory_limit: Option<u64>,
-    /// Blocks nothing where the plan says so.
+    /// Occludes nothing in a clear scene.
     pub(super) rays: Arc<RayTree>,
     // The mesh and its light.
     pub(super) hierarchy: Hierarchy,
     /// `None` where no emitter is sampled.
     pub(super) direct: Option<DirectField>,
     pub(super) linked: LinkedLight,
-    /// Part of the view of each piece of surface that lit surfaces fill.
-    pub(super) closures: Closures,
-    /// What leaves found over links when they gathered last.
+    /// Coverage of the hemisphere of each cell by lit surfaces.
+    pub(super) coverage: CoverageMap,
+    /// Linked light of the leaves when they gathered last.
     pub(super) leaves: Vec<LeafLight>,
-    /// By what linked light at each vertex is multiplied; empty for 1.
+    /// Factor of the linked light by vertex, from the final gather; empty for 1.
     pub(super) vertex_factors: Vec<Vec4>,
     /// Mean irradiance (luminance), to which the thresholds of the last step relate.
     pub(super) mean_irradiance: f32,
-    // How far the solve has come.
+    // Progress.
     pub(super) step: u32,
     pub(super) ray_count: u64,
-    /// Whether the memory limit kept the last step from being finer.
+    /// Whether the memory limit prevented finer links or elements in the last step.
     is_full: bool,
     pub(super) relighting: Relighting,
     pub(super) snapshot: Snapshot,
 }
 
 impl Solver {
-    /// Prepare a solve: plan, hierarchy, ray tree, first mesh. `memory_limit` in bytes bounds what it will hold.
-    /// Returns `None` when cancelled on the way.
+    /// Prepare a solve: plan, hierarchy, ray tree, first mesh. `memory_limit` bounds its memory in bytes.
+    /// Returns `None` when cancelled.
     pub fn new(
         scene: Arc<Scene>,
         settings: SolveSettings,
@@ -74,8 +74,8 @@ impl Solver {
         Self::with_rays(scene, None, settings, memory_limit, None, cancel)
     }
 
-    /// As [`Self::new`], with the scene's ray tree where there is one already, and for materials that look so, where not as
-    /// the scene says. What one of both needs is not left out, so that what is switched off may be switched on.
+    /// As [`Self::new`], with the scene's ray tree if there is one already, and lit with these appearances instead of
+    /// the scene's. The plan holds for both, so that lamps that are off may be switched on.
     pub fn with_rays(
         scene: Arc<Scene>,
         mut rays: Option<Arc<RayTree>>,
@@ -86,14 +86,14 @@ impl Solver {
     ) -> Option<Self> {
         cancel.proceed()?;
         let is_cancelled = || cancel.is_cancelled();
-        // What the scene does not need.
+        // The parts that the scene does not need.
         let active = wished.map_or_else(ActiveMaterials::default, |wished| {
             scene.active_materials(&scene.allowed(wished))
         });
         let sheets = SheetSides::of(&scene, &mut rays);
         cancel.proceed()?;
         let (plan, tree) = Plan::make(&scene, sheets.as_ref(), &settings, active, &is_cancelled)?;
-        // Hierarchy and ray tree. Both take about as long, and neither keeps all processors busy.
+        // Hierarchy and ray tree. Both take about the same time, and neither uses all processors.
         let (hierarchy, rays) = rayon::join(
             || Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &is_cancelled),
             || match rays {
@@ -107,7 +107,7 @@ impl Solver {
         let mut solver = Self {
             direct: None,
             linked: LinkedLight::default(),
-            closures: Closures::default(),
+            coverage: CoverageMap::default(),
             leaves: Vec::new(),
             vertex_factors: Vec::new(),
             mean_irradiance: 0.0,
@@ -123,7 +123,7 @@ impl Solver {
             rays,
             hierarchy,
         };
-        // Something to see before the first link.
+        // A first picture before the first link.
         solver.first_light(cancel)?;
         solver.show(0, cancel)?;
         if let Some(wished) = wished {
@@ -132,9 +132,9 @@ impl Solver {
         Some(solver)
     }
 
-    /// The first mesh, with direct light by few rays.
+    /// Make the first mesh, with direct light from few rays.
     fn first_light(&mut self, cancel: &Cancel) -> Option<()> {
-        // Elements as textures and emitters need them.
+        // Divide elements by textures, and find the emitters.
         self.linked.extend(&self.hierarchy);
         let limits = self.limits(1.0);
         let painted = Painted {
@@ -146,7 +146,7 @@ impl Solver {
         let lights = Lights::new(&self.scene, &self.hierarchy, self.settings.direct);
         self.direct = (!lights.is_empty()).then(|| DirectField::new(lights));
         cancel.proceed()?;
-        // Elements that their corners tell of, and none that lies within a solid in part.
+        // Divide large elements and contact elements.
         let limits = self.limits(1.0);
         self.divide_coarse(limits);
         let limits = self.limits(1.0);
@@ -159,7 +159,7 @@ impl Solver {
         let count = shadow_samples(&self.settings, true);
         if let Some(field) = &mut self.direct {
             self.ray_count +=
-                field.cover_first(rays, &self.hierarchy, count, limits.seed, cancel)?;
+                field.sample_vertices_first(rays, &self.hierarchy, count, limits.seed, cancel)?;
         }
         self.extend_to_new_elements();
         self.pull();
@@ -167,7 +167,7 @@ impl Solver {
     }
 
     /// One progressive step: lower the threshold, refine, gather, push and pull.
-    /// Returns `None` when cancelled on the way; the light is then that of the last whole step.
+    /// Returns `None` when cancelled; the snapshot is then that of the last whole step.
     pub fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
         let step_count = self.settings.step_count();
         let mut report = StepReport {
@@ -178,28 +178,28 @@ impl Solver {
         let is_coarse = is_coarse(threshold_scale);
         self.is_full = false;
         self.relighting.begin_step();
-        // Which part of its view lit surfaces fill, for each cell of the first mesh.
-        self.probe_closures(is_coarse, cancel)?;
-        // Divide elements where light bends between their corners: that of the last step, and direct light.
+        // Coverage of the hemisphere of each cell of the first mesh by lit surfaces.
+        self.probe_coverage(is_coarse, cancel)?;
+        // Divide elements where interpolation errs: of the linked light of the last step, and of direct light.
         self.adapt_to_linked(threshold_scale);
         self.adapt_to_direct(threshold_scale, cancel)?;
         cancel.proceed()?;
-        // What everything sends now, and the mean that errors are relative to.
+        // Source tables of the present light, and the mean that errors are relative to.
         self.pull();
         cancel.proceed()?;
         self.mean_irradiance = self.linked.mean_irradiance(self.surfaces());
         // Links whose errors are below the threshold.
         report.epsilon = self.refine(threshold_scale, cancel)?;
         self.probe_contacts(cancel)?;
-        // Factors by which what is sent adds up, as what is received does.
+        // Factors of the senders, so that sent light adds up as received light does.
         self.balance(cancel)?;
-        // Exchange light over the links until it settles. Coarse links err by more than light that has not quite settled.
+        // Exchange light over the links until it converges; coarse links need a coarse tolerance only.
         let tolerance = self.settings.tolerance * threshold_scale;
         self.iterate(tolerance, &mut report, cancel)?;
         // Light at the corners of each leaf, from its links.
         self.gather_for_leaves(is_coarse, cancel)?;
         cancel.proceed()?;
-        // In the last step, what rays from vertices find over what links tell.
+        // In the last step, factors of the linked light from rays at the vertices.
         self.vertex_factors.clear();
         if self.is_full || report.step >= step_count {
             self.vertex_factors = self.final_gather(1.0, cancel)?;
@@ -217,10 +217,10 @@ impl Solver {
         Surfaces::new(&self.hierarchy, &self.direct)
     }
 
-    /// The memory limit, and what is held beside the mesh and its light.
+    /// The memory limit, and the memory beside the mesh and its light.
     fn budget(&self) -> Budget {
         let others = self.rays.memory_bytes()
-            + self.closures.memory_bytes()
+            + self.coverage.memory_bytes()
             + size_of_val(self.leaves.as_slice())
             + size_of_val(self.vertex_factors.as_slice())
             + self.relighting.memory_bytes()
@@ -241,45 +241,45 @@ impl Solver {
         self.linked.pull(surfaces);
     }
 
-    /// New elements have colours of their own, and inherit the light of the one that was divided.
+    /// Give new elements colours of their own, and the light of the element that was divided.
     fn extend_to_new_elements(&mut self) {
         self.hierarchy
             .color_new_elements(&self.scene, &self.relighting.appearances);
         self.linked.extend(&self.hierarchy);
     }
 
-    /// Probe closures of the first mesh, unless those that are known are good enough.
-    pub(super) fn probe_closures(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
-        if self.closures.serve(is_coarse) {
+    /// Probe the coverage of the cells of the first mesh, unless the known coverage is precise enough.
+    pub(super) fn probe_coverage(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
+        if self.coverage.serve(is_coarse) {
             return Some(());
         }
-        if let Some(closures) = Closures::without_rays(&self.plan, &self.hierarchy) {
-            self.closures = closures;
+        if let Some(coverage) = CoverageMap::without_rays(&self.plan, &self.hierarchy) {
+            self.coverage = coverage;
             return Some(());
         }
         let (scene, rays, seed) = (&self.scene, &self.rays, self.settings.seed);
-        let known = &self.closures;
-        let probed =
-            coverage::closures(scene, &self.hierarchy, rays, known, is_coarse, seed, cancel)?;
-        self.closures = probed.closures;
+        let known = &self.coverage;
+        let probed = coverage::probe(scene, &self.hierarchy, rays, known, is_coarse, seed, cancel)?;
+        self.coverage = probed.coverage;
         self.ray_count += probed.ray_count;
-        // What rays found to lie within solids.
+        // Cells that rays found inside solids.
         let within = &probed.within;
         self.ray_count += places::probe_within(scene, &mut self.hierarchy, rays, within, cancel)?;
         Some(())
     }
 
-    /// Where nothing else divides them, divide elements over which the light of the last step bends.
+    /// Divide elements by the interpolation error of the linked light of the last step, where no link divides them.
     fn adapt_to_linked(&mut self, threshold_scale: f32) {
         if self.plan.follows_light {
             let (limits, mean) = (self.limits(threshold_scale), self.mean_irradiance);
             let (hierarchy, leaves) = (&mut self.hierarchy, &self.leaves);
-            self.is_full |= !vertices::divide_bent(hierarchy, leaves, limits, mean);
+            self.is_full |=
+                !vertices::divide_by_interpolation_error(hierarchy, leaves, limits, mean);
             self.extend_to_new_elements();
         }
     }
 
-    /// Make direct light known at all vertices, and divide elements where it bends.
+    /// Sample direct light at all vertices, and divide elements by its interpolation error.
     fn adapt_to_direct(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
         let limits = self.limits(threshold_scale);
         self.is_full |= !self.divide_coarse(limits);
@@ -293,14 +293,14 @@ impl Solver {
         Some(())
     }
 
-    /// Divide elements that are too large to be trusted with their corners. Returns whether all could be.
+    /// Divide elements that are too large to be sampled at their corners only. Returns whether memory allowed it.
     fn divide_coarse(&mut self, limits: Limits) -> bool {
         let lights = self.direct.as_ref().map(|field| &field.lights);
         let is_clear = self.plan.follows_light;
         direct::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
     }
 
-    /// Find out which new elements lie within solids.
+    /// Find which corners and centroids of new elements lie inside solids.
     fn probe_contacts(&mut self, cancel: &Cancel) -> Option<()> {
         let limits = self.limits(1.0);
         let (scene, rays) = (&self.scene, &self.rays);
@@ -308,7 +308,7 @@ impl Solver {
         Some(())
     }
 
-    /// Bring the links to the threshold of a scale. Returns the threshold that they have.
+    /// Refine the links to the threshold of a step. Returns the threshold that they meet.
     pub(super) fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
         let refining = Refining {
             settings: &self.settings,
@@ -338,11 +338,11 @@ impl Solver {
 
     fn balance(&mut self, cancel: &Cancel) -> Option<()> {
         let surfaces = Surfaces::new(&self.hierarchy, &self.direct);
-        let (closures, settings) = (&self.closures, &self.settings);
-        iteration::balance(&mut self.linked, surfaces, closures, settings, cancel)
+        let (coverage, settings) = (&self.coverage, &self.settings);
+        iteration::balance(&mut self.linked, surfaces, coverage, settings, cancel)
     }
 
-    /// Exchange light until it settles to a tolerance, as that of the settings is.
+    /// Exchange light over the links until it converges to a tolerance, relative to the total power.
     pub(super) fn iterate(
         &mut self,
         tolerance: f32,
@@ -351,7 +351,7 @@ impl Solver {
     ) -> Option<()> {
         let iteration = Iteration {
             surfaces: Surfaces::new(&self.hierarchy, &self.direct),
-            closures: &self.closures,
+            coverage: &self.coverage,
             settings: &self.settings,
             tolerance,
             cancel,
@@ -364,13 +364,13 @@ impl Solver {
         Some(())
     }
 
-    /// Let each leaf gather once more, for the vertices.
+    /// Gather once more for each leaf, at its own corners.
     pub(super) fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
         self.leaves = self.gathered(&self.linked.power, is_coarse, cancel)?;
         Some(())
     }
 
-    /// What each leaf gathers over the links, of what these tables send.
+    /// Light of the leaves, gathered over the links from these source tables.
     fn gathered(
         &self,
         tables: &Tables,
@@ -383,10 +383,10 @@ impl Solver {
             reading: self.settings.method.reading(),
         };
         let (surfaces, links) = (self.surfaces(), &self.linked.links);
-        vertices::gather_leaves(kernel, surfaces, links, &self.closures, is_coarse, cancel)
+        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, is_coarse, cancel)
     }
 
-    /// By what linked light at vertices is to be multiplied, as well as a step of this threshold scale needs it.
+    /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.
     pub(super) fn final_gather(
         &mut self,
         threshold_scale: f32,
@@ -405,7 +405,7 @@ impl Solver {
             squares: &squares,
             rays: &self.rays,
             limits: self.limits(threshold_scale),
-            settled: vertices::settled_change(tolerance, self.mean_irradiance),
+            converged_change: vertices::converged_change(tolerance, self.mean_irradiance),
             cancel,
         };
         let found = gather.run()?;
@@ -413,18 +413,18 @@ impl Solver {
         Some(found.factors)
     }
 
-    /// Fill in what can be read off the state after a step.
+    /// Fill in the figures of the present state.
     pub(super) fn fill(&self, report: &mut StepReport) {
         let (surfaces, budget) = (self.surfaces(), self.budget());
         shown::fill(report, surfaces, &self.linked, &self.leaves);
         report.shadow_rays = self.ray_count;
-        report.memory_bytes = budget.held_bytes(surfaces, &self.linked);
+        report.memory_bytes = budget.used_bytes(surfaces, &self.linked);
         if self.is_full || budget.is_exceeded(surfaces, &self.linked) {
             shown::note_full(report);
         }
     }
 
-    /// Renew the snapshot after a step. When cancelled it stays as it was.
+    /// Renew the snapshot after a step. When cancelled it is unchanged.
     pub(super) fn show(&mut self, step: u32, cancel: &Cancel) -> Option<()> {
         cancel.proceed()?;
         let triangles = shown::changed_triangles(&mut self.hierarchy, &self.snapshot.mesh);
@@ -436,7 +436,7 @@ impl Solver {
             linked: &self.linked,
             leaves: &self.leaves,
             factors: &self.vertex_factors,
-            left_out: &self.plan.left_out,
+            omitted: &self.plan.omitted,
             step,
         };
         self.snapshot = view.show(triangles, &self.snapshot, cancel)?;

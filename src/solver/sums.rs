@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use crate::hierarchy::{Channels as _, Hierarchy, luminance};
 
-/// Values that one task sums. It sets the order of sums, so it must not depend on the number of threads.
+/// Values that one task sums. It determines the order of summation, so it must not depend on the number of threads.
 const CHUNK: usize = 4096;
 
-/// A sum over indices whose order does not depend on the number of threads.
+/// Sum over indices in an order that does not depend on the number of threads.
 pub(super) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> DVec3 {
     let parts: Vec<DVec3> = (0..count.div_ceil(CHUNK))
         .into_par_iter()
@@ -20,7 +20,7 @@ pub(super) fn ordered_sum(count: usize, of: impl Fn(usize) -> DVec3 + Sync) -> D
     parts.into_iter().sum()
 }
 
-/// Sum over leaves of area times a colour, in fixed order and in double precision.
+/// Sum over leaves of area (square frame units) times a colour, in fixed order and in double precision.
 pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> DVec3 {
     let elements = &hierarchy.mesh.elements;
     ordered_sum(elements.len(), |index| {
@@ -32,12 +32,12 @@ pub(super) fn area_sum(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync)
     })
 }
 
-/// As [`area_sum`], of all colours together.
+/// As [`area_sum`], summed over the colours.
 pub(super) fn area_total(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f64 {
     area_sum(hierarchy, of).element_sum()
 }
 
-/// Mean of a colour over the scene, each leaf weighed as it counts there (see [`crate::hierarchy::Importance`]).
+/// Mean of a colour over the scene, each leaf weighted by its importance (see [`crate::hierarchy::Importance`]).
 pub(super) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> Vec4 {
     let importance = &hierarchy.importance;
     let elements = &hierarchy.mesh.elements;
@@ -46,12 +46,13 @@ pub(super) fn mean(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> 
     sum.as_vec3().extend(0.0)
 }
 
-/// Part of the scene that is taken to be lit at least: light on less of it is measured by its root mean square and not by
-/// its mean, which would tell of the dark.
+/// Smallest lit part of the scene for which errors are relative to the mean; with less, they are relative to the root
+/// mean square, since the mean would be that of the dark. Smaller, and a small lit part gets too many links and
+/// elements; larger, and dark scenes with bright spots get too few.
 const LEAST_LIT: f32 = 1.0 / 9.0;
 
-/// The luminance by which errors of a quantity are measured: its mean over the scene, or, where it is concentrated on a
-/// small part, what the mean would be if that part were [`LEAST_LIT`] of the scene.
+/// Luminance to which errors of a quantity are relative: its mean over the scene, or, if it is concentrated on a small
+/// part, the mean that it would have if that part were [`LEAST_LIT`] of the scene.
 pub(super) fn scale(hierarchy: &Hierarchy, of: impl Fn(usize) -> Vec4 + Sync) -> f32 {
     let moments = mean(hierarchy, |leaf| {
         let value = luminance(of(leaf));

@@ -1,10 +1,10 @@
-//! Elements divided by what textures show, before any light: a painted lamp, a floor that is half dark.
+//! Division of elements by their textures, before any light: a painted lamp, a floor that is half dark.
 //!
-//! An element sends the mean of its textures from all of itself, so light leaves from the wrong place: at most half of
-//! its mean deviation is moved, by about its radius. A receiver at the distance `d` gets light wrong by the share
-//! `4 · moved / d` of what is moved ([`CHANGE`]). For a receiver as far away as what sends is large, these errors are
-//! summed over all elements, as those of independent ones, and the largest are divided until the sum is small. So a
-//! fine pattern is left alone, whose light leaves evenly, and so is what sends little.
+//! An element sends the mean of its textures uniformly, so part of its light leaves from the wrong place: at most half
+//! of the mean deviation, displaced by about the radius. At the distance `d` the irradiance from displaced light is
+//! wrong by the share `4 · displacement / d` ([`CHANGE`]). For a distance as large as the sending area, these errors
+//! are summed over all elements as independent ones, and the elements with the largest errors are divided until the sum
+//! is below the tolerance. So fine patterns, whose light leaves evenly, and weak senders are not divided.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -14,23 +14,23 @@ use crate::{
     scene::{Appearance, Scene},
 };
 
-/// Error of the light that leaves, relative to all of it. Larger shows lamps in wrong places, smaller divides more finely
-/// than links tell apart.
+/// Tolerated error of the light that leaves, relative to all of it. Larger displaces lamps; smaller divides more finely
+/// than links resolve.
 const TOLERANCE: f32 = 0.02;
 
-/// Relative change of a form factor per distance moved over the distance between: of the two cosines one, and of the
-/// squared distance two.
+/// Relative change of a form factor, in multiples of the displacement over the distance: one for each of the two
+/// cosines, two for the squared distance.
 const CHANGE: f32 = 4.0;
 
-/// Elements that may be made. Fewer, and many painted lamps are coarse; more, and it takes longer to sample them than all
-/// else. One lamp takes ten to a hundred, whatever the picture.
+/// Most elements that textures may make. Fewer, and many painted lamps are coarse; more, and sampling them takes longer
+/// than everything else. One lamp takes ten to a hundred, whatever the picture.
 const MOST_MADE: usize = 4096;
 
-/// Elements whose errors could add to no more than this share of the tolerance are not looked at. Larger leaves errors
-/// unknown, smaller takes time where there are many small textured faces.
+/// Textures are not measured on elements whose errors together cannot exceed this share of the tolerance. Larger
+/// ignores errors; smaller takes time where there are many small textured faces.
 const UNSEEN_SHARE: f32 = 0.1;
 
-/// Light of one kind that all elements send: emission, or reflection of even light.
+/// Light of one kind that all elements send: emission, or reflection of uniform light.
 #[derive(Clone, Copy, Default)]
 struct Sent {
     /// Luminance times area.
@@ -48,28 +48,29 @@ impl Sent {
         }
     }
 
-    /// Error for light of this deviation from its mean, on an element of this area and radius; 0 where nothing is sent.
+    /// Error due to an element of this area and radius whose light deviates so much from its mean; 0 where nothing is
+    /// sent.
     fn error(self, deviation: f32, area: f32, radius: f32) -> f32 {
-        // Root of the area that would send as much if it did so evenly.
+        // Square root of the area that would send the same power uniformly.
         let size = self.power / self.squares.sqrt();
-        let moved = 0.5 * f64::from(deviation) * f64::from(area) * f64::from(radius);
-        let error = f64::from(CHANGE) * moved / (size * self.power);
+        let displaced = 0.5 * f64::from(deviation) * f64::from(area) * f64::from(radius);
+        let error = f64::from(CHANGE) * displaced / (size * self.power);
         if error.is_finite() { error as f32 } else { 0.0 }
     }
 }
 
-/// How the textures of a scene look at present.
+/// The textures of a scene with the present appearances.
 #[derive(Clone, Copy)]
 pub(super) struct Painted<'a> {
-    /// What is lit.
+    /// The scene.
     pub scene: &'a Scene,
-    /// How materials look, by material.
+    /// Appearance by material.
     pub appearances: &'a [Appearance],
 }
 
 impl Painted<'_> {
-    /// Divide elements by their textures until the light that leaves is right to [`TOLERANCE`]. Children are not smaller
-    /// than `min_area` (frame units), and there are no more than `most_elements` after.
+    /// Divide elements by their textures until the error of the light that leaves is below [`TOLERANCE`]. Children are
+    /// not smaller than `min_area` (square frame units), and the mesh gets at most `most_elements`.
     pub(super) fn divide(self, hierarchy: &mut Hierarchy, min_area: f32, most_elements: u64) {
         let most = hierarchy.mesh.elements.len() + MOST_MADE;
         let most_elements = most_elements.min(most as u64);
@@ -77,7 +78,7 @@ impl Painted<'_> {
             let leaves = self.textured_leaves(hierarchy, min_area);
             let mut wanted = self.misplaced(hierarchy, &leaves);
             while !hierarchy.mesh.fits(&wanted, most_elements) {
-                // The first ones err most.
+                // The first ones have the largest errors.
                 wanted.truncate(wanted.len() / 2);
             }
             if wanted.is_empty() || !hierarchy.mesh.divide(&wanted) {
@@ -87,7 +88,7 @@ impl Painted<'_> {
         }
     }
 
-    /// Mean deviation of reflectance and emission within an element, as far as it is known.
+    /// Mean deviation of reflectance and emission within an element; `None` if its textures were not measured.
     pub(super) fn deviation(self, hierarchy: &Hierarchy, element: usize) -> Option<Appearance> {
         let deviation = hierarchy.texture_deviation_of(element)?;
         let triangle = hierarchy.patch_of(element).triangle;
@@ -107,12 +108,12 @@ impl Painted<'_> {
         leaves.collect()
     }
 
-    /// Those of some textured leaves that must be divided, the one that errs most first.
+    /// Those of some textured leaves that must be divided, in descending order of error.
     fn misplaced(self, hierarchy: &mut Hierarchy, leaves: &[usize]) -> Vec<u32> {
         if leaves.is_empty() {
             return Vec::new();
         }
-        // Look at the textures of those that may err.
+        // Measure the textures of leaves that may err.
         let sent = sent(hierarchy);
         let unseen = UNSEEN_SHARE * TOLERANCE / (leaves.len() as f32).sqrt();
         // No deviation is larger than twice the mean.
@@ -122,8 +123,8 @@ impl Painted<'_> {
                 && error_of(hierarchy, sent, leaf, most) > unseen
         };
         let unknown: Vec<usize> = leaves.iter().copied().filter(may_err).collect();
-        hierarchy.look_at_textures(self.scene, self.appearances, &unknown);
-        // Take the largest errors until the rest is small.
+        hierarchy.measure_textures(self.scene, self.appearances, &unknown);
+        // Take the largest errors until the sum of the others is small.
         let mut errors: Vec<(f32, usize)> = leaves
             .par_iter()
             .filter_map(|&leaf| {
@@ -156,7 +157,7 @@ fn shown_by(hierarchy: &Hierarchy, element: usize) -> [Vec3; 2] {
     ]
 }
 
-/// What all leaves reflect and emit.
+/// Light that all leaves reflect and emit.
 fn sent(hierarchy: &Hierarchy) -> [Sent; 2] {
     let leaves = hierarchy.mesh.active_leaves();
     leaves.fold([Sent::default(); 2], |sent, leaf| {
@@ -167,7 +168,7 @@ fn sent(hierarchy: &Hierarchy) -> [Sent; 2] {
     })
 }
 
-/// Error of an element whose reflectance and emission deviate so from their means.
+/// Error due to an element whose reflectance and emission have these deviations.
 fn error_of(hierarchy: &Hierarchy, sent: [Sent; 2], element: usize, deviations: [Vec3; 2]) -> f32 {
     let element = &hierarchy.mesh.elements[element];
     let area = element.area_vector.length();
@@ -194,7 +195,7 @@ mod tests {
 
     const SIDE: usize = 64;
 
-    /// A square lamp with a picture in it, by column and row, that looks at a black square.
+    /// A square lamp with a picture, by column and row, that faces a black square.
     fn lamp(picture: impl Fn(usize, usize) -> f32) -> Solver {
         let mut builder = SceneBuilder::default();
         builder.textures.push(Texture {
@@ -239,7 +240,7 @@ mod tests {
         Solver::new(scene, settings, None, &Cancel::default()).expect("nobody cancels")
     }
 
-    /// Whether nothing need be divided any more.
+    /// Whether nothing needs division any more.
     fn is_right(solver: &mut Solver) -> bool {
         let min_area = min_area(&solver.settings, &solver.hierarchy);
         let painted = Painted {
@@ -250,7 +251,7 @@ mod tests {
         painted.misplaced(&mut solver.hierarchy, &leaves).is_empty()
     }
 
-    /// Area and power of what shines, relative to a lamp that is white all over, and the number of its parts.
+    /// Area and power of the emitting parts, relative to a lamp that is white all over, and their number.
     fn shining(solver: &Solver) -> (f32, f32, usize) {
         let hierarchy = &solver.hierarchy;
         let lamps = (0..hierarchy.patches.len())
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn black_parts_of_a_lamp_shine_not_and_bright_ones_are_whole() {
+    fn black_parts_of_a_lamp_do_not_emit_and_bright_ones_are_complete() {
         let mut solver = lamp(|column, row| match (column, row) {
             (16..32, 32..48) => 1.0,
             _ => 0.0,
@@ -279,7 +280,7 @@ mod tests {
         assert!(is_right(&mut solver));
         let (area, power, count) = shining(&solver);
         assert!((power - 1.0 / 16.0).abs() < 1e-3, "{power}");
-        // With the rim over which the picture is blurred.
+        // Including the rim over which the picture is blurred.
         assert!(area < 0.2, "{area}");
         assert!(count < 200, "{count}");
     }
@@ -309,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fine_pattern_is_left_alone() {
+    fn a_fine_pattern_is_not_divided() {
         let fine = lamp(|column, row| {
             if (column + row).is_multiple_of(2) {
                 1.0

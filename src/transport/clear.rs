@@ -1,9 +1,9 @@
-//! Pairs in scenes that need less: those of few patches, and those where nothing blocks.
+//! Pairs that need less work: those of scenes with few patches, and those of scenes without occlusion.
 //!
-//! Where nothing blocks, the form factor between two elements is known exactly, however near they are. What is left to
-//! err is that the source is not evenly bright, which its own elements tell, and that the receiver's part of the form
-//! factor varies, which matters only for what it reflects: what is shown is evaluated at its corners. So a pair can be
-//! kept that bounds from spheres would divide again and again, and elements are left to be divided where light bends.
+//! Without occlusion, the form factor between two elements is known exactly at any distance. Two errors remain. The
+//! source is not uniformly bright: its elements say by how much. The form factor varies over the receiver: that matters
+//! only for the reflected light, because the displayed light is evaluated at the corners. So a pair can become a link
+//! that bounds from spheres would divide again and again, and elements are divided only where interpolation errs.
 
 use glam::{Vec3, Vec4};
 
@@ -18,23 +18,25 @@ use crate::{
     hierarchy::{ElementId, Hierarchy, Kind, NodeId},
 };
 
-/// Beyond this many radii of both, form factors are those of the centroids: they vary by less than half.
+/// Form factors of pairs further apart than this many times the sum of their radii are evaluated at the centroid of the
+/// receiver: over it they vary by less than half. Smaller, and that is wrong near the source; larger, and points are
+/// evaluated that agree.
 const NEAR: f32 = 2.0;
 
-/// Relative change of a form factor per radius of the receiver over the distance: of the two cosines one, and of the
-/// squared distance two.
+/// Relative change of a form factor over the receiver, in multiples of the receiver's radius over the distance: one for
+/// each of the two cosines, two for the squared distance.
 const FAR_CHANGE: f32 = 4.0;
 
-/// Where a form factor changes by more than this share of its mean, more points are taken: it is peaked where receiver and
-/// source touch, and a few points inside miss some of that.
+/// Where a form factor varies by more than this share of its mean, it is averaged over more points: it has a peak where
+/// receiver and source touch. Smaller, and smooth form factors cost time; larger, and part of the peak is missed.
 const PEAKED: f32 = 0.5;
 
-/// Errors in view are estimates, where those of other pairs are bounds that are hardly ever reached: to be as good, pairs
-/// must keep this share of the threshold. Larger, and light from uneven walls smears into the corners of a room; smaller,
-/// and time goes into what is not seen.
+/// Share of the threshold that the error of an unoccluded pair may have: its error is an estimate, while those of other
+/// pairs are bounds that are hardly ever reached. Larger, and light from uneven walls smears into the corners of a
+/// room; smaller, and time goes into invisible errors.
 const ESTIMATE_SHARE: f32 = 0.02;
 
-/// The unoccluded form factor from points of a receiver to a source.
+/// The unoccluded form factor from points of a receiver to a source, 0…1.
 struct InView {
     mean: f32,
     /// Largest minus smallest.
@@ -42,7 +44,7 @@ struct InView {
 }
 
 impl InView {
-    /// Of a pair that has a link: near its source a leaf may see as much more as it sees on average.
+    /// Of a pair that has a link: near the source the form factor may be up to twice the mean.
     fn known(form_factor: f32) -> Self {
         Self {
             mean: form_factor,
@@ -88,7 +90,7 @@ impl InView {
 }
 
 impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
-    /// What becomes of a pair for which the scene needs less than in general; `None` for the others.
+    /// The decision on a pair to which a simplification of the plan applies; `None` for other pairs.
     pub(super) fn decide_by_plan(
         &self,
         source: NodeId,
@@ -113,7 +115,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 
-    /// What becomes of two elements in full view of each other; `known` is their link if they have one.
+    /// The decision on two elements with nothing between them; `known` is their link if they have one.
     fn decide_in_view(
         &self,
         [from, to]: [usize; 2],
@@ -125,9 +127,9 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let [source_node, receiver_node] =
             [from, to].map(|element| hierarchy.element_node(ElementId(element as u32)));
         let (source, receiver) = (&hierarchy.mesh.elements[from], &hierarchy.mesh.elements[to]);
-        // Form factors, and errors by how uneven the source is and by how they vary over the receiver.
+        // The form factor, the error from the unevenness of the source, and that from the variation over the receiver.
         let seen = match known {
-            // What a leaf receives stays as it is, and only the source may have become uneven.
+            // The form factor of a linked leaf is known; only the source may have become less even.
             Some(link) if receiver.is_leaf() => InView::known(link.form_factor()),
             _ => InView::between(hierarchy, from, to),
         };
@@ -135,7 +137,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mean = luminance(self.judge.kernel.tables.elements[from]);
         let of_source = self.unevenness(from) * (seen.mean + seen.change);
         let of_receiver = reflected * mean * seen.change;
-        // Divide where an error exceeds the threshold: now, or after this pass.
+        // Divide where an error exceeds the threshold: existing children now, leaves after this pass.
         let exceeds = |error: f32| error * weight > ESTIMATE_SHARE * self.threshold;
         if !source.is_leaf() && exceeds(of_source) {
             return Decision::DivideSource;
@@ -146,7 +148,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if exceeds(of_source) && source.area_vector.length() * 0.25 >= self.min_area {
             out.wanted.push(from as u32);
         }
-        // What is seen at a few points tells more than bounds that hold for all.
+        // The estimate from a few points is usually tighter than the bound over all points.
         let error = self
             .judge
             .bound(source_node, receiver_node)
@@ -154,7 +156,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         Decision::Keep(Link::between_elements(source_node, 1.0, seen.mean, error))
     }
 
-    /// By how much the radiosity of an element is above its mean somewhere.
+    /// Largest excess of the radiosity of an element over its mean (luminance).
     fn unevenness(&self, element: usize) -> f32 {
         let tables = self.judge.kernel.tables;
         if self.hierarchy().mesh.elements[element].is_leaf() {

@@ -1,4 +1,5 @@
-//! What becomes of a pair: it is dropped, kept as a link, or replaced by pairs with the children of one of its nodes.
+//! The decision on a pair: it is dropped, becomes a link, or is replaced by pairs with the children of one of its
+//! nodes.
 
 use super::{
     Judgement, Link, element_form_factor, element_form_factors,
@@ -10,42 +11,45 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
 };
 
-/// Rays of one link at least.
+/// Fewest visibility rays of a link. Fewer, and the two halves that correct the bias are missing; more cost time on all
+/// weak links.
 const LEAST_RAYS: u32 = 2;
 
-/// Rays of one link at most.
+/// Most visibility rays of a link. Fewer, and strong links are noisy; more cost time.
 const MOST_RAYS: u32 = 8;
 
-/// Rays that find which part of a cluster's light falls on the cluster itself. These links are few and carry much.
+/// Rays that estimate which part of its own light a cluster receives. Fewer, and these links, which are few and carry
+/// much light, are noisy; more cost time.
 const SELF_RAYS: u32 = 16;
 
-/// Share of its brightest patch's light by which the exchange of a cluster within itself may be wrong. Larger, and links
-/// within convex objects are sought in vain; smaller, and bright corners are blurred.
+/// Assumed error of the light that a cluster exchanges within itself, as a share of the radiosity of its brightest
+/// patch. Larger, and links within convex objects are refined in vain; smaller, and bright corners are blurred.
 const SELF_SHARE: f32 = 0.2;
 
-/// Largest factor by which rays may raise what tables say of near nodes. Larger, and a few lucky rays make a firefly;
-/// smaller, and light is lost where tables see a source edge-on.
+/// Largest factor by which rays may raise the form factor that tables give for near nodes. Larger, and a few rays that
+/// hit by chance make a firefly; smaller, and light is lost where tables see a source edge-on.
 const MOST_CORRECTION: f32 = 64.0;
 
-/// Rays of a link between near nodes, at least and at most.
+/// Fewest and most rays of a link between near nodes. Fewer, and their form factors are noisy; more cost time.
 const NEAR_RAYS: std::ops::RangeInclusive<u32> = 4..=16;
 
-/// Share of a partly visible transfer that counts as error: shadows vary over the receiver, and neither node's
-/// table knows how.
+/// Share of a partly visible transfer that counts as error: shadows vary over the receiver, and the tables do not
+/// resolve them. Smaller, and shadows are blurred; larger, and links are divided at every shadow.
 const PARTIAL_VISIBILITY: f32 = 0.5;
 
-/// Part of a transfer that may get through although no sampled ray did: a few rays prove little. Smaller, and pairs that
-/// were once found blocked stay so; larger, and refinement goes on behind walls.
+/// Smallest visibility that refinement assumes: a few occluded rays do not prove that a pair is occluded. Smaller, and
+/// pairs whose rays were all occluded stay as they are; larger, and refinement goes on behind walls.
 const DOUBT: f32 = 0.1;
 
-/// Of two nodes whose radii differ by less, the source is divided: rounding must not choose among equals.
+/// The source is divided unless its radius is smaller than this share of the receiver's: rounding must not choose
+/// between equal nodes.
 const TIE: f32 = 0.999;
 
-/// Normals agree when their vector sum is shorter than their total area by less than this.
+/// Normals agree when the length of the summed area vectors is within this relative difference of the summed areas.
 const SAME_DIRECTION: f32 = 1e-6;
 
 impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
-    /// What becomes of a pair; `known` is its link if it has one.
+    /// The decision on a pair; `known` is its link if it has one.
     pub(super) fn decide(
         &self,
         source: NodeId,
@@ -82,7 +86,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             }
         };
         if self.judge.is_too_near_for_tables(source, receiver) {
-            // What few rays have seen must not decide: of pairs that see little, only those found blind would stay.
+            // A few rays must not decide: among pairs of low visibility, only those without any hit would stay.
             return Decision::Keep(link.with_error(bound));
         }
         let visibility = link.light_factor();
@@ -91,13 +95,13 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
             return decision;
         }
-        // What gets through is known from a few rays: the bound of the transfer, and twice the deviation of a share that so
-        // many rays found.
+        // The bound of the transfer, and twice the standard error of a visibility that `LEAST_RAYS` rays estimate.
         let share = (visibility.min(1.0) * LEAST_RAYS as f32 + 1.0) / (LEAST_RAYS as f32 + 2.0);
         let deviation = (share * (1.0 - share) / LEAST_RAYS as f32).sqrt();
         Decision::Keep(link.with_error(bound + 2.0 * deviation * irradiance))
     }
 
+    /// The decision on a cluster and itself.
     fn decide_self(
         &self,
         cluster: NodeId,
@@ -109,8 +113,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if judged <= 0.0 || self.faces_one_way(cluster) {
             return Decision::Drop;
         }
-        // What few rays have seen must not decide: of clusters that see little of themselves, only those found blind would
-        // stay.
+        // A few rays must not decide: among clusters that exchange little within themselves, only those without any hit
+        // would stay.
         if judged * SELF_SHARE * weight > self.threshold {
             return Decision::DivideReceiver;
         }
@@ -134,7 +138,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         ))
     }
 
-    /// Whether all faces of a cluster look the same way: then none sees another.
+    /// Whether all faces of a cluster have the same normal: then none sees another.
     fn faces_one_way(&self, cluster: NodeId) -> bool {
         let Kind::Cluster(index) = self.hierarchy().kind(cluster) else {
             return true;
@@ -144,13 +148,13 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         vector.length() >= (1.0 - SAME_DIRECTION) * moments.total().area()
     }
 
-    /// Rays for a transfer, the more the more it matters.
+    /// Number of rays of a transfer, in proportion to its weighted irradiance over the threshold.
     fn ray_count(&self, weighted: f32, most: u32) -> u32 {
         let importance = weighted / self.threshold.max(f32::MIN_POSITIVE);
         (importance.min(64.0).ceil() as u32).clamp(LEAST_RAYS, most)
     }
 
-    /// Which node to divide: the larger that can be.
+    /// Which node to divide: the larger of those that can be divided; `None` where neither can.
     fn division(&self, source: NodeId, receiver: NodeId) -> Option<Decision> {
         let hierarchy = self.hierarchy();
         let can_divide_source = !hierarchy.children(source).is_empty();
@@ -174,12 +178,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 
-    /// Root of the receiver's share of the area: error is summed in squares over area.
+    /// Square root of the receiver's share of the area: squares of errors are summed over the area.
     fn weight(&self, receiver: NodeId) -> f32 {
         self.hierarchy().node_share_of_area(receiver).sqrt()
     }
 
-    /// The link of a pair, with what rays say of it.
+    /// The link of a pair, with the visibility that `ray_count` rays estimate; near nodes get up to twice as many.
     pub(super) fn link(
         &self,
         source: NodeId,
@@ -216,7 +220,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
     }
 }
 
-/// Form factor from one element to another, unoccluded, averaged over the receiver where they are near.
+/// Unoccluded form factor from a receiving element to a source, 0…1; averaged over the receiver where they are near.
 fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f32 {
     let (from, to) = (
         &hierarchy.mesh.elements[source],

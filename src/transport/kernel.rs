@@ -1,7 +1,7 @@
-//! What a source sends to a point: eqs 11–15 of the paper for every kind of pair.
+//! The irradiance that a source causes at a point: eqs 11–15 of the paper for every kind of pair.
 //!
-//! A cluster is seen from its centroid through its directional table. An element that is near is integrated exactly,
-//! since the point-to-point kernel grows without bound where faces touch.
+//! A cluster sends its projected power, by its directional table, from its centre. A near element is integrated
+//! exactly, since the point-to-point kernel grows without bound where faces touch.
 
 use std::f32::consts::PI;
 
@@ -12,36 +12,37 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, Moments, NodeId, Quantity as _, Reading, Tables},
 };
 
-/// Where on the way to its corners a receiver is looked at, beside its centroid.
+/// Share of the way from the centroid to the corners at which a receiver is evaluated, beside its centroid. Smaller,
+/// and the variation over the receiver is missed; larger, and edges that touch the source count too much.
 const TOWARDS_CORNER: f32 = 0.6;
 
-/// An element nearer than this many of its radii is integrated exactly.
-/// At 4 the point kernel errs by about 1 %; much larger, and most links pay for arctangents.
+/// Elements nearer than this many of their radii are integrated exactly. Smaller, and the point-to-point kernel is
+/// wrong by more than the 1 % that it is at 4; larger, and most links pay for arctangents.
 const NEAR: f32 = 4.0;
 
-/// A vector irradiance: light that arrives at a point, and where from.
+/// A vector irradiance: the light that arrives at a point, and its direction.
 ///
-/// The paper's has one direction. That is wrong for a source that is as near as it is large: faces edge-on to its centre
-/// would get nothing, though half of it stands above their horizon. `spread` tells which part comes from a whole
-/// half-space instead, and gives a face at angle θ the share (1 + cos θ)/2.
+/// The paper's has one direction. That is wrong for a source that is as near as it is large: faces edge-on to its
+/// centre would get nothing, though half of it stands above their horizon. `spread` is the part that comes from a whole
+/// half-space instead; a face at angle θ receives the share (1 + cos θ)/2 of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Incident {
     /// Unit direction from the receiving point towards the source: −r of the paper.
     pub towards_source: Vec3,
-    /// Irradiance of a face that looks that way.
+    /// Irradiance of a face with that normal.
     pub strength: Vec4,
-    /// Part of it that comes from everywhere in the half-space about the direction, 0…1; 0 in the paper's methods.
+    /// Part of it that comes uniformly from the half-space about the direction, 0…1; 0 in the paper's methods.
     pub spread: f32,
 }
 
 impl Incident {
-    /// Irradiance of a face of unit normal (eq. 15).
+    /// Irradiance of a face with this unit normal (eq. 15).
     pub fn on_face(&self, normal: Vec3) -> Vec4 {
         let cosine = self.towards_source.dot(normal);
         self.strength * (cosine.max(0.0) * (1.0 - self.spread) + 0.5 * (1.0 + cosine) * self.spread)
     }
 
-    /// Add it, times a transmission, to the moments of what arrives.
+    /// Add this irradiance, times a transmission, to moments of incident light.
     pub fn add_to(&self, moments: &mut Moments<Vec4>, transmission: Vec4) {
         moments.add_spread(
             self.towards_source,
@@ -51,21 +52,22 @@ impl Incident {
     }
 }
 
-/// A cluster as it looks from about a point: what it sends there, by which its light is known at all points near by.
+/// A cluster as seen from a point: its projected power in that direction, from which its irradiance at all points near
+/// by follows.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight {
     /// Where the power comes from.
     pub(super) centre: Vec3,
-    /// Projected power along the way to the point.
+    /// Projected power in the direction of the point.
     pub(super) power: Vec4,
     /// Largest radiosity.
     pub(super) brightest: Vec4,
-    /// Square of the radius over which the light spreads, 0 if it does not.
+    /// Square of the radius of the source; 0 where it counts as a point.
     pub(super) extent: f32,
 }
 
 impl Sight {
-    /// Vector irradiance at a point so near to that of the sight that the power along the way is the same.
+    /// Vector irradiance at a point near enough to that of the sight for the projected power to be the same.
     pub fn incident(&self, point: Vec3) -> Incident {
         let separation = point - self.centre;
         let squared = separation.length_squared();
@@ -81,17 +83,18 @@ impl Sight {
     }
 }
 
-/// Share of the light of a source of this squared extent that comes from the half-space about the way to it; 0…1.
+/// Part of the light of a source of this squared radius that counts as uniform over the half-space about the direction
+/// to it; 0…1.
 fn spread(extent: f32, squared_distance: f32) -> f32 {
     (extent / squared_distance.max(f32::MIN_POSITIVE)).min(1.0)
 }
 
-/// Reads the source tables of a hierarchy by one method.
+/// The transport kernel: reads the source tables of a hierarchy by one method.
 #[derive(Clone, Copy)]
 pub struct Kernel<'a> {
     /// Where the nodes are.
     pub hierarchy: &'a Hierarchy,
-    /// What they send.
+    /// Their radiosities and moments.
     pub tables: &'a Tables,
     /// How moments are read; `None` sums over the patches of a cluster (eq. 3).
     pub reading: Option<Reading>,
@@ -135,7 +138,7 @@ impl Kernel<'_> {
         sum
     }
 
-    /// A cluster as it looks from about a point.
+    /// A cluster as seen from a point.
     pub fn sight(&self, cluster: usize, point: Vec3) -> Sight {
         let centre = self.tables.centres[cluster];
         let extent = self.extent(self.hierarchy.clusters[cluster].radius);
@@ -158,7 +161,7 @@ impl Kernel<'_> {
         }
     }
 
-    /// Square of the radius over which the light of a node spreads: the paper's methods take it for a point.
+    /// Square of the radius of a node as a source: 0 in the paper's methods, which take it for a point.
     fn extent(&self, radius: f32) -> f32 {
         match self.reading {
             Some(Reading::Bounded) => radius * radius,
@@ -166,8 +169,8 @@ impl Kernel<'_> {
         }
     }
 
-    /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards its
-    /// brightest patch, as that of a disc does exactly on its axis: A/π r² becomes A/(π r² + A).
+    /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards the
+    /// radiosity of its brightest patch, as that of a disc does on its axis: A/π r² becomes A/(π r² + A).
     pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident {
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => self.sight(index, point).incident(point),
@@ -190,8 +193,8 @@ impl Kernel<'_> {
         }
     }
 
-    /// Mean form factor (unoccluded) from the patches of a receiver to a source, as tables tell it: what the receiver's
-    /// links would give if everything sent 1.
+    /// Mean unoccluded form factor from the patches of a receiver to a source by the tables: the irradiance over such a
+    /// link if every radiosity were 1.
     pub fn mean_form_factor(&self, source: NodeId, receiver: NodeId) -> f32 {
         let point = self.hierarchy.centroid(receiver);
         match self.hierarchy.kind(receiver) {
@@ -218,7 +221,7 @@ impl Kernel<'_> {
         }
     }
 
-    /// Irradiance (eqs 12 and 15, unoccluded) of a face of unit normal at a point.
+    /// Irradiance (eqs 12 and 15, unoccluded) of a face with this unit normal at a point.
     pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Vec4 {
         match self.hierarchy.kind(source) {
             Kind::Cluster(_) => self.vector_irradiance(source, point).on_face(normal),
@@ -229,7 +232,7 @@ impl Kernel<'_> {
         }
     }
 
-    /// As [`Self::irradiance`], at four points of one unit normal.
+    /// As [`Self::irradiance`], at four points with one unit normal.
     pub fn irradiances(&self, source: NodeId, points: &Vectors4, normal: Vec3) -> [Vec4; 4] {
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => points
@@ -239,7 +242,7 @@ impl Kernel<'_> {
                 let normals = Vectors4::splat(normal);
                 let factors = element_form_factors(self.hierarchy, index, points, &normals);
                 let radiosity = self.tables.elements[index];
-                // Written out: as a `map` it becomes a call for every link.
+                // Written out: a `map` compiles to a call for every link.
                 [
                     radiosity * factors.x,
                     radiosity * factors.y,
@@ -299,8 +302,8 @@ pub fn element_form_factors(
     }
 }
 
-/// The centroid of a triangle, and three points on the way to its corners. Weighed alike they are nearly a rule of degree
-/// 2 whose points lie inside.
+/// The centroid of a triangle, and three points on the way to its corners. With equal weights they are nearly a
+/// quadrature rule of degree 2 whose points lie inside.
 pub(super) fn inner_points(corners: [Vec3; 3]) -> Vectors4 {
     let middle = centroid(corners);
     let [a, b, c] = corners.map(|corner| middle.lerp(corner, TOWARDS_CORNER));

@@ -4,24 +4,24 @@ use glam::{Vec3, Vec4};
 
 use crate::hierarchy::{Hierarchy, NodeId};
 
-/// A source as one receiver sees it. The receiver is known from where the link is stored.
+/// Transport from a source to one receiver. The receiver is implied by where the link is stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
-    /// Where the light comes from. Equal to the receiver for the light that a cluster exchanges within itself.
+    /// The sending node. Equal to the receiver for the light that a cluster exchanges within itself.
     pub source: NodeId,
-    /// Bound of the error of the irradiance that a face gets over this link (luminance): guaranteed but for visibility,
-    /// which adds twice its standard error.
+    /// Bound of the error of the irradiance that a face receives over this link (luminance): guaranteed except for
+    /// visibility, which adds twice its standard error.
     pub error: f32,
     /// See [`Self::light_factor`].
     light_factor: f32,
-    /// The form factor between elements, else the factor of the area: what a sweep needs, so that a link takes 16 bytes. Read
-    /// by [`Self::form_factor`] and [`Self::area_factor`].
+    /// The form factor between elements, else the factor of the area: a sweep needs only one of both, so that a link
+    /// takes 16 bytes. Read by [`Self::form_factor`] and [`Self::area_factor`].
     form_or_area_factor: f32,
 }
 
 impl Link {
-    /// Between two elements, whose form factor, visibility included, is a constant. `visibility` is that of the light and of
-    /// the area alike.
+    /// A link between two elements. `form_factor` (0…1) includes the visibility; `visibility` is the unoccluded
+    /// fraction of both light and area.
     pub fn between_elements(source: NodeId, visibility: f32, form_factor: f32, error: f32) -> Self {
         Self {
             source,
@@ -31,7 +31,8 @@ impl Link {
         }
     }
 
-    /// With a cluster at one end at least. What is bright often stands free, so light may get through where area does not.
+    /// A link with a cluster at one end at least. Bright surfaces often stand free, so the unoccluded fraction of the
+    /// light may exceed that of the area.
     pub fn over_tables(source: NodeId, light_factor: f32, area_factor: f32, error: f32) -> Self {
         Self {
             source,
@@ -41,23 +42,23 @@ impl Link {
         }
     }
 
-    /// By what unoccluded light is multiplied: the part of it that gets through, 0…1.5 as few rays tell it without bias; more
-    /// where near nodes exchange more than tables say.
+    /// Factor of the unoccluded irradiance: the visible part of the light, 0…1.5, since an unbiased estimate from few
+    /// rays may exceed 1; larger where near nodes exchange more than the tables give.
     pub fn light_factor(&self) -> f32 {
         self.light_factor
     }
 
-    /// The same for the area of the source, and so for form factors. Where one end at least is a cluster.
+    /// The same factor for the area of the source, and so for form factors. Only where one end at least is a cluster.
     pub fn area_factor(&self) -> f32 {
         self.form_or_area_factor
     }
 
-    /// The form factor, visibility included. Between elements.
+    /// The form factor, visibility included, 0…1. Only between elements.
     pub fn form_factor(&self) -> f32 {
         self.form_or_area_factor
     }
 
-    /// What each channel of an unoccluded irradiance is multiplied by where not both ends are elements.
+    /// Factor by channel of an unoccluded irradiance, where one end at least is a cluster.
     pub fn transmission(&self) -> Vec4 {
         Vec3::splat(self.light_factor).extend(self.area_factor())
     }
@@ -77,7 +78,8 @@ pub struct LinkStore {
 }
 
 impl LinkStore {
-    /// From runs of links in any order of receivers; each receiver at most once.
+    /// From runs of links: `runs` names each receiver at most once, in any order, with its number of links; `links` has
+    /// them in that order.
     pub fn from_runs(node_count: usize, runs: &[(NodeId, u32)], links: &[Link]) -> Self {
         let mut offsets = vec![0u32; node_count + 1];
         for &(node, count) in runs {
@@ -101,7 +103,7 @@ impl LinkStore {
         }
     }
 
-    /// The links over which a node receives. Nodes that came after the store was made have none.
+    /// The links over which a node receives; none for nodes that are newer than the store.
     pub fn of(&self, node: NodeId) -> &[Link] {
         match self.offsets.get(node.index()..node.index() + 2) {
             Some(&[start, end]) => &self.links[start as usize..end as usize],
@@ -114,8 +116,8 @@ impl LinkStore {
         &self.links
     }
 
-    /// Let all light through as the area does: then the sums of form factors bound what any surface receives. Between
-    /// elements both are the same already.
+    /// Set the factor of the light to that of the area: then the sums of form factors bound the irradiance of any
+    /// surface. Between elements both are equal already.
     pub fn level(&mut self, hierarchy: &Hierarchy) {
         let first_element = hierarchy.clusters.len();
         for (receiver, range) in self.offsets.windows(2).enumerate() {
@@ -137,7 +139,7 @@ impl LinkStore {
         self.links.is_empty()
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.links.as_slice()) + size_of_val(self.offsets.as_slice())
     }

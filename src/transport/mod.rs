@@ -1,4 +1,4 @@
-//! Node pairs: what a source sends to a point, who sees whom, which pairs are good enough, and the links that stay.
+//! Transport between pairs of nodes: the kernel, visibility, the error oracle, refinement, and the links.
 
 mod clear;
 mod decide;

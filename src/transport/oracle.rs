@@ -1,4 +1,4 @@
-//! Is a pair good enough? Bounds or samples of what a receiver gets from a source.
+//! The error oracle: bounds or samples of the irradiance that a receiver gets from a source.
 //!
 //! `interval` bounds the transfer over all points of both nodes, from spheres about their centroids: the distance lies
 //! in d ± (r_s + r_r), the direction in a cone of sine (r_s + r_r) / d, and a projection changes by at most its total
@@ -17,41 +17,44 @@ use crate::{
 /// How errors are estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Estimate {
-    /// From bounds.
+    /// From bounds over both nodes.
     Interval,
     /// From this many sample pairs.
     Samples(u32),
 }
 
-/// What the oracle says of a pair.
+/// The oracle's judgement of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Judgement {
     /// No point of the source can light any point of the receiver.
     Nothing,
     /// Luminance of the irradiance, unoccluded.
     Transfer {
-        /// Its likely value.
+        /// Its expected value.
         irradiance: f32,
-        /// How far it may be off, or vary over the receiver, towards the source: what decides about division.
+        /// Its variation over both nodes, for faces normal to the direction of the source. Decides about division.
         error: f32,
-        /// How far the irradiance that is pushed to any face, at any point of the receiver, may be from the unoccluded
-        /// one. Guaranteed by `Interval` with tables read as `Bounded`; with `Samples` no more than they have seen.
+        /// Bound of the error of the irradiance pushed to any face, at any point of the receiver, against the exact
+        /// unoccluded one. Guaranteed by `Interval` with tables read as `Bounded`; with `Samples` the range of the
+        /// samples.
         bound: f32,
     },
 }
 
-/// A point nearer to a plane than this, relative to the pair's size, lies in it: rounding tilts flat meshes.
+/// Points nearer to a plane than this, relative to the pair's size, lie in it. Smaller, and rounding tilts flat meshes
+/// so that they face themselves; larger, and real angles are lost.
 const IN_PLANE: f32 = 1e-5;
 
 /// Judges pairs of nodes.
 #[derive(Clone, Copy)]
 pub struct Judge<'a> {
-    /// Reads what sources send, and the area that receivers show.
+    /// Reads projected powers of sources and projected areas of receivers.
     pub kernel: Kernel<'a>,
     /// How errors are estimated.
     pub estimate: Estimate,
-    /// Radiosity that everything is taken to have beside its own, 0 for none. Light is scaled by sums of form factors, so
-    /// they must be known of dark sources, too: those that are judged by nothing but their light keep coarse links.
+    /// Radiosity (luminance) that is added to every source when it is judged, at least 0. Light is scaled by sums of
+    /// form factors, which must be right for dark sources, too; judged by their own light alone, these would have
+    /// coarse links.
     pub ambient: f32,
     /// Draws sample points.
     pub sampler: PairSampler<'a>,
@@ -66,7 +69,7 @@ impl Judge<'_> {
         self.kernel.tables
     }
 
-    /// Judge a pair of different nodes, neither above the other.
+    /// Judge a pair of different nodes, neither of which is an ancestor of the other.
     pub fn judge(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> Judgement {
         if !self.face_each_other(source, receiver) {
             return Judgement::Nothing;
@@ -77,13 +80,13 @@ impl Judge<'_> {
         }
     }
 
-    /// Whether some point of each node can look at the other.
+    /// Whether some point of each node can face the other.
     pub(super) fn face_each_other(&self, source: NodeId, receiver: NodeId) -> bool {
         self.can_face(source, receiver) && self.can_face(receiver, source)
     }
 
-    /// Whether two nodes may touch, and at least one of them is a cluster: then neither knows the other as more than a
-    /// direction that may be any.
+    /// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is
+    /// undetermined, and the tables say nothing.
     pub fn is_too_near_for_tables(&self, source: NodeId, receiver: NodeId) -> bool {
         let hierarchy = self.hierarchy();
         let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
@@ -97,12 +100,12 @@ impl Judge<'_> {
                 <= reach
     }
 
-    /// Luminance of a quantity of light as it is judged.
+    /// Luminance of a quantity of light, with the ambient radiosity added.
     fn judged(&self, light: Vec4) -> f32 {
         luminance(light) + self.ambient * light.unit_response()
     }
 
-    /// Luminance of the brightest patch of a node, as it is judged.
+    /// Luminance of the brightest patch of a node, with the ambient radiosity added.
     pub fn judged_brightest(&self, node: NodeId) -> f32 {
         self.judged(self.tables().brightest(self.hierarchy(), node))
     }
@@ -112,7 +115,7 @@ impl Judge<'_> {
         luminance(self.tables().brightest(self.hierarchy(), node))
     }
 
-    /// Whether any face of `from` can look at any point of `to`.
+    /// Whether any face of `from` can face any point of `to`.
     fn can_face(&self, from: NodeId, to: NodeId) -> bool {
         let hierarchy = self.hierarchy();
         match hierarchy.kind(from) {
@@ -123,7 +126,7 @@ impl Judge<'_> {
                 let least = IN_PLANE * (element.radius + hierarchy.radius(to));
                 let height_of = |point: Vec3| (point - element.centroid).dot(normal);
                 match hierarchy.kind(to) {
-                    // Some corner is at least as high as the centroid, which is at hand.
+                    // Some corner is at least as high as the centroid, which is cheaper to read.
                     Kind::Element(other) => {
                         height_of(hierarchy.mesh.elements[other].centroid) > least
                             || hierarchy
@@ -140,7 +143,7 @@ impl Judge<'_> {
                     }
                 }
             }
-            // Along some axis the cluster must show area towards a part of the other node's box.
+            // Along some axis the cluster must have projected area towards a part of the other node's box.
             Kind::Cluster(index) => {
                 let cluster = &hierarchy.clusters[index];
                 let (min, max) = hierarchy.bounds(to);
@@ -157,7 +160,7 @@ impl Judge<'_> {
         }
     }
 
-    /// From bounds of distance and direction.
+    /// Judge by bounds of distance and direction.
     fn interval(&self, source: NodeId, receiver: NodeId) -> Judgement {
         let hierarchy = self.hierarchy();
         let brightest = self.judged_brightest(source);
@@ -165,7 +168,7 @@ impl Judge<'_> {
         let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
         let distance = from.distance(to);
         if distance <= reach {
-            // The nodes may touch: anything up to the brightest patch is possible.
+            // The nodes may touch: any irradiance up to the radiosity of the brightest patch is possible.
             return Judgement::Transfer {
                 irradiance: 0.5 * brightest,
                 error: brightest,
@@ -187,12 +190,12 @@ impl Judge<'_> {
         }
     }
 
-    /// Bound of the error of a face's irradiance.
+    /// Bound of the error of a face's irradiance (luminance).
     ///
-    /// Seen from any point of the receiver, light of the source comes along directions within an angle α of the one
-    /// between the centres. So what arrives per area facing it lies between (L − α T)/π far² and (U + α T)/π near², with
-    /// T the total and L, U the bounds of the table; a cosine at the face is off by at most α; and the spread of a near
-    /// source adds half of itself.
+    /// At any point of the receiver, light of the source arrives along directions within an angle α of the one between
+    /// the centres. So the irradiance of a face normal to it lies between (L − α T)/π far² and (U + α T)/π near², with
+    /// T the total power and L, U the bounds of the table; the cosine at a face is off by at most α; and the spread of
+    /// a near source adds half of itself.
     pub(super) fn bound(&self, source: NodeId, receiver: NodeId) -> f32 {
         let hierarchy = self.hierarchy();
         let brightest = self.brightest(source);
@@ -219,7 +222,7 @@ impl Judge<'_> {
         bound.min(brightest)
     }
 
-    /// The paper's EstimateEnergy, per area of the receiver.
+    /// Judge by the paper's EstimateEnergy, per area of the receiver.
     fn samples(
         &self,
         source: NodeId,
@@ -260,7 +263,7 @@ impl Judge<'_> {
     }
 }
 
-/// Mean irradiance that a cluster of the given power would give itself if all of its light fell on it.
+/// Mean irradiance of a cluster that received all of this power itself.
 pub(crate) fn self_irradiance(hierarchy: &Hierarchy, index: usize, power: Vec4) -> Vec4 {
     let area = hierarchy.clusters[index].area;
     if area > 0.0 {

@@ -1,24 +1,24 @@
-//! Sums over patches, to choose among them.
+//! Running sums over patches, to sample patches in proportion to a quantity.
 
 use std::ops::Range;
 
 use super::luminance;
 use crate::hierarchy::{Channels as _, Hierarchy, Tables};
 
-/// Running sums over the patches in tree order, to choose patches of a cluster in proportion to what is summed.
-/// One more than there are patches.
+/// Running sums over the patches in tree order, to sample patches of a cluster in proportion to the quantity summed.
+/// One entry more than there are patches.
 #[derive(Clone, Debug)]
 pub struct PatchSums(Vec<f64>);
 
 impl PatchSums {
-    /// Of the areas of the patches, frame units, as far as they send anything.
+    /// Sums of the active areas of the patches, square frame units.
     pub fn of_area(hierarchy: &Hierarchy, tables: &Tables) -> Self {
         Self::of(hierarchy, |patch, area| {
             tables.elements[patch].active_share() * area
         })
     }
 
-    /// Of what the patches send (luminance of radiosity, times area).
+    /// Sums of the powers of the patches (luminance of the radiosity times area).
     pub fn of_power(hierarchy: &Hierarchy, tables: &Tables) -> Self {
         Self::of(hierarchy, |patch, area| {
             luminance(tables.elements[patch]).max(0.0) * area
@@ -34,12 +34,12 @@ impl PatchSums {
         Self(std::iter::once(0.0).chain(values).collect())
     }
 
-    /// The sum over some patches.
+    /// The sum over a range of patches.
     pub(super) fn total(&self, patches: &Range<usize>) -> f64 {
         self.0[patches.end] - self.0[patches.start]
     }
 
-    /// One of some patches; `at` is 0…1.
+    /// One patch of a range, for a uniform number `at` in 0…1.
     pub(super) fn choose(&self, patches: &Range<usize>, at: f32) -> usize {
         let sums = &self.0[patches.start..=patches.end];
         let target = sums[0] + f64::from(at) * self.total(patches);
@@ -47,7 +47,7 @@ impl PatchSums {
         patches.start + above.clamp(1, patches.len()) - 1
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.0.as_slice())
     }

@@ -1,8 +1,8 @@
 //! Refinement: from the links of the last step to those of a smaller threshold.
 //!
-//! Receivers are walked from the root. A pair whose error, weighted by the root of the receiver's share of the area,
-//! exceeds the threshold is replaced by pairs with the children of the node that causes the error, which is the larger
-//! one. Links that are good enough stay as they are: nothing is traced again.
+//! Receivers are walked from the root. A pair whose error, weighted by the square root of the receiver's share of the
+//! area, exceeds the threshold is replaced by pairs with the children of its larger node. Links whose errors are below
+//! it stay as they are, without new rays.
 
 use super::{
     Link,
@@ -10,11 +10,12 @@ use super::{
 };
 use crate::hierarchy::{Hierarchy, Kind, NodeId};
 
-/// Receivers with fewer patches than this are refined by one task; less in small scenes.
+/// Receivers with at most this many patches are refined by one task; fewer in small scenes. Smaller, and tasks cost
+/// more than their work; larger, and processors wait.
 const TASK_PATCHES: u32 = 256;
 
 impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
-    /// Refine everything, from the root's exchange with itself where there are no links yet.
+    /// Refine all links; if `is_first`, begin with the root's exchange with itself.
     pub fn refine(&self, is_first: bool) -> Refinement {
         let start = if is_first {
             vec![Hierarchy::ROOT]
@@ -23,7 +24,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         };
         let mut refinement = self.visit(Hierarchy::ROOT, &start);
         if self.follows_light {
-            // Sources are wanted by each of their receivers.
+            // A source may be listed once for each of its receivers.
             refinement.wanted.sort_unstable();
             refinement.wanted.dedup();
         }
@@ -33,15 +34,15 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 
-    /// Whether the rest is not worth doing.
+    /// Whether the result will be discarded anyway.
     fn is_stopped(&self) -> bool {
         (self.cancelled)() || self.budget.is_spent()
     }
 
-    /// Whether nothing that decides about a link has changed since it was judged.
-    fn is_settled(&self, source: NodeId, receiver: NodeId) -> bool {
+    /// Whether a link was judged by this threshold and neither of its nodes was divided since.
+    fn is_up_to_date(&self, source: NodeId, receiver: NodeId) -> bool {
         let hierarchy = self.hierarchy();
-        // What a division makes comes after all that was there before.
+        // Children of a division are numbered after all nodes that existed before.
         self.judged.is_some_and(|count| {
             [source, receiver]
                 .iter()
@@ -49,7 +50,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         })
     }
 
-    /// Refine a receiver and all below it; `sources` are handed down from above.
+    /// Refine a receiver and all its descendants; `sources` are those handed down by its parent.
     fn visit(&self, receiver: NodeId, sources: &[NodeId]) -> Refinement {
         let mut refinement = Refinement::default();
         if self.is_stopped() {
@@ -81,7 +82,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         refinement
     }
 
-    /// As `visit`, within one task. Depth is bounded by that of the trees.
+    /// As `visit`, within one task. The recursion is as deep as the trees, whose depth is bounded.
     fn visit_into(&self, receiver: NodeId, sources: &[NodeId], refinement: &mut Refinement) {
         if self.is_stopped() {
             return;
@@ -93,7 +94,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 
-    /// Decide on the links of one receiver; sources for its children go to `down`.
+    /// Decide on the links of one receiver; sources for its children are added to `down`.
     fn refine_links(
         &self,
         receiver: NodeId,
@@ -101,12 +102,12 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         out: &mut Refinement,
         down: &mut Vec<NodeId>,
     ) {
-        // Judge the links that there are.
+        // Judge the existing links.
         let before = out.links.len();
         let mut is_wanted = false;
         let mut pending: Vec<NodeId> = Vec::new();
         for link in (self.links_of)(receiver) {
-            if self.is_settled(link.source, receiver) {
+            if self.is_up_to_date(link.source, receiver) {
                 out.links.push(*link);
                 continue;
             }
@@ -122,7 +123,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 &mut is_wanted,
             );
         }
-        // Judge sources from above, and the children of those that were divided.
+        // Judge sources handed down, and the children of divided ones.
         pending.extend(sources.iter().rev());
         while let Some(source) = pending.pop() {
             let made = (out.links.len() - before) as u64;
@@ -141,7 +142,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 &mut is_wanted,
             );
         }
-        // Close the run of this receiver.
+        // Record the run of this receiver.
         let count = (out.links.len() - before) as u32;
         self.budget.count(u64::from(count));
         if count > 0 {
@@ -152,6 +153,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 
+    /// Carry out a decision: add a link, or hand the pair on as pairs of children.
     #[expect(
         clippy::too_many_arguments,
         reason = "the state of one walk; a struct would be filled and read once"
@@ -178,7 +180,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             }
             Decision::DivideReceiver => {
                 if self.hierarchy().children(receiver).is_empty() {
-                    // The element will be divided after this pass, if there is room; until then its link stays.
+                    // The element is divided after this pass, if memory allows; until then the pair has a link.
                     *is_wanted = true;
                     let error = self.judge.brightest(source);
                     let link = known

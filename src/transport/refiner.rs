@@ -1,4 +1,4 @@
-//! What refinement goes by and what it makes.
+//! Input and output of refinement.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -8,7 +8,7 @@ use crate::{
     hierarchy::{Hierarchy, NodeId},
 };
 
-/// Links of some receivers, in the order of the walk.
+/// Links of a subtree of receivers, in the order of the walk.
 #[derive(Clone, Debug, Default)]
 pub struct Refinement {
     /// Receivers with their number of links.
@@ -19,8 +19,8 @@ pub struct Refinement {
     pub wanted: Vec<u32>,
     /// Rays shot.
     pub ray_count: u64,
-    /// Whether the links fit into the budget. If not, they are incomplete and must be thrown away; the same on any
-    /// number of threads.
+    /// Whether the links fit into the budget, the same on any number of threads. If not, they are incomplete and must
+    /// be discarded.
     pub fits: bool,
 }
 
@@ -33,30 +33,31 @@ impl Refinement {
     }
 }
 
-/// What refinement needs to know.
+/// Input of refinement.
 pub struct Refiner<'a, F> {
     /// Judges pairs.
     pub judge: Judge<'a>,
-    /// The links that a receiver has so far.
+    /// The present links of a receiver.
     pub links_of: F,
-    /// Nodes that there were when these links were last judged by this threshold; `None` where that was another one. Links
-    /// of which neither end was divided since stay as they are.
+    /// Number of nodes when these links were last judged by this threshold; `None` if they were judged by another one.
+    /// Links neither of whose nodes was divided since stay as they are.
     pub judged: Option<usize>,
-    /// Largest error of a link, times the root of the receiver's share of the area (luminance irradiance).
+    /// Largest error of a link, times the square root of the receiver's share of the area (luminance of the
+    /// irradiance).
     pub threshold: f32,
-    /// Elements below this area are not divided.
+    /// Children of elements are not smaller than this, square frame units.
     pub min_area: f32,
     /// Seed of the rays.
     pub seed: u64,
-    /// Tells to stop; the result is then incomplete and must be thrown away.
+    /// Whether to stop; the result is then incomplete and must be discarded.
     pub cancelled: &'a (dyn Fn() -> bool + Sync),
-    /// How many links there may be.
+    /// Limit of the number of links.
     pub budget: LinkBudget,
     /// Whether only elements are linked, no clusters.
     pub is_by_patch: bool,
-    /// Whether nothing blocks and elements are divided where light is found to bend, not for their links.
+    /// Whether nothing occludes and elements are divided by interpolation errors instead of errors of links.
     pub follows_light: bool,
-    /// By how much the radiosity of each leaf varies over it (luminance); needed where `follows_light`.
+    /// By element, the variation of the radiosity of a leaf (luminance); needed where `follows_light`.
     pub spreads: &'a [f32],
 }
 
@@ -68,7 +69,7 @@ pub struct LinkBudget {
 }
 
 impl LinkBudget {
-    /// So many links may be made.
+    /// A budget of `most` links.
     pub fn new(most: u64) -> Self {
         Self {
             made: AtomicU64::new(0),
@@ -81,18 +82,18 @@ impl LinkBudget {
         self.made.fetch_add(made, Ordering::Relaxed);
     }
 
-    /// Links that may be made in all.
+    /// Most links that may be made in all.
     pub(super) fn most(&self) -> u64 {
         self.most
     }
 
-    /// Whether more were made.
+    /// Whether more links were made than the budget allows.
     pub(super) fn is_spent(&self) -> bool {
         self.made.load(Ordering::Relaxed) > self.most
     }
 }
 
-/// What becomes of a pair.
+/// The decision on a pair.
 pub(super) enum Decision {
     Drop,
     Keep(Link),

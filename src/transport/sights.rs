@@ -1,4 +1,4 @@
-//! Many clusters as they look from about a point: four at a time send what they send to a face.
+//! Many clusters as seen from a point: the irradiance of a face, four clusters at a time.
 
 use std::f32::consts::PI;
 
@@ -7,16 +7,16 @@ use glam::{Vec3, Vec4};
 use super::Sight;
 use crate::{geometry::Vectors4, hierarchy::Quantity as _};
 
-/// Sights with the transmissions on the way from each.
+/// Sights with the transmission of each.
 #[derive(Clone, Debug, Default)]
 pub struct Sights {
-    /// Where they are, four to a group, and the squares of the radii over which their light spreads.
+    /// Centres, four to a group, and squared radii of the sources.
     places: Vec<(Vectors4, Vec4)>,
-    /// What each sends, in the same order; the last group may lack some.
+    /// The light of each, in the same order; the last group may have fewer than four.
     lights: Vec<Light>,
 }
 
-/// What a sight sends.
+/// The light of a sight.
 #[derive(Clone, Copy, Debug)]
 struct Light {
     power: Vec4,
@@ -25,7 +25,7 @@ struct Light {
 }
 
 impl Sights {
-    /// Forget all.
+    /// Remove all.
     pub fn clear(&mut self) {
         self.places.clear();
         self.lights.clear();
@@ -49,8 +49,8 @@ impl Sights {
         });
     }
 
-    /// What a face of unit normal receives, added to a sum in the order of the sights: for each what
-    /// [`Sight::incident`] gives [`on_face`](super::Incident::on_face), times the transmission.
+    /// The sum plus the irradiance of a face with this unit normal at a point, in the order of the sights: for each
+    /// [`Sight::incident`] on that face ([`on_face`](super::Incident::on_face)), times the transmission.
     pub fn add_to(&self, sum: Vec4, point: Vec3, normal: Vec3) -> Vec4 {
         let (point, normal) = (Vectors4::splat(point), Vectors4::splat(normal));
         let groups = self.places.iter().zip(self.lights.chunks(4));
@@ -61,7 +61,7 @@ impl Sights {
             let spread = (*extents / squared.max(Vec4::splat(f32::MIN_POSITIVE))).min(Vec4::ONE);
             let seen =
                 cosine.max(Vec4::ZERO) * (Vec4::ONE - spread) + 0.5 * (Vec4::ONE + cosine) * spread;
-            // Nothing comes from where the point is.
+            // A source at the point itself sends nothing.
             let is_apart = squared.cmpgt(Vec4::ZERO) & cosine.is_finite_mask();
             let seen = Vec4::select(is_apart, seen, Vec4::ZERO).to_array();
             let falloff = Vec4::select(is_apart, Vec4::ONE / (PI * squared), Vec4::ZERO).to_array();
@@ -79,13 +79,13 @@ mod tests {
     use crate::geometry::Random;
 
     #[test]
-    fn all_together_send_what_each_sends() {
+    fn sights_together_send_the_sum_of_each() {
         let mut random = Random::new(7, 0);
         let mut vector = || Vec3::from_array([(); 3].map(|()| random.uniform() - 0.5));
         let (point, normal) = (vector(), vector().normalize_or_zero());
         let mut sights = Sights::default();
         let mut sum = Vec4::splat(0.25);
-        // Groups that are full and that are not; some where the point is, some beside it that spread.
+        // Full groups and partial ones; some sources at the point, some with an extent.
         for index in 0..11 {
             let sight = Sight {
                 centre: if index % 5 == 3 { point } else { vector() },

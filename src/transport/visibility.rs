@@ -1,9 +1,9 @@
-//! Which fraction of a transfer gets through.
+//! Visibility: the unoccluded fraction of a transfer.
 //!
-//! A fraction of area-uniform rays is biased, since most of them stand for little light. Here each ray stands for the
-//! light that it carries: points of the source are chosen by power and by area in turn, of a few candidate point pairs
-//! one is kept with probability proportional to its unoccluded transfer, and the outcome of its ray counts with their
-//! mean weight (resampled importance sampling, Talbot 2005).
+//! The visible fraction of area-uniform rays is biased, since most of them carry little light. Here each ray counts by
+//! the light that it carries: points of the source are sampled by power and by area in turn, one of a few candidate
+//! pairs of points is chosen with probability proportional to its unoccluded transfer, and its ray counts with the mean
+//! weight of the candidates (resampled importance sampling, Talbot 2005).
 
 use std::ops::Range;
 
@@ -19,15 +19,16 @@ use crate::{
     scene::TriangleId,
 };
 
-/// Candidate pairs of points for each ray. Fewer leave light out, since the ratio of few weights is biased; more cost time
-/// and change little from eight on.
+/// Candidate pairs of points for each ray. Fewer lose light, since a ratio of few weights is biased; more cost time and
+/// change little from eight on.
 const CANDIDATES: u32 = 6;
 
-/// Share of the source's points that are chosen by power; the others by area. Few bright patches carry much of the light
-/// of many clusters, and what is bright is often what stands free: chosen by area, the light would seem blocked.
+/// Share of the points of a source that are sampled by power; the others are sampled by area. Smaller, and the few
+/// bright patches that carry most of the light, and often stand free, seem occluded; larger, and the visible area is
+/// noisy.
 const POWER_SHARE: f32 = 0.5;
 
-/// Points of a receiver at which form factors of clusters are summed. One would miss how uneven they are near an edge; many
+/// Points of a receiver at which form factors to clusters are summed. Fewer miss their variation near an edge; more
 /// cost time for links that later steps divide.
 const POINTS: usize = 4;
 
@@ -40,7 +41,7 @@ struct Sample {
     radiosity: f32,
 }
 
-/// An element to draw points on.
+/// An element to sample points on.
 #[derive(Clone, Copy, Debug)]
 struct Facet {
     corners: [Vec3; 3],
@@ -50,7 +51,7 @@ struct Facet {
 }
 
 impl Facet {
-    /// Uniform over its area.
+    /// A point, uniform over the area.
     fn sample(&self, random: &mut Random) -> Sample {
         let [a, b, c] = self.corners;
         let at = triangle_point(random.uniform_2d());
@@ -63,20 +64,20 @@ impl Facet {
     }
 }
 
-/// A node that many points are drawn on by area.
+/// A node whose points are sampled by area.
 enum Receiver {
-    /// An element as a whole, whatever its parts.
+    /// An element as a whole, without regard to its children.
     Element(Facet),
-    /// An element with parts that do not count.
+    /// An element with inactive parts.
     Parts(usize),
     /// The patches of a cluster.
     Patches(Range<usize>),
 }
 
-/// A node that many points are drawn on by power and by area in turn.
+/// A node whose points are sampled by power and by area in turn.
 struct Source {
     kind: Kind,
-    /// The element where it has no parts; else parts are chosen each time.
+    /// The element if it is a leaf; otherwise a leaf is chosen for each point.
     leaf: Option<Facet>,
     /// Whether it sends anything at all.
     has_power: bool,
@@ -84,17 +85,17 @@ struct Source {
     mean: f32,
 }
 
-/// A point of a source that may be chosen.
+/// A candidate point of a source.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     from: Sample,
-    /// Light that the point stands for, relative to that of a point chosen by area in a source of even radiosity.
+    /// Light that the point stands for, relative to that of a point sampled by area on a source of uniform radiosity.
     light: f32,
-    /// Area that it stands for, likewise.
+    /// Area that the point stands for, likewise.
     area: f32,
 }
 
-/// What a number of rays stand for, and what those that got through do.
+/// Summed weights of all rays and of the visible ones.
 #[derive(Clone, Copy, Debug, Default)]
 struct Arrival {
     sent: f32,
@@ -107,7 +108,7 @@ impl Arrival {
     }
 }
 
-/// Which part of what was sent arrived. Every second ray belongs to the same half.
+/// The visible part of a weighted number of rays, in two halves of alternate rays.
 #[derive(Clone, Copy, Debug, Default)]
 struct Share {
     halves: [Arrival; 2],
@@ -124,8 +125,9 @@ impl Share {
         self.count += 1;
     }
 
-    /// The part, 0…1.5. The ratio of two sums over few rays is too small on average, since what weighs much is often what
-    /// gets through. The halves have twice the bias of the whole, which tells how large it is (Quenouille 1956).
+    /// The visible part, 0…1.5; `None` without weight. The ratio of two sums over few rays is too small on average,
+    /// since large weights often belong to visible rays. The halves have twice the bias of the whole, which gives its
+    /// size (Quenouille 1956).
     fn part(&self) -> Option<f32> {
         let [first, second] = self.halves;
         let whole = Arrival {
@@ -143,18 +145,18 @@ impl Share {
 pub struct PairSampler<'a> {
     /// Where the nodes are.
     pub hierarchy: &'a Hierarchy,
-    /// What they send.
+    /// Their radiosities.
     pub tables: &'a Tables,
     /// Areas of the patches.
     pub areas: &'a PatchSums,
-    /// Power of the patches, as the tables have it.
+    /// Powers of the patches by the tables.
     pub powers: &'a PatchSums,
-    /// What blocks.
+    /// The occluders.
     pub rays: &'a RayTree,
 }
 
 impl PairSampler<'_> {
-    /// A random point of a node and its normal, uniform over its area.
+    /// A random point of a node, uniform over its area (frame units), and its unit normal.
     pub fn point_on(&self, node: NodeId, random: &mut Random) -> (Vec3, Vec3) {
         let sample = self.sample(&self.receiver(node), random);
         (sample.point, sample.normal)
@@ -168,13 +170,13 @@ impl PairSampler<'_> {
         }
     }
 
-    /// Whether all of an element counts, or none, or its parts are not known.
+    /// Whether an element is active or inactive as a whole, or a leaf.
     fn is_whole(&self, element: usize) -> bool {
         let part = self.tables.elements[element].active_share();
         part >= 1.0 || part <= 0.0 || self.hierarchy.mesh.elements[element].is_leaf()
     }
 
-    /// Uniform over the area of a node.
+    /// A point, uniform over the active area of a node.
     fn sample(&self, receiver: &Receiver, random: &mut Random) -> Sample {
         match receiver {
             Receiver::Element(facet) => facet.sample(random),
@@ -213,7 +215,7 @@ impl PairSampler<'_> {
         }
     }
 
-    /// A point of a source, now in proportion to its power, now to its area.
+    /// A point of a source, sampled by power or by area.
     fn sample_source(&self, source: &Source, random: &mut Random) -> Candidate {
         let by_power = random.uniform() < POWER_SHARE;
         let sample = match (&source.leaf, source.kind) {
@@ -243,7 +245,7 @@ impl PairSampler<'_> {
         }
     }
 
-    /// A point on one of the leaves of an element.
+    /// A point on one of the leaves of an element, chosen by power or by area.
     fn sample_leaf(&self, mut element: usize, by_power: bool, random: &mut Random) -> Sample {
         while !self.hierarchy.mesh.elements[element].is_leaf() {
             element = self.choose_child(element, by_power, random.uniform());
@@ -281,8 +283,8 @@ impl PairSampler<'_> {
         }
     }
 
-    /// Unoccluded fractions of the light and of the area that a source shows to a receiver, by `ray_count` rays; both
-    /// 0…1.5, since what is estimated without bias may exceed what can be. Where no sampled pair transfers anything, all of them count alike.
+    /// Unoccluded fractions of the light and of the area that a source turns to a receiver, by `ray_count` rays; both
+    /// 0…1.5, since an unbiased estimate may exceed 1. Where no sampled pair transfers light, all pairs count alike.
     pub fn visibility(
         &self,
         source: NodeId,
@@ -297,17 +299,17 @@ impl PairSampler<'_> {
         let mut all = Share::default();
         let (source, receiver) = (self.source(source), self.receiver(receiver));
         for _ in 0..ray_count {
-            let (mut kept, mut sum) = (None, 0.0);
+            let (mut chosen, mut sum) = (None, 0.0);
             for _ in 0..CANDIDATES {
                 let candidate = self.sample_source(&source, random);
                 let to = self.sample(&receiver, random);
                 let weight = transfer(&candidate.from, &to);
                 sum += weight;
-                if kept.is_none() || random.uniform() * sum < weight {
-                    kept = Some((candidate, to));
+                if chosen.is_none() || random.uniform() * sum < weight {
+                    chosen = Some((candidate, to));
                 }
             }
-            let Some((candidate, to)) = kept else {
+            let Some((candidate, to)) = chosen else {
                 continue;
             };
             let from = candidate.from;
@@ -325,8 +327,8 @@ impl PairSampler<'_> {
     }
 
     /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of
-    /// the receiver; 0…1. For a cluster and itself it is the part of its light that falls on itself: 0 where it is flat
-    /// or convex, whatever its box.
+    /// the receiver; 0…1. For a cluster and itself it is the part of its light that it receives itself: 0 where it is
+    /// flat or convex.
     pub fn seen_fraction(
         &self,
         source: NodeId,
@@ -355,8 +357,8 @@ impl PairSampler<'_> {
         met as f32 / ray_count.max(1) as f32
     }
 
-    /// Mean form factor from a receiver to a source where nothing blocks: the exact form factors of all patches of the
-    /// source from a few points.
+    /// Mean form factor from a receiver to a source without occlusion, 0…1: the exact form factors of all patches of
+    /// the source from a few points.
     fn form_factor_in_clear(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> f32 {
         let hierarchy = self.hierarchy;
         let elements = match hierarchy.kind(source) {
@@ -389,7 +391,7 @@ impl PairSampler<'_> {
     }
 }
 
-/// Unoccluded transfer between two points of radiosity 1, up to a factor that is the same for all pairs of two nodes.
+/// Unoccluded transfer between two points for a radiosity of 1, up to a factor common to all pairs of points.
 fn transfer(from: &Sample, to: &Sample) -> f32 {
     let separation = to.point - from.point;
     let squared = separation.length_squared();

@@ -20,7 +20,7 @@ use crate::{
     metrics::{MeshLookup, middle},
     reference::{PathSettings, PathTracer, ReferencePoint},
     scene::Scene,
-    solver::{Cancel, Keep, LeftOut, Omission, SolveSettings, Solver, StepReport},
+    solver::{Cancel, Keep, Omission, Omitted, SolveSettings, Solver, StepReport},
 };
 
 /// Points at which light is compared; a difference over them is good to about a hundredth of itself.
@@ -76,13 +76,13 @@ impl Trial {
         let seconds_of = |settings: &SolveSettings| {
             let seconds = (0..PLANS).map(|_| {
                 let begin = Instant::now();
-                LeftOut::of(&scene, settings, cancel)?;
+                Omitted::of(&scene, settings, cancel)?;
                 Some(begin.elapsed().as_secs_f64())
             });
             seconds.collect::<Option<Vec<f64>>>().map(median)
         };
         let planned = keeping(Keep::NONE);
-        let names: Vec<&str> = LeftOut::of(&scene, &planned, cancel)?
+        let names: Vec<&str> = Omitted::of(&scene, &planned, cancel)?
             .iter()
             .map(|left| left.name)
             .collect();

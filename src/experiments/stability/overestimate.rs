@@ -13,14 +13,8 @@ use crate::{
         SceneBuilder,
         builtin::{sphere_furnace, stability},
     },
-    solver::{Cancel, Direct, Method, Push, SolveSettings},
+    solver::{Cancel, Direct, Method, Note, Push, SolveSettings},
 };
-
-/// Part of the note that names growth that scaling to the coverage bounds.
-const SCALED_NOTE: &str = "keep energy";
-
-/// Part of the note that names growth which bounded rows answer.
-const ANSWERED: &str = "the light grows";
 
 pub(super) fn cases() -> Vec<Case> {
     let names = [(Method::SixFace, "six-face"), (Method::Bounded, "bounded")];
@@ -54,10 +48,20 @@ fn coarse(builder: SceneBuilder, method: Method, cancel: &Cancel) -> Result<Lit,
     solve(builder, &one_sided(), &settings, cancel)
 }
 
-/// 1 where a note of the solve holds this, else 0.
-fn noted(lit: &Lit, part: &str) -> f64 {
+/// 1 if the solve has such a note, else 0.
+fn noted(lit: &Lit, is_such: impl Fn(&Note) -> bool) -> f64 {
     let mut notes = lit.reports.iter().flat_map(|report| &report.notes);
-    f64::from(u8::from(notes.any(|note| note.contains(part))))
+    f64::from(u8::from(notes.any(is_such)))
+}
+
+/// Whether a note names growth that the scaling to the coverage prevents.
+fn is_scaled(note: &Note) -> bool {
+    matches!(note, Note::CoarseLinks { .. })
+}
+
+/// Whether a note names growth for which the sums of form factors are bounded.
+fn is_bounded(note: &Note) -> bool {
+    *note == Note::GrowthBounded
 }
 
 fn row_sum(lit: &Lit) -> f64 {
@@ -76,12 +80,12 @@ fn closed(method: Method, cancel: &Cancel) -> Result<Finding, Trouble> {
         Method::SixFace => vec![
             irradiance,
             Claim::at_least("gain of unscaled links", 1.05, gain),
-            Claim::at_least("scaled growth is named", 1.0, noted(&lit, SCALED_NOTE)),
+            Claim::at_least("scaled growth is named", 1.0, noted(&lit, is_scaled)),
         ],
         _ => vec![
             irradiance,
             Claim::at_most("gain of unscaled links", 1.0, gain),
-            Claim::small("growth is named", noted(&lit, SCALED_NOTE), 0.0),
+            Claim::small("growth is named", noted(&lit, is_scaled), 0.0),
         ],
     }))
 }
@@ -95,12 +99,12 @@ fn leaking(method: Method, cancel: &Cancel) -> Result<Finding, Trouble> {
     let irradiance = Claim::at_most("irradiance", ceiling, found);
     Ok(lit.finding(match method {
         Method::SixFace => vec![
-            Claim::at_least("answered growth is named", 1.0, noted(&lit, ANSWERED)),
+            Claim::at_least("answered growth is named", 1.0, noted(&lit, is_bounded)),
             irradiance,
         ],
         _ => vec![
             irradiance,
-            Claim::small("growth is named", noted(&lit, ANSWERED), 0.0),
+            Claim::small("growth is named", noted(&lit, is_bounded), 0.0),
         ],
     }))
 }

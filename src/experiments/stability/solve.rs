@@ -215,8 +215,9 @@ impl Lit {
             finding.steps += 1;
             finding.sweeps += report.sweeps;
             for note in &report.notes {
-                if !finding.notes.contains(note) {
-                    finding.notes.push(note.clone());
+                let note = note.to_string();
+                if !finding.notes.contains(&note) {
+                    finding.notes.push(note);
                 }
             }
         }

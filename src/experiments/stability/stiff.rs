@@ -9,7 +9,7 @@ use super::{
 use crate::{
     reference::analytic::furnace_radiosity,
     scene::builtin::{furnace, stability},
-    solver::{Cancel, SolveSettings, StepReport},
+    solver::{Cancel, Note, SolveSettings, StepReport},
 };
 
 /// Settings under which light converges to a residual of 1e-4.
@@ -113,7 +113,7 @@ fn white_maze(cancel: &Cancel) -> Result<Finding, Trouble> {
             || report
                 .notes
                 .iter()
-                .any(|note| note.contains("not converged"))
+                .any(|note| matches!(note, Note::NotConverged { .. }))
     };
     let unnamed = lit.reports.iter().filter(|report| !is_named(report));
     Ok(lit.finding(vec![

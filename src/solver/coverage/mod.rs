@@ -1,7 +1,7 @@
-//! Closures: which part of a view lit surfaces fill, and the rays that find it.
+//! Hemisphere coverage: the part of a surface's hemisphere that lit surfaces fill, and the rays that estimate it.
 
-mod closure;
+mod hemisphere;
 mod prober;
 
-pub(crate) use closure::{Closure, Closures};
-pub(crate) use prober::closures;
+pub(crate) use hemisphere::{CoverageMap, HemisphereCoverage};
+pub(crate) use prober::probe;

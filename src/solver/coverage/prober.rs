@@ -1,99 +1,103 @@
-//! How closures are found: rays from groups of cells, and from each cell of those groups that are open.
+//! Estimation of the coverage: rays from groups of cells, and from each cell of the groups that are not enclosed.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::closure::{Closure, Closures};
+use super::hemisphere::{CoverageMap, HemisphereCoverage};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Element, Hierarchy},
     scene::Scene,
-    solver::{Cancel, places::open_places},
+    solver::{Cancel, places::outside_places},
 };
 
-/// Share of all rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and open places
-/// take light that is not theirs until the other rays are shot.
+/// Share of the rays that is shot for coarse steps. Larger, and the first picture comes later; smaller, and cells that
+/// are not enclosed are too bright until the other rays are shot.
 const ROUGH_SHARE: f32 = 0.125;
 
-/// Patches that are probed together first. If every ray of a group meets a lit side, so will nearly all others.
+/// Patches that are probed together first. If every ray of a group meets a lit side, so do nearly all others. Smaller,
+/// and more rays are needed; larger, and one leak makes many cells be probed one by one.
 const GROUP_PATCHES: u32 = 64;
 
-/// Boxes of triangles that a ray crosses in usual scenes. Where it crosses many more, rays are saved, and patches share
-/// them in larger groups.
+/// Bounding boxes of triangles that a ray crosses in usual scenes. Where it crosses more, fewer rays are shot, from
+/// larger groups. Smaller, and the coverage is noisier; larger, and scenes of overlapping triangles take long.
 const USUAL_CROSSINGS: f32 = 64.0;
 
-/// Rays per group, at least.
+/// Fewest rays per group. Fewer, and leaks are missed; more cost time in all scenes.
 const GROUP_RAYS: usize = 24;
 
-/// More rays for groups with more cells than these times [`GROUP_RAYS`].
+/// Cells per ray of a group, if that gives more rays than [`GROUP_RAYS`]. Fewer cost time; more, and leaks are missed.
 const CELLS_PER_RAY: usize = 2;
 
-/// Rays spent on all groups together for a second look where one of them is open: in a scene that leaks, a group that
-/// `GROUP_RAYS` find closed may yet see a few holes, and where walls are white these few decide.
+/// Rays of the second pass over all groups, made if one group is not enclosed: in such a scene, groups that
+/// `GROUP_RAYS` found enclosed may have small leaks, which matter where walls are white. Fewer miss leaks; more cost
+/// time.
 const SECOND_RAYS: usize = 100_000;
 
-/// Rays of the second look per group at most.
+/// Most rays of the second pass per group. Fewer miss leaks in small scenes; more cost time there.
 const MOST_SECOND_RAYS: usize = 1024;
 
-/// Rays spent on all cells together where the rays of a group did not all meet a lit side, as long as that leaves each
-/// cell between the two counts that follow. More would delay the first picture, fewer leave noise in open scenes.
-const OPEN_RAYS: usize = 100_000;
+/// Rays of all cells of groups that are not enclosed, within the limits per cell below. More delay the first picture;
+/// fewer leave noise in scenes with openings.
+const CELL_RAYS: usize = 100_000;
 
-/// Rays per cell at least.
+/// Fewest rays per cell. Fewer leave noise; more delay the first picture of large scenes.
 const LEAST_CELL_RAYS: usize = 16;
 
-/// Open cells that are probed one by one. Beyond, neighbours share their rays: a large open scene would wait long for its
-/// first picture, and where all its triangles cross each other, each ray takes long, too.
+/// Most cells that are probed one by one; if there are more, neighbours share their rays. Smaller, and small
+/// differences between neighbours are lost; larger, and large scenes with openings wait long for their first picture.
 const MOST_PROBED_CELLS: usize = 60_000;
 
-/// Groups of neighbours that share their rays, about.
+/// Approximate number of groups of neighbours that share their rays. Fewer blur the coverage; more delay the first
+/// picture.
 const MOST_SHARES: usize = 15_000;
 
-/// Rays per cell at most.
+/// Most rays per cell. Fewer leave noise in small scenes; more cost time there.
 const MOST_CELL_RAYS: usize = 8192;
 
-/// Neighbouring cells of open groups count as closed if that many rays from them met nothing but lit sides. Fewer, and
-/// what leaks goes unseen; more, and few cells of small open scenes are known to be closed.
-const CLOSED_RAYS: f32 = 512.0;
+/// Neighbouring cells count as enclosed if at least this many rays from them met only lit sides. Fewer, and leaks are
+/// missed; more, and few cells of small scenes with openings count as enclosed.
+const ENCLOSED_RAYS: f32 = 512.0;
 
-/// What the rays of a cell met.
+/// Counts of what the rays of a cell met.
 #[derive(Clone, Copy, Debug, Default)]
 struct Met {
     /// Rays that met a lit side.
     hits: f32,
-    /// Rays that count.
+    /// Rays that began outside solids.
     rays: f32,
-    /// Rays that began within a solid.
+    /// Rays that began inside a solid.
     within: f32,
 }
 
 impl Met {
-    /// Half a hit and half a miss more, so that no finite number of rays proves a certainty.
+    /// Share of hits, with half a hit and half a miss added, so that no finite number of rays gives 0 or 1.
     fn share(self) -> f32 {
         (self.hits + 0.5) / (self.rays + 1.0)
     }
 
-    /// Standard error of the share, if it is that of so many rays.
+    /// Standard error of the share for this many rays.
     fn deviation(self, rays: f32) -> f32 {
         (self.share() * (1.0 - self.share()) / (rays + 1.0)).sqrt()
     }
 
-    /// The closure of each of `sharing` cells, by what their rays met and what those of their neighbourhood did.
-    fn closure(self, around: Self, sharing: usize) -> Closure {
+    /// The coverage of each of `sharing` cells, from their rays and those of their neighbourhood `around`.
+    fn coverage(self, around: Self, sharing: usize) -> HemisphereCoverage {
         if self.rays == 0.0 {
-            return Closure::BURIED;
+            return HemisphereCoverage::INSIDE_SOLID;
         }
-        // Of cells that share their rays it is known no better than by a few of their own.
+        // Cells that share their rays may differ: their coverage counts as that of a few rays.
         let rays = if sharing > 1 {
             LEAST_CELL_RAYS as f32
         } else {
             self.rays
         };
-        // One ray more that met what those about it do on average: few rays say little.
+        // One more ray has the mean result of the neighbourhood.
         let share = (self.hits + around.share()) / (self.rays + 1.0);
-        Closure::estimated(share, self.deviation(rays))
+        HemisphereCoverage::estimated(share, self.deviation(rays))
     }
 
+    /// The counts of both.
     fn and(self, other: Self) -> Self {
         Self {
             hits: self.hits + other.hits,
@@ -103,41 +107,42 @@ impl Met {
     }
 }
 
-/// The closures of cells in the order of the tree, from what the rays of each `sharing` of them met. Neighbours all of
-/// whose rays met lit sides are closed if these are enough to tell; the others are halved for as long as they are several.
-fn pooled(cells: &[Met], around: Met, sharing: usize, closures: &mut Vec<Closure>) {
+/// Append the coverage of cells in the order of the tree, of which each `sharing` cells share one count. Neighbours are
+/// enclosed if all their rays met lit sides and are at least [`ENCLOSED_RAYS`]; others are halved down to single
+/// counts.
+fn pooled(cells: &[Met], around: Met, sharing: usize, coverage: &mut Vec<HemisphereCoverage>) {
     let met = cells.iter().copied().fold(Met::default(), Met::and);
-    if met.hits >= met.rays && met.rays >= CLOSED_RAYS {
-        closures.resize(closures.len() + cells.len(), Closure::CLOSED);
+    if met.hits >= met.rays && met.rays >= ENCLOSED_RAYS {
+        coverage.resize(coverage.len() + cells.len(), HemisphereCoverage::ENCLOSED);
     } else if let [cell] = cells {
-        closures.push(cell.closure(around, sharing));
+        coverage.push(cell.coverage(around, sharing));
     } else {
         let (first, second) = cells.split_at(cells.len() / 2);
-        pooled(first, met, sharing, closures);
-        pooled(second, met, sharing, closures);
+        pooled(first, met, sharing, coverage);
+        pooled(second, met, sharing, coverage);
     }
 }
 
-/// What is found about the cells of a mesh.
+/// The result of probing.
 pub(crate) struct Probed {
-    pub closures: Closures,
-    /// Cells that lie within a solid, in part or as a whole, so far as rays told.
+    pub coverage: CoverageMap,
+    /// Cells some of whose rays began inside a solid.
     pub within: Vec<usize>,
     pub ray_count: u64,
 }
 
-/// Closures of all cells for coarse links or for others; `None` when cancelled. The cells are those of what is `known`, or,
-/// where nothing is, the leaves of the mesh as it is now.
-pub(crate) fn closures(
+/// Estimate the coverage of all cells for a coarse step or another one; `None` when cancelled. The cells are those of
+/// the `known` coverage, or the present leaves of the mesh if none is known.
+pub(crate) fn probe(
     scene: &Scene,
     hierarchy: &Hierarchy,
     rays: &RayTree,
-    known: &Closures,
+    known: &CoverageMap,
     is_coarse: bool,
     seed: u64,
     cancel: &Cancel,
 ) -> Option<Probed> {
-    // In the clear a tree is needed for this alone.
+    // In a clear scene only this needs a ray tree.
     let own_tree = rays.is_clear().then(|| RayTree::new(scene));
     let rays = own_tree.as_ref().unwrap_or(rays);
     let cost = (rays.crossings() / USUAL_CROSSINGS).max(1.0);
@@ -160,91 +165,96 @@ pub(crate) fn closures(
         .map(|group| cells(hierarchy, group, count))
         .filter(|cells| !cells.is_empty())
         .collect();
-    // Rays from groups, and from each cell of those that are open.
-    let (open, looked) = prober.open_groups(&groups);
-    let (found, probed) = prober.probe_groups(&open);
+    // Rays from groups, and from each cell of those that are not enclosed.
+    let (unenclosed, tested) = prober.unenclosed_groups(&groups);
+    let (found, probed) = prober.probe_groups(&unenclosed);
     cancel.proceed()?;
-    // All others are closed, or lie within solids.
+    // All others are enclosed, or inside solids.
     let elements = &hierarchy.mesh.elements[..count];
-    let untold = |element: &Element| match element.is_inside_solid() {
-        true => Closure::BURIED,
-        false => Closure::CLOSED,
+    let unprobed = |element: &Element| match element.is_inside_solid() {
+        true => HemisphereCoverage::INSIDE_SOLID,
+        false => HemisphereCoverage::ENCLOSED,
     };
-    let mut of: Vec<Closure> = elements.iter().map(untold).collect();
+    let mut of: Vec<HemisphereCoverage> = elements.iter().map(unprobed).collect();
     let mut within = Vec::new();
-    let cells = open.into_iter().flatten();
-    for (&cell, (closure, is_within)) in cells.zip(found.into_iter().flatten()) {
-        of[cell] = closure;
+    let cells = unenclosed.into_iter().flatten();
+    for (&cell, (coverage, is_within)) in cells.zip(found.into_iter().flatten()) {
+        of[cell] = coverage;
         if is_within {
             within.push(cell);
         }
     }
     Some(Probed {
-        closures: Closures::new(hierarchy, of, is_coarse),
+        coverage: CoverageMap::new(hierarchy, of, is_coarse),
         within,
-        ray_count: (looked + probed) as u64,
+        ray_count: (tested + probed) as u64,
     })
 }
 
-/// Shoots the rays of closures. When cancelled, what it finds is incomplete.
+/// Shoots the rays that estimate the coverage. When cancelled, its results are incomplete.
 struct Prober<'a> {
     scene: &'a Scene,
     hierarchy: &'a Hierarchy,
     rays: &'a RayTree,
     seed: u64,
     cancel: &'a Cancel,
-    /// Rays that are shot, of all that would be if each cost what usual ones do.
+    /// Share of the rays that is shot, by the step and by the cost of a ray.
     share: f32,
 }
 
 impl Prober<'_> {
-    /// What is shot of so many rays.
+    /// That share of a number of rays.
     fn budget(&self, rays: usize) -> usize {
         (rays as f32 * self.share) as usize
     }
 
-    /// What one ray from a cell meets.
-    fn look(&self, cell: usize, number: usize) -> Met {
+    /// One ray from a cell, by its number.
+    fn probe_once(&self, cell: usize, number: usize) -> Met {
         self.probe(cell, 1, number as u32)
     }
 
-    /// The groups of cells that are not surrounded by lit surfaces, and the rays spent on finding them.
-    fn open_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
-        let look = |group: &[usize], first: usize, count: usize| {
+    /// The groups of cells that are not enclosed by lit surfaces, and the number of rays.
+    fn unenclosed_groups<'g>(&self, groups: &'g [Vec<usize>]) -> (Vec<&'g [usize]>, usize) {
+        let all_hit = |group: &[usize], first: usize, count: usize| {
             (0..count).all(|ray| {
                 !self.cancel.is_cancelled()
                     && self
-                        .look(group[ray * group.len() / count], first + ray)
+                        .probe_once(group[ray * group.len() / count], first + ray)
                         .hits
                         > 0.0
             })
         };
-        let first_look = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
-        let mut closed: Vec<bool> = groups
+        let first_rays = |group: &[usize]| GROUP_RAYS.max(self.budget(group.len() / CELLS_PER_RAY));
+        let mut enclosed: Vec<bool> = groups
             .par_iter()
-            .map(|group| look(group, 0, first_look(group)))
+            .map(|group| all_hit(group, 0, first_rays(group)))
             .collect();
-        let mut shot: usize = groups.iter().map(|group| first_look(group)).sum();
-        if closed.iter().any(|is_closed| !is_closed) {
+        let mut shot: usize = groups.iter().map(|group| first_rays(group)).sum();
+        if enclosed.iter().any(|is_enclosed| !is_enclosed) {
             let count = (self.budget(SECOND_RAYS) / groups.len()).min(MOST_SECOND_RAYS);
-            closed
+            enclosed
                 .par_iter_mut()
                 .zip(groups)
-                .filter(|(is_closed, _)| **is_closed)
-                .for_each(|(is_closed, group)| *is_closed = look(group, first_look(group), count));
+                .filter(|(is_enclosed, _)| **is_enclosed)
+                .for_each(|(is_enclosed, group)| {
+                    *is_enclosed = all_hit(group, first_rays(group), count)
+                });
             shot += groups.len() * count;
         }
-        let open = groups
+        let unenclosed = groups
             .iter()
-            .zip(&closed)
-            .filter(|(_, is_closed)| !**is_closed);
-        (open.map(|(group, _)| group.as_slice()).collect(), shot)
+            .zip(&enclosed)
+            .filter(|(_, is_enclosed)| !**is_enclosed);
+        (
+            unenclosed.map(|(group, _)| group.as_slice()).collect(),
+            shot,
+        )
     }
 
-    /// The closures of all cells of some groups, and whether they lie within a solid, group by group; and the rays spent on
-    /// them. Where there are many cells, neighbours share their rays.
-    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(Closure, bool)>>, usize) {
-        // How many cells share their rays, and how many rays a part of a group gets.
+    /// By group, the coverage of each cell and whether some of its rays began inside a solid; and the number of rays.
+    /// Where there are many cells, neighbours share their rays.
+    fn probe_groups(&self, groups: &[&[usize]]) -> (Vec<Vec<(HemisphereCoverage, bool)>>, usize) {
+        // The number of cells that share their rays, and the number of rays of a part of a group.
         let area = |cell: &usize| self.hierarchy.mesh.elements[*cell].area_vector.length();
         let cells = || groups.iter().copied().flatten();
         let (cell_count, whole): (usize, f32) = (cells().count(), cells().map(area).sum());
@@ -257,33 +267,33 @@ impl Prober<'_> {
         let even = sharing as f32 / cell_count.max(1) as f32;
         let count = |part: &[usize]| {
             let share = part.iter().map(area).sum::<f32>() / whole;
-            let count = self.budget(OPEN_RAYS) as f32 * 0.5 * (even + share);
+            let count = self.budget(CELL_RAYS) as f32 * 0.5 * (even + share);
             (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
         };
-        // What the rays of a part meet.
-        let look = |part: &[usize]| match part {
+        // The counts of a part.
+        let probe_part = |part: &[usize]| match part {
             [cell] => self.probe(*cell, count(part) as u32, 0),
             _ => {
                 let count = count(part);
                 let cell = |ray: usize| part[ray * part.len() / count];
-                let met = (0..count).map(|ray| self.look(cell(ray), ray));
+                let met = (0..count).map(|ray| self.probe_once(cell(ray), ray));
                 met.fold(Met::default(), Met::and)
             }
         };
-        // By group, from the parts: halved for as long as it pays, then the same for all cells of a part.
+        // The coverage of each part, and the same for all its cells.
         let found = groups.par_iter().map(|group| {
             if self.cancel.is_cancelled() {
                 return Vec::new();
             }
-            let met: Vec<Met> = group.chunks(sharing).map(look).collect();
-            let mut closures = Vec::with_capacity(met.len());
-            pooled(&met, Met::default(), sharing, &mut closures);
+            let met: Vec<Met> = group.chunks(sharing).map(probe_part).collect();
+            let mut coverage = Vec::with_capacity(met.len());
+            pooled(&met, Met::default(), sharing, &mut coverage);
             let is_within = met
                 .iter()
                 .flat_map(|met| std::iter::repeat_n(met.within > 0.0, sharing));
-            let parts = group.chunks(sharing).zip(closures);
+            let parts = group.chunks(sharing).zip(coverage);
             parts
-                .flat_map(|(part, closure)| std::iter::repeat_n(closure, part.len()))
+                .flat_map(|(part, coverage)| std::iter::repeat_n(coverage, part.len()))
                 .zip(is_within)
                 .collect()
         });
@@ -292,22 +302,22 @@ impl Prober<'_> {
         (found.collect(), shot)
     }
 
-    /// What some cosine-weighted rays from an element meet; `first` numbers them within the element. Of an element that
-    /// lies within a solid in part it is what its open places see: its links are scaled to that. A ray that meets the
-    /// inside of a solid began there, and does not count.
+    /// Counts of `count` cosine-weighted rays from an element; `first` is the number of the first within the element.
+    /// Rays of a contact element start at its places outside solids, to whose coverage its links are scaled. A ray that
+    /// meets the inside of a solid began there and is not counted in `rays`.
     fn probe(&self, element: usize, count: u32, first: u32) -> Met {
         let mut random = Random::new(self.seed, (u64::from(first) << 32) | element as u64);
         let shift = random.uniform_2d();
         let [a, b, c] = self.hierarchy.mesh.corners(element);
         let patch = self.hierarchy.patch_of(element);
-        let places = open_places(self.hierarchy, element);
+        let places = outside_places(self.hierarchy, element);
         let mut met = Met::default();
         for index in 0..count {
-            // Only the directions are stratified: a point from the same sequence would go with its direction.
+            // Only directions are stratified: points of the same sequence would correlate with them.
             let at = triangle_point(random.uniform_2d());
             let place = (random.uniform() * places.len() as f32) as usize;
             let origin: Vec3 = match places.get(place) {
-                Some(&open) => open,
+                Some(&place) => place,
                 None => a * at.x + b * at.y + c * at.z,
             };
             let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
@@ -329,8 +339,8 @@ impl Prober<'_> {
     }
 }
 
-/// The elements of a cluster that are not buried and were leaves when there were `count` elements, in the order of its
-/// patches.
+/// The elements of a cluster that are outside solids and were leaves when the mesh had `count` elements, in the order
+/// of its patches.
 fn cells(hierarchy: &Hierarchy, cluster: usize, count: usize) -> Vec<usize> {
     let mut cells = Vec::new();
     let mut pending: Vec<usize> = hierarchy.clusters[cluster].patches().rev().collect();
@@ -357,7 +367,7 @@ mod tests {
     };
 
     #[test]
-    fn coarse_steps_shoot_a_share_of_the_rays_and_fine_ones_look_at_the_same_cells_again() {
+    fn coarse_steps_shoot_a_share_of_the_rays_and_fine_ones_probe_the_same_cells_again() {
         let scene = find_builtin("room-1022").unwrap().builder();
         let scene = Arc::new(scene.finish(&SceneOptions::default()).unwrap());
         let cancel = Cancel::default();
@@ -367,12 +377,12 @@ mod tests {
         for threshold_scale in [16.0, 8.0, 4.0, 2.0, 1.0] {
             let before = solver.ray_count;
             solver
-                .probe_closures(is_coarse(threshold_scale), &cancel)
+                .probe_coverage(is_coarse(threshold_scale), &cancel)
                 .unwrap();
-            assert!(solver.closures.serve(is_coarse(threshold_scale)));
-            assert_eq!(solver.closures.count(), cells);
+            assert!(solver.coverage.serve(is_coarse(threshold_scale)));
+            assert_eq!(solver.coverage.count(), cells);
             probed.push(solver.ray_count - before);
-            // Elements that are divided since are no cells.
+            // Elements made by later divisions are not cells.
             let leaf = solver.hierarchy.mesh.leaves().next().unwrap();
             solver.hierarchy.mesh.divide(&[leaf as u32]);
         }

@@ -1,4 +1,4 @@
-//! Division of elements where linear interpolation between their corners would miss direct light.
+//! Division of elements where linear interpolation of direct light between their corners errs.
 
 use glam::Vec4;
 use rayon::prelude::*;
@@ -15,33 +15,34 @@ use crate::{
     transport::luminance,
 };
 
-/// No element is longer than the longest edge of a right isosceles triangle of this share of the scene's area: smaller
-/// shadows than such an element could be missed by all its corners. Larger misses more, smaller costs vertices on empty
-/// walls.
+/// Largest share of the scene's area of an element, or of a right isosceles triangle with its longest edge: all corners
+/// of an element may miss a smaller shadow. Larger misses more shadows; smaller costs vertices on empty walls.
 const LARGEST_SHARE: f32 = 1.0 / 1000.0;
 
-/// Larger elements are left whole where no other surface stands above their plane within this many radii and light does
-/// not bend: nothing can cast a shadow there. Smaller misses shadows that fall far, larger divides empty ground.
+/// Radii within which no other surface may stand above the plane of a larger element if it is not divided: nothing can
+/// cast a shadow there. Smaller misses long shadows; larger divides empty ground.
 const EMPTY_RADII: f32 = 16.0;
 
-/// Where all corners of an element lie in shadow, its centroid is sampled if it could get more light than this many
-/// times the tolerance. Smaller costs rays in the shade, larger loses light on narrow faces.
+/// Unoccluded light, in multiples of the tolerance, from which the centroid of an element is sampled though all its
+/// corners lie in shadow. Smaller costs rays in shadows; larger loses light on narrow faces.
 const HIDDEN_TOLERANCE: f32 = 4.0;
 
-/// Part of the smallest area of elements down to which they are divided where light bends that nothing blocks. Smaller
-/// divides without end where a lamp touches a surface; larger misses the light about a lamp far smaller than the scene.
+/// Smallest area of elements that are divided by the interpolation error of unoccluded light, as a share of the
+/// smallest area of others. Smaller divides too far where a lamp touches a surface; larger misses the light about a
+/// lamp far smaller than the scene.
 const SMOOTH_SHARE: f32 = 1e-6;
 
-/// Where it is asked whether the light of many emitters bends, its error is relative to this many times the tolerance of the last
-/// step: it is then a tenth of that. Smaller looks at emitters that do not matter, larger divides by the error.
-const BEND_SCALE: f32 = 30.0;
+/// Light, in multiples of the tolerance of the last step, to which the error of many emitters at a centroid is relative
+/// if the corners are darker: the error is then a tenth of the tolerance. Smaller evaluates emitters that do not
+/// matter; larger divides elements because of that error.
+const INTERPOLATION_SCALE: f32 = 30.0;
 
-/// Rounds of division in one step at most.
+/// Most rounds of division in one step. Fewer, and small shadows stay coarse; more, and one step takes long.
 const MOST_ROUNDS: u32 = 8;
 
-/// Divide elements that are too large to be trusted with their corners. Returns whether all could be. Where nothing casts
-/// a shadow, in all of the scene if `is_clear`, `lights` tell over which elements their light does not bend: these stay
-/// whole.
+/// Divide elements that are too large to be sampled at their corners only. Returns whether memory allowed it. Where
+/// nothing casts a shadow, in all of the scene if `is_clear`, elements are not divided over which the light of `lights`
+/// has no interpolation error.
 pub(crate) fn divide_coarse(
     hierarchy: &mut Hierarchy,
     lights: Option<&Lights>,
@@ -54,17 +55,17 @@ pub(crate) fn divide_coarse(
             .active_leaves()
             .filter(|&leaf| is_large(hierarchy, leaf, limits))
             .collect();
-        // Elsewhere than in the clear, links divide elements for the light that they carry.
-        let bends = |leaf: usize| match lights {
+        // If emission is linked, links divide elements for it, except in clear scenes.
+        let has_error = |leaf: usize| match lights {
             Some(lights) if is_clear || lights.are_all(hierarchy) => {
-                lights.bend_over(hierarchy, leaf, limits)
+                lights.has_interpolation_error(hierarchy, leaf, limits)
             }
             _ => is_clear,
         };
         let wanted: Vec<u32> = large
             .into_par_iter()
             .filter(|&leaf| {
-                (!is_clear && !hierarchy.is_empty_above(leaf, EMPTY_RADII)) || bends(leaf)
+                (!is_clear && !hierarchy.is_empty_above(leaf, EMPTY_RADII)) || has_error(leaf)
             })
             .map(|leaf| leaf as u32)
             .collect();
@@ -77,7 +78,7 @@ pub(crate) fn divide_coarse(
     }
 }
 
-/// Whether an element is too large, or too long, to be trusted with its corners.
+/// Whether an element is too large, or too long, to be sampled at its corners only.
 fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
     let squared = longest_edge_squared(hierarchy.mesh.corners(leaf)) as f32;
     // The area of a right isosceles triangle with that edge.
@@ -87,8 +88,8 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
 }
 
 impl DirectField {
-    /// Sample all vertices, and divide and sample until interpolation is good enough. Returns the rays shot, and whether there
-    /// was room for all elements; `None` when cancelled.
+    /// Sample all vertices, then divide elements and sample again until the interpolation error is tolerated. Returns
+    /// the rays shot, and whether memory allowed all divisions; `None` when cancelled.
     pub(crate) fn adapt(
         &mut self,
         rays: &RayTree,
@@ -97,7 +98,7 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<(u64, bool)> {
         let mut ray_count = 0;
-        // Elements from here on were not looked at yet in this step.
+        // First element that was not examined in this step.
         let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
             let (shot, mean) = self.sample(rays, hierarchy, limits, cancel)?;
@@ -109,7 +110,7 @@ impl DirectField {
             fresh = elements.end;
             let leaves: Vec<usize> = hierarchy.mesh.leaves_among(elements).collect();
             ray_count += self.probe_centres(rays, hierarchy, &leaves, limits, mean, cancel)?;
-            let wanted = self.bent(hierarchy, &leaves, limits, mean);
+            let wanted = self.leaves_to_divide(hierarchy, &leaves, limits, mean);
             let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
             if !fits || !hierarchy.mesh.divide(&wanted) {
                 return Some((ray_count, fits));
@@ -118,7 +119,8 @@ impl DirectField {
         Some((ray_count, true))
     }
 
-    /// Sample all vertices, until their noise is small enough. Returns the rays shot and the mean luminance.
+    /// Sample all vertices until their noise is tolerated. Returns the rays shot and the mean luminance; `None` when
+    /// cancelled.
     pub(crate) fn sample(
         &mut self,
         rays: &RayTree,
@@ -126,14 +128,15 @@ impl DirectField {
         limits: Limits,
         cancel: &Cancel,
     ) -> Option<(u64, f32)> {
-        let covering = self.cover(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
-        let moving = self.move_before_walls(rays, hierarchy, limits, cancel)?;
+        let sampled =
+            self.sample_vertices(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
+        let offset = self.offset_before_walls(rays, hierarchy, limits, cancel)?;
         let mean = self.mean(hierarchy);
-        let settling = self.settle(rays, hierarchy, limits, mean, cancel)?;
-        Some((covering + moving + settling, mean))
+        let denoised = self.reduce_noise(rays, hierarchy, limits, mean, cancel)?;
+        Some((sampled + offset + denoised, mean))
     }
 
-    /// How much the luminance of the corners varies, times the weight of the element, relative to the mean.
+    /// Range of the luminance of the corners, times the weight of the element, relative to the mean.
     fn spread(&self, hierarchy: &Hierarchy, element: usize, mean: f32) -> f32 {
         let corners = hierarchy.mesh.elements[element].vertices;
         let values = corners.map(|vertex| luminance(self.corner(vertex)));
@@ -142,8 +145,8 @@ impl DirectField {
         range * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
-    /// The light that an element would get if nothing stood before it, as `spread` counts, where none of it reaches the
-    /// corners: rings and bands lie with all their corners under the edges of their neighbours.
+    /// The largest unoccluded light of the corners, in the units of `spread`, if none of it reaches them; else 0. Rings
+    /// and bands lie with all their corners under the edges of their neighbours.
     fn hidden(&self, hierarchy: &Hierarchy, element: usize, mean: f32) -> f32 {
         let lights = hierarchy.mesh.elements[element]
             .vertices
@@ -158,10 +161,10 @@ impl DirectField {
         most * share_root(hierarchy, element) / mean.max(f32::MIN_POSITIVE)
     }
 
-    /// How far light that nothing blocks is from linear between the corners of an element, as `spread` counts; 0 where it
-    /// cannot be above the tolerance, or where none reaches the corners. `at_centre` is the luminance of that light at the
-    /// centroid, found where it is not known yet.
-    fn bend_unoccluded(
+    /// Interpolation error of the unoccluded light at the centroid of an element, in the units of `spread`; 0 where it
+    /// cannot exceed the tolerance, or where no light reaches the corners. `at_centre` is the luminance of that light
+    /// at the centroid, computed if it is `None`.
+    fn unoccluded_interpolation_error(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -181,17 +184,18 @@ impl DirectField {
         }
         let at_centre = *at_centre.get_or_insert_with(|| {
             let centre = centre_of(hierarchy, element);
-            // What is off by far less than the tolerance tells as much.
+            // An error far below the tolerance is precise enough.
             let brightest_corner = corners.into_iter().fold(0.0, f32::max);
-            let scale = brightest_corner.max(BEND_SCALE * limits.finest_tolerance / weight);
+            let scale =
+                brightest_corner.max(INTERPOLATION_SCALE * limits.finest_tolerance / weight);
             let mut cut = Vec::new();
             luminance(self.lights.unoccluded(&centre, Some(scale), &mut cut))
         });
         (at_centre - corners.iter().sum::<f32>() / 3.0).abs() * weight
     }
 
-    /// Sample the centroids of those of some leaves whose corners differ, or may all be dark by chance. Returns the rays
-    /// shot.
+    /// Sample the centroids of those of some leaves whose corners differ, or may all be in shadow by chance. Returns
+    /// the rays shot; `None` when cancelled.
     fn probe_centres(
         &mut self,
         rays: &RayTree,
@@ -204,9 +208,9 @@ impl DirectField {
         let element_count = hierarchy.mesh.elements.len();
         self.centres.resize(element_count, None);
         self.unoccluded_at_centres.resize(element_count, None);
-        // The leaves to sample: what lies between their corners may show.
+        // The leaves to sample: their interpolation error may exceed a tolerance.
         let candidates = leaves.par_iter().copied().filter(|&leaf| {
-            hierarchy.mesh.is_held(leaf)
+            hierarchy.mesh.is_active(leaf)
                 && hierarchy.mesh.elements[leaf].is_outside_solids()
                 && self.centres[leaf].is_none()
         });
@@ -214,9 +218,14 @@ impl DirectField {
             .map(|leaf| {
                 let mut at_centre = self.unoccluded_at_centres[leaf];
                 let is_wanted = self.spread(hierarchy, leaf, mean) > limits.tolerance
-                    || self.bend_unoccluded(hierarchy, leaf, limits, mean, &mut at_centre)
-                        > limits.tolerance
-                    || self.may_show(hierarchy, leaf, limits, mean)
+                    || self.unoccluded_interpolation_error(
+                        hierarchy,
+                        leaf,
+                        limits,
+                        mean,
+                        &mut at_centre,
+                    ) > limits.tolerance
+                    || self.may_error_be_visible(hierarchy, leaf, limits, mean)
                     || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance;
                 (leaf, is_wanted, at_centre)
             })
@@ -261,27 +270,28 @@ impl DirectField {
         Some(ray_count)
     }
 
-    /// Those of some leaves whose corners do not tell what lies between.
-    fn bent(
+    /// Those of some leaves whose interpolation error exceeds a tolerance.
+    fn leaves_to_divide(
         &mut self,
         hierarchy: &Hierarchy,
         leaves: &[usize],
         limits: Limits,
         mean: f32,
     ) -> Vec<u32> {
-        let mut bent = Vec::new();
+        let mut wanted = Vec::new();
         for &leaf in leaves {
             let mut at_centre = self.unoccluded_at_centres[leaf];
-            if self.is_bent(hierarchy, leaf, limits, mean, &mut at_centre) {
-                bent.push(leaf as u32);
+            if self.needs_division(hierarchy, leaf, limits, mean, &mut at_centre) {
+                wanted.push(leaf as u32);
             }
             self.unoccluded_at_centres[leaf] = at_centre;
         }
-        bent
+        wanted
     }
 
-    /// Whether the corners of a leaf do not tell what lies between; `at_centre` as [`Self::bend_unoccluded`] has it.
-    fn is_bent(
+    /// Whether the interpolation error of a leaf exceeds a tolerance; `at_centre` as in
+    /// [`Self::unoccluded_interpolation_error`].
+    fn needs_division(
         &self,
         hierarchy: &Hierarchy,
         leaf: usize,
@@ -294,19 +304,19 @@ impl DirectField {
         let Some(centre) = self.centres.get(leaf).copied().flatten() else {
             return false;
         };
-        // What reaches into a solid was divided as far as it shall be.
+        // Contact elements are divided elsewhere.
         if !element.is_outside_solids() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
             return false;
         }
-        // Shadows have borders however small elements are; light that nothing blocks does not.
+        // Shadow borders need a smallest area; unoccluded light is smooth.
         if area * 0.25 < limits.min_area {
-            return self.bend_unoccluded(hierarchy, leaf, limits, mean, at_centre)
+            return self.unoccluded_interpolation_error(hierarchy, leaf, limits, mean, at_centre)
                 > limits.tolerance;
         }
         let [a, b, c] = element.vertices.map(|vertex| self.corner(vertex));
-        let bend = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
+        let error = luminance((centre.irradiance() - (a + b + c) / 3.0).abs());
         let weight = share_root(hierarchy, leaf) / mean.max(f32::MIN_POSITIVE);
-        bend * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
-            || self.shows(hierarchy, leaf, &centre, limits, mean)
+        error * weight + SPREAD_SHARE * self.spread(hierarchy, leaf, mean) > limits.tolerance
+            || self.is_error_visible(hierarchy, leaf, &centre, limits, mean)
     }
 }

@@ -1,8 +1,8 @@
-//! Vertices that lie a little behind a wall.
+//! Vertices that lie slightly behind a wall.
 //!
-//! Boards and boxes are let into walls by a little, so that no gap shows. Their vertices there get nothing, and that would
-//! show as a smudge all over the elements beside them. So where rays from such a vertex meet backs alone, its light is
-//! that of a place further within the element: just before the wall.
+//! Objects often reach slightly into walls, to avoid gaps. Their vertices there get no light, which would darken the
+//! elements about them. So where rays from such a vertex meet only backs, its light is evaluated at an offset place
+//! further inside the element, before the wall.
 
 use rayon::prelude::*;
 
@@ -13,23 +13,23 @@ use crate::{
     solver::{
         Cancel,
         limits::Limits,
-        places::{Moved, inset, is_behind_wall},
+        places::{OffsetPlace, inset, is_behind_wall},
     },
     transport::luminance,
 };
 
-/// Shares of the way from a vertex to the centroid of an element at which a place before the wall is looked for. Further
-/// within, light may be another; of an element that lies behind the wall by more, the dark is not small.
+/// Shares of the way from a vertex to the centroid of an element at which an offset place is sought. Smaller, and
+/// vertices stay behind walls; larger, and they get light of another place.
 const INSETS: [f32; 3] = [0.2, 0.35, 0.5];
 
-/// Light of a vertex that is looked at, as a share of that at another of an element. Smaller misses vertices where a ray
-/// slips through an edge; larger looks at penumbrae.
+/// Largest light of a vertex that is probed, as a share of the largest of its element. Smaller misses vertices where a
+/// ray slips through an edge; larger probes penumbrae.
 const DARK_SHARE: f32 = 0.1;
 
 impl DirectField {
-    /// Find places before the wall for vertices that lie beyond one, and sample there. A vertex is looked at once at each
-    /// element, where it is dark and the element is not. Returns the rays shot.
-    pub(super) fn move_before_walls(
+    /// Find offset places for vertices behind walls, and sample there. A vertex is probed once in each element, if it
+    /// is dark and the element is not. Returns the rays shot; `None` when cancelled.
+    pub(super) fn offset_before_walls(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -37,9 +37,9 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let count = hierarchy.mesh.vertices.len();
-        self.offsets.looked_at.resize(count, u32::MAX);
-        // Look for a place before the wall, for each dark vertex beside light.
-        let found: Vec<(u32, u32, (Option<Moved>, u64))> = self
+        self.offsets.probed_at.resize(count, u32::MAX);
+        // Seek an offset place for each dark vertex beside light.
+        let found: Vec<(u32, u32, (Option<OffsetPlace>, u64))> = self
             .dark_beside_light(hierarchy)
             .into_par_iter()
             .map(|(vertex, leaf)| match cancel.is_cancelled() {
@@ -51,14 +51,14 @@ impl DirectField {
             })
             .collect();
         cancel.proceed()?;
-        // Take these places over.
+        // Store these places.
         let mut shot = 0;
         let mut is_new = vec![false; count];
-        for (vertex, leaf, (moved, rays)) in found {
+        for (vertex, leaf, (offset, rays)) in found {
             shot += rays;
-            self.offsets.looked_at[vertex as usize] = leaf;
-            if let Some(moved) = moved {
-                self.offsets.moved.insert(vertex, moved);
+            self.offsets.probed_at[vertex as usize] = leaf;
+            if let Some(offset) = offset {
+                self.offsets.by_vertex.insert(vertex, offset);
                 self.vertices[vertex as usize] = Some(DirectLight::default());
                 is_new[vertex as usize] = true;
             }
@@ -78,7 +78,7 @@ impl DirectField {
         Some(shot + self.shot(&receivers))
     }
 
-    /// Vertices that are dark, each with the lightest element about it, if it was not looked at there.
+    /// Dark vertices, each with the brightest element about it, unless it was probed there.
     fn dark_beside_light(&self, hierarchy: &Hierarchy) -> Vec<(u32, u32)> {
         let mesh = &hierarchy.mesh;
         let mut lightest: Vec<Option<(f32, u32)>> = vec![None; self.vertices.len()];
@@ -102,19 +102,19 @@ impl DirectField {
         let found = lightest.into_iter().enumerate();
         found
             .filter_map(|(vertex, found)| Some((vertex as u32, found?.1)))
-            .filter(|&(vertex, leaf)| self.offsets.looked_at[vertex as usize] != leaf)
+            .filter(|&(vertex, leaf)| self.offsets.probed_at[vertex as usize] != leaf)
             .collect()
     }
 }
 
-/// Where light of a vertex is to be evaluated within an element, if it lies behind a wall and a part of the element does
-/// not; and the rays shot.
+/// The offset place of a vertex in an element, if the vertex lies behind a wall and a part of the element does not; and
+/// the rays shot.
 fn before_wall(
     rays: &RayTree,
     hierarchy: &Hierarchy,
     vertex: u32,
     leaf: usize,
-) -> (Option<Moved>, u64) {
+) -> (Option<OffsetPlace>, u64) {
     let (at, mesh) = (hierarchy.mesh.position(vertex), &hierarchy.mesh);
     let element = &mesh.elements[leaf];
     let place = |inset: f32| at.lerp(element.centroid, inset);
@@ -128,7 +128,7 @@ fn before_wall(
         let (is_behind, shot) = is_behind_wall(rays, hierarchy, leaf, place);
         ray_count += shot;
         if !is_behind {
-            return (Some(Moved { place, inset }), ray_count);
+            return (Some(OffsetPlace { place, inset }), ray_count);
         }
     }
     (None, ray_count)

@@ -1,5 +1,5 @@
-//! What the eye sees of direct light that bends within an element: at the border of a shadow an error counts for its
-//! contrast with what surrounds it, though the element is small.
+//! Visible interpolation errors of direct light: at the border of a shadow an error counts by its contrast with the
+//! surroundings, though the element is small.
 
 use super::{field::DirectField, samples::DirectLight};
 use crate::{
@@ -8,16 +8,17 @@ use crate::{
     transport::luminance,
 };
 
-/// Share of the variation between the corners that counts as error even where the centroid agrees with their mean.
+/// Share of the range of the corners that counts as error even if the centroid agrees with their mean. Smaller misses
+/// borders by chance; larger divides gradients.
 pub(crate) const SPREAD_SHARE: f32 = 0.15;
 
-/// Standard errors of a difference that are taken for noise and not for a border. Smaller divides grain; larger lets
-/// narrow penumbrae be.
+/// Standard errors of a difference that count as noise and are subtracted. Smaller divides grain; larger leaves narrow
+/// penumbrae coarse.
 const NOISE_DEVIATIONS: f32 = 0.5;
 
 impl DirectField {
-    /// Whether what lies between the corners of an element may show: how far they differ, beyond noise, is seen.
-    pub(super) fn may_show(
+    /// Whether the interpolation error of an element may be visible: the range of its corners, without noise, is.
+    pub(super) fn may_error_be_visible(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -28,11 +29,11 @@ impl DirectField {
             most, least, noise, ..
         } = self.corners(hierarchy, element);
         let spread = most - least - NOISE_DEVIATIONS * noise;
-        limits.is_seen(spread, mean.max(most), share_root(hierarchy, element))
+        limits.is_visible(spread, mean.max(most), share_root(hierarchy, element))
     }
 
-    /// Whether the bend between the corners of an element and its centroid shows.
-    pub(super) fn shows(
+    /// Whether the interpolation error at the centroid of an element is visible.
+    pub(super) fn is_error_visible(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
@@ -47,11 +48,11 @@ impl DirectField {
             noise,
         } = self.corners(hierarchy, element);
         let at_centre = luminance(centre.irradiance());
-        let bend = (at_centre - between).abs() + SPREAD_SHARE * (most - least);
+        let error = (at_centre - between).abs() + SPREAD_SHARE * (most - least);
         let noise = centre.error().hypot(noise);
         let beside = mean.max(most).max(at_centre);
-        let error = bend - NOISE_DEVIATIONS * noise;
-        limits.is_seen(error, beside, share_root(hierarchy, element))
+        let visible = error - NOISE_DEVIATIONS * noise;
+        limits.is_visible(visible, beside, share_root(hierarchy, element))
     }
 
     /// Luminances of direct light at the corners of an element.
@@ -79,6 +80,6 @@ struct Corners {
     most: f32,
     least: f32,
     mean: f32,
-    /// Standard error of one of them, in the root mean square.
+    /// Root mean square of their standard errors.
     noise: f32,
 }

@@ -1,4 +1,4 @@
-//! An emitter, and points of it for shadow rays.
+//! Emitters, and the sampling of their points.
 
 use std::f32::consts::PI;
 
@@ -21,7 +21,7 @@ pub(super) struct Emitter {
     pub area: f32,
     pub triangle: TriangleId,
     pub material: MaterialId,
-    /// By what the material's texture multiplies its emission here, in the mean.
+    /// Mean of the emission texture over it, which multiplies the emission of the material.
     pub texture: Vec3,
     pub radiosity: Vec4,
 }
@@ -46,8 +46,9 @@ impl Emitter {
         }
     }
 
-    /// A point of the emitter for a point of the unit square, and the light that it stands for at a receiver, up to a
-    /// factor. Of an emitter that is `seen` under a large angle all directions are as likely; elsewhere all points are.
+    /// A point of the emitter for a point of the unit square, and its weight at a receiver, up to a factor. `seen` is
+    /// the spherical triangle of an emitter with a large solid angle: its directions are sampled uniformly; otherwise
+    /// its points are.
     pub(super) fn aim(
         &self,
         receiver: &Receiver,

@@ -1,4 +1,4 @@
-//! Direct light as a field on the mesh: known at vertices, and at the centroids of elements where it varies.
+//! Direct light as a field on the mesh: sampled at vertices, and at the centroids of elements where it varies.
 
 use glam::Vec4;
 
@@ -14,35 +14,35 @@ use crate::{
 /// Direct light on a mesh.
 pub(crate) struct DirectField {
     pub(crate) lights: Lights,
-    /// By vertex, where it was sampled; shorter than the vertices where some are new.
+    /// By vertex, if it was sampled; shorter than the vertices of the mesh if some are new.
     pub(super) vertices: Vec<Option<DirectLight>>,
-    /// By element, where it was needed.
+    /// At the centroid by element, where it was needed.
     pub(super) centres: Vec<Option<DirectLight>>,
-    /// Luminance of the unoccluded irradiance at centroids by element, where it was needed.
+    /// Luminance of the unoccluded irradiance at the centroid by element, where it was needed.
     pub(super) unoccluded_at_centres: Vec<Option<f32>>,
-    /// Elements whose corners are all sampled: those that come after are new.
-    pub(super) covered: usize,
-    /// Shadow rays that these corners have where it takes all.
+    /// Number of elements whose corners are all sampled; later ones are new.
+    pub(super) sampled_elements: usize,
+    /// Shadow rays of these corners at shadow borders.
     pub(crate) samples: u32,
-    /// Vertices behind walls.
+    /// Offset places of vertices behind walls.
     pub(crate) offsets: OffsetPlaces,
 }
 
 impl DirectField {
-    /// Nothing is known yet.
+    /// The field before any sample.
     pub(crate) fn new(lights: Lights) -> Self {
         Self {
             lights,
             vertices: Vec::new(),
             centres: Vec::new(),
             unoccluded_at_centres: Vec::new(),
-            covered: 0,
+            sampled_elements: 0,
             samples: 0,
             offsets: OffsetPlaces::default(),
         }
     }
 
-    /// The same light in other colours: of these emitters, with what shadow rays found at vertices and centroids.
+    /// Replace the light by that of recoloured emitters, with samples at vertices and centroids.
     pub(super) fn recolor(
         &mut self,
         lights: Lights,
@@ -53,14 +53,14 @@ impl DirectField {
         self.unoccluded_at_centres.clear();
     }
 
-    /// Direct irradiance of a leaf: its corners' mean, or the rule of degree 2 with its centroid. Of one that lies within a
-    /// solid in part, that of its open part.
+    /// Direct irradiance of a leaf: the mean of its corners, or the quadrature rule of degree 2 with its centroid. For
+    /// a contact element, the mean of its corners outside solids.
     pub(super) fn element(&self, hierarchy: &Hierarchy, element: usize) -> Vec4 {
         let leaf = &hierarchy.mesh.elements[element];
         if leaf.is_contact() {
-            let open = (0..3).filter(|&side| !leaf.is_inside_solid_at(side));
-            let known = open.clone().map(|side| self.corner(leaf.vertices[side]));
-            return known.sum::<Vec4>() / (open.count().max(1) as f32);
+            let outside = (0..3).filter(|&side| !leaf.is_inside_solid_at(side));
+            let known = outside.clone().map(|side| self.corner(leaf.vertices[side]));
+            return known.sum::<Vec4>() / (outside.count().max(1) as f32);
         }
         let [a, b, c] = leaf.vertices.map(|vertex| self.corner(vertex));
         let corners = a + b + c;
@@ -72,8 +72,8 @@ impl DirectField {
         }
     }
 
-    /// Direct irradiance to show at each vertex of the mesh, smoothed, and its standard error (luminance). A vertex that only
-    /// closes an edge takes the mean of its ends.
+    /// Direct irradiance at each vertex for display, smoothed, and its standard error (luminance). A vertex that only
+    /// prevents cracks takes the mean of the ends of its edge.
     pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Vec<(Vec4, f32)> {
         let smoothed = self.smoothed(hierarchy);
         let mut shown: Vec<(Vec4, f32)> = Vec::with_capacity(hierarchy.mesh.vertices.len());
@@ -92,7 +92,7 @@ impl DirectField {
         shown
     }
 
-    /// Irradiance at the vertices that were sampled, as far as noise explains how neighbours differ.
+    /// Irradiance at the sampled vertices, smoothed as far as noise explains differences of neighbours.
     fn smoothed(&self, hierarchy: &Hierarchy) -> Vec<Vec4> {
         let fractions = smooth::fractions(hierarchy, &self.vertices);
         let known = self.vertices.iter().zip(fractions);
@@ -102,18 +102,22 @@ impl DirectField {
                 self.lights.bounded(unoccluded * fraction)
             })
             .collect();
-        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
-        carry_over(&hierarchy.mesh, tells, &mut shown);
-        let open = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
-        let centres = hierarchy.mesh.leaves().filter(open).filter_map(|leaf| {
-            let centre = self.centres.get(leaf).copied().flatten()?;
-            Some((leaf, self.lights.bounded(centre.irradiance())))
-        });
+        let is_known = |element: &Element, side| !element.is_inside_solid_at(side);
+        carry_over(&hierarchy.mesh, is_known, &mut shown);
+        let is_outside = |leaf: &usize| hierarchy.mesh.elements[*leaf].is_outside_solids();
+        let centres = hierarchy
+            .mesh
+            .leaves()
+            .filter(is_outside)
+            .filter_map(|leaf| {
+                let centre = self.centres.get(leaf).copied().flatten()?;
+                Some((leaf, self.lights.bounded(centre.irradiance())))
+            });
         project(hierarchy, &mut shown, centres);
         shown
     }
 
-    /// Direct irradiance at a corner of a leaf.
+    /// Direct irradiance at a vertex; 0 if it was not sampled.
     pub(crate) fn corner(&self, vertex: u32) -> Vec4 {
         self.vertices
             .get(vertex as usize)
@@ -122,18 +126,18 @@ impl DirectField {
             .map_or(Vec4::ZERO, |light| self.lights.bounded(light.irradiance()))
     }
 
-    /// Irradiance at a vertex without occlusion; 0 where it was not sampled.
+    /// Unoccluded irradiance at a vertex; 0 if it was not sampled.
     pub(super) fn unoccluded(&self, vertex: u32) -> Vec4 {
         let light = self.vertices[vertex as usize].unwrap_or_default();
         light.unoccluded()
     }
 
-    /// The luminance by which errors of direct light are measured.
+    /// Luminance to which errors of direct light are relative.
     pub(super) fn mean(&self, hierarchy: &Hierarchy) -> f32 {
         sums::scale(hierarchy, |leaf| self.element(hierarchy, leaf))
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.vertices.as_slice())
             + size_of_val(self.centres.as_slice())

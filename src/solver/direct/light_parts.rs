@@ -1,7 +1,7 @@
-//! Direct light in parts that can be dimmed and coloured without new shadow rays.
+//! Direct light in parts, which can be dimmed and coloured without new shadow rays.
 //!
-//! Direct light is linear in each emitter. As long as all sampled emitters change alike, what was shot is scaled. Once
-//! they do not, each emitting material is shot by itself, and is a part of its own from there on.
+//! Direct light is linear in each emitter. As long as all sampled emitters change by one factor, their samples are
+//! scaled. Otherwise each emitting material is sampled separately, and is a part of its own from then on.
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -17,14 +17,15 @@ use crate::{
     },
 };
 
-/// Emitting materials that get parts of their own. With more, memory grows by 64 bytes each for every vertex: then all
-/// are shot again whenever they change unlike each other.
+/// Most emitting materials that get parts of their own; with more, all are sampled again whenever their ratio changes.
+/// More take memory, 64 bytes each for every vertex; fewer need new rays more often.
 const MOST_PARTS: usize = 8;
 
-/// Ratios that differ by less than this share are the same but for rounding.
+/// Ratios that differ by less than this share are equal. Smaller, and rounding counts; larger, and small changes are
+/// lost.
 const SAME_RATIO: f32 = 1e-5;
 
-/// What shadow rays found, by vertex and by element, as a [`DirectField`] keeps it.
+/// Samples by vertex and by element, as in a [`DirectField`].
 #[derive(Clone)]
 struct Samples {
     vertices: Vec<Option<DirectLight>>,
@@ -33,12 +34,12 @@ struct Samples {
 
 /// The direct light of some materials.
 struct Part {
-    /// The materials with the emission that they had when they were shot.
+    /// The materials, with the emission for which they were sampled.
     shot_as: Vec<(MaterialId, Vec3)>,
     samples: Samples,
 }
 
-/// What is needed to shoot.
+/// Input of new shadow rays.
 #[derive(Clone, Copy)]
 pub(crate) struct Shooting<'a> {
     pub(crate) scene: &'a Scene,
@@ -48,11 +49,11 @@ pub(crate) struct Shooting<'a> {
     pub(crate) cancel: &'a Cancel,
 }
 
-/// Parts that make up the direct light of a field.
+/// The parts of the direct light of a field.
 pub(crate) struct LightParts(Vec<Part>);
 
 impl LightParts {
-    /// All of a field, which was shot when materials looked so, as one part.
+    /// A field, sampled for these appearances, as one part.
     pub(crate) fn whole(field: &DirectField, scene: &Scene, appearances: &[Appearance]) -> Self {
         let emission = |material: MaterialId| (material, appearances[material.index()].emission);
         Self(vec![Part {
@@ -67,8 +68,8 @@ impl LightParts {
         }])
     }
 
-    /// Give a field the light of materials that look so, with new shadow rays only where the parts do not tell it.
-    /// Returns the rays shot, or `None` when cancelled: the field is then as it was.
+    /// Change a field to the light for these appearances, with new shadow rays only if the parts do not determine it.
+    /// Returns the rays shot; `None` when cancelled, with the field unchanged.
     pub(crate) fn mix(
         &mut self,
         field: &mut DirectField,
@@ -87,7 +88,7 @@ impl LightParts {
         Some(shot)
     }
 
-    /// What each part must be multiplied by, where all can be.
+    /// The factor of each part; `None` if one has none.
     fn factors(&self, appearances: &[Appearance]) -> Option<Vec<Vec4>> {
         let factor = |part: &Part| {
             let pairs = part.shot_as.iter();
@@ -97,6 +98,7 @@ impl LightParts {
         self.0.iter().map(factor).collect()
     }
 
+    /// The sum of the parts times their factors.
     fn mixed(&self, factors: &[Vec4]) -> Samples {
         let mix = |of: fn(&Samples) -> &[Option<DirectLight>]| {
             let count = self.0.first().map_or(0, |part| of(&part.samples).len());
@@ -118,7 +120,7 @@ impl LightParts {
         }
     }
 
-    /// Shoot each material by itself, or all in their new colours where there are too many.
+    /// Sample each material separately, or all in their new colours if there are too many.
     fn shoot_anew(
         &mut self,
         field: &DirectField,
@@ -129,7 +131,7 @@ impl LightParts {
         let (groups, shot_as) = if materials.len() > MOST_PARTS {
             (vec![materials], appearances.to_vec())
         } else {
-            // Shot white, a part can take any colour later.
+            // A part sampled as white can take any colour later.
             let mut white = appearances.to_vec();
             for material in &materials {
                 white[material.index()].emission = Vec3::ONE;
@@ -154,7 +156,7 @@ impl LightParts {
         Some(ray_count)
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         let bytes = |part: &Part| {
             size_of_val(part.samples.vertices.as_slice())
@@ -164,8 +166,8 @@ impl LightParts {
     }
 }
 
-/// Ratio of the second to the first of all pairs of colours, where it is the same for all. Pairs of 0 go with any; 1
-/// where all are.
+/// Ratio of the second to the first colour, if it is the same for all pairs. Pairs of 0 have any ratio; it is 1 if all
+/// pairs are 0.
 pub(crate) fn common_ratio(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> Option<Vec3> {
     let mut common: [Option<f32>; 3] = [None; 3];
     for (before, after) in pairs {
@@ -178,8 +180,8 @@ pub(crate) fn common_ratio(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> Option<
             if !ratio.is_finite() {
                 return None;
             }
-            let held = *common.get_or_insert(ratio);
-            if (ratio - held).abs() > SAME_RATIO * held.max(ratio) {
+            let known = *common.get_or_insert(ratio);
+            if (ratio - known).abs() > SAME_RATIO * known.max(ratio) {
                 return None;
             }
         }
@@ -198,7 +200,7 @@ fn sampled_materials(lights: &Lights, scene: &Scene) -> Vec<MaterialId> {
     materials
 }
 
-/// As many shadow rays as a field has had from each of its points, towards other lights; and their number. `None` when
+/// Samples of other lights at the places of a field, with as many shadow rays from each; and the rays shot. `None` when
 /// cancelled.
 fn shoot_known(
     field: &DirectField,
@@ -236,7 +238,7 @@ fn shoot_known(
     Some((samples, shot))
 }
 
-/// As many shadow rays from each place as were shot there before.
+/// Sample places with as many shadow rays as before. Returns the rays shot; `None` when cancelled.
 fn shoot_like(
     before: &[Option<DirectLight>],
     mut places: Vec<(usize, Receiver)>,

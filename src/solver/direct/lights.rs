@@ -1,8 +1,8 @@
 //! Direct light: irradiance from the emitters at points, by exact form factors and shadow rays.
 //!
-//! Unoccluded, the irradiance of the emitters is exact, or that of many far ones together nearly so (see `light_tree`).
-//! Shadow rays only tell which part of it arrives: they are spread over the emitters in proportion to that irradiance,
-//! stratified, and weighed by the transfer that each stands for.
+//! The unoccluded irradiance of the emitters is exact, that of many far ones together nearly so (see `light_tree`).
+//! Shadow rays only estimate its visible fraction: they are distributed over the emitters in proportion to that
+//! irradiance, stratified, and weighted by their transfer.
 
 use std::{f32::consts::PI, ops::Range};
 
@@ -23,7 +23,8 @@ use crate::{
     transport::luminance,
 };
 
-/// Places of random streams per frame unit: single precision tells 2^17 of them apart at the rim of the frame.
+/// Positions of random streams per frame unit: single precision resolves 2^17 at the rim of the frame. Larger, and
+/// rounding changes the streams; smaller, and neighbouring points share them.
 const PLACES: f32 = 16_384.0;
 
 /// The emitters that are sampled.
@@ -36,7 +37,7 @@ pub(crate) struct Lights {
 }
 
 impl Lights {
-    /// The emitting patches of a hierarchy: all of them, or none.
+    /// The active emitting patches of a hierarchy, or none if emission is linked.
     pub(crate) fn new(scene: &Scene, hierarchy: &Hierarchy, mode: Direct) -> Self {
         let is_sampled: Vec<bool> = hierarchy
             .patches
@@ -64,7 +65,7 @@ impl Lights {
         }
     }
 
-    /// The emitters whose materials `emission` knows, with that emitted radiance times their texture.
+    /// The emitters for whose materials `emission` gives an emitted radiance, with that radiance times their texture.
     pub(super) fn repainted(&self, emission: impl Fn(MaterialId) -> Option<Vec3>) -> Self {
         let emitters: Vec<Emitter> = self
             .tree
@@ -82,8 +83,8 @@ impl Lights {
         Self::of(&emitters, self.is_sampled.clone())
     }
 
-    /// Irradiance no larger than any surroundings can give. Of many emitters behind each other, few rays tell badly how
-    /// much is seen.
+    /// The irradiance, bounded by the largest radiosity: with many emitters behind each other, few rays estimate their
+    /// visibility badly.
     pub(super) fn bounded(&self, irradiance: Vec4) -> Vec4 {
         irradiance.min(self.brightest)
     }
@@ -93,12 +94,12 @@ impl Lights {
         self.brightest
     }
 
-    /// Whether nothing is sampled.
+    /// Whether no emitter is sampled.
     pub(crate) fn is_empty(&self) -> bool {
         self.tree.emitters.is_empty()
     }
 
-    /// Whether the emission of a patch is sampled and so must not travel over links.
+    /// Whether the emission of a patch is sampled, and so must not be linked.
     pub(crate) fn is_sampled(&self, patch: usize) -> bool {
         self.is_sampled[patch]
     }
@@ -108,14 +109,15 @@ impl Lights {
         self.tree.emitters.iter().map(|emitter| emitter.triangle)
     }
 
-    /// Whether all emission that light is computed from is sampled.
+    /// Whether the emission of all active patches is sampled.
     pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
-        let mut held = hierarchy.active_patches();
-        held.all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
+        let mut active = hierarchy.active_patches();
+        active
+            .all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
     }
 
-    /// Luminance of the power of the emitters per area of the scene: the mean irradiance if all of it arrives, where that is
-    /// no more than can.
+    /// Luminance of the power of the emitters per area of the scene, which is the mean irradiance if all of it arrives;
+    /// at most the largest radiosity.
     pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
         let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
         let sum: f64 = self.tree.emitters.iter().map(power).sum();
@@ -128,8 +130,8 @@ impl Lights {
         (0..self.is_sampled.len()).filter(|&patch| self.is_sampled[patch])
     }
 
-    /// Shoot shadow rays from many points until each has had as many as are `wanted` of a point of this index of which so much is
-    /// known, and add what they find to that. When cancelled, some points are left out and all must be asked again.
+    /// Shoot shadow rays from many points until each has had the number `wanted` for its index and light so far, and
+    /// add them to its `known` light. When cancelled, some points are omitted, and all must be sampled again.
     pub(super) fn shoot(
         &self,
         rays: &RayTree,
@@ -160,7 +162,7 @@ impl Lights {
             });
     }
 
-    /// Shoot a range of the shadow rays of one point, of which the cut is known.
+    /// Shoot a range of the shadow rays of one point with a known cut.
     fn shoot_at(
         &self,
         rays: &RayTree,
@@ -178,7 +180,7 @@ impl Lights {
         if total <= 0.0 {
             return;
         }
-        // The stream belongs to the place, so that the order of points does not matter, nor the last digit.
+        // The random stream depends on the rounded position, not on the order of points.
         let [x, y, z] = (receiver.point * PLACES)
             .round()
             .to_array()
@@ -186,11 +188,11 @@ impl Lights {
         let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
         let mut random = Random::new(seed, place);
         let (shift, scramble) = (random.uniform_2d(), random.next_u32());
-        // All rays so far are stratified together. Those to one target follow each other.
+        // All rays so far are stratified together. Those to one target are consecutive.
         strata.clear();
         strata.extend(samples.map(|sample| (low_discrepancy_1d(sample, scramble), sample)));
         strata.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        // Shoot them, each to an emitter of the part of the cut that it falls on.
+        // Shoot them, each to an emitter of its part of the cut.
         let (mut target, mut bundle) = (usize::MAX, Bundle::default());
         let mut outcomes = Outcomes::default();
         for &(at, sample) in &*strata {
@@ -222,7 +224,7 @@ impl Lights {
         light.changes += outcomes.changes();
     }
 
-    /// Rays that are about to be shot to a target.
+    /// An empty bundle of rays to a target.
     fn bundle(&self, receiver: &Receiver, target: Target) -> Bundle {
         let seen = match target {
             Target::Emitter(emitter) => {
@@ -249,7 +251,7 @@ impl Lights {
 #[derive(Default)]
 struct Shot {
     cut: Vec<Arriving>,
-    /// Places of rays in the light of the cut, 0 to 1, and their numbers.
+    /// Positions of rays in the light of the cut, 0…1, and their numbers.
     strata: Vec<(f32, u32)>,
 }
 

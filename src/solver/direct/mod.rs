@@ -1,12 +1,11 @@
-//! Light straight from emitters.
+//! Direct light: irradiance straight from emitters.
 
 mod adapt;
 mod before_walls;
-mod bend;
 mod border;
-mod cover;
 mod emitter;
 mod field;
+mod interpolation;
 mod light_parts;
 mod light_tree;
 mod lights;
@@ -16,6 +15,7 @@ mod panel;
 mod samples;
 mod smooth;
 mod surfaces;
+mod vertex_samples;
 
 pub(crate) use adapt::divide_coarse;
 pub(crate) use border::SPREAD_SHARE;

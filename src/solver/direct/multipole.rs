@@ -1,10 +1,10 @@
-//! The light of many emitters from afar: moments that give the irradiance at a point, and how far it may be off.
+//! The light of many far emitters: moments that give the irradiance at a point, and its error.
 //!
-//! At a point whose unit normal is n, an emitter of radiosity B and area vector S at the place x from there gives
-//! `B (S·−x)+ (n·x)+ / (π |x|⁴)`. Emitters that all face the point and lie above its horizon need no clamping, and the sum
-//! over them is expanded about the centre of their power: to the first order in the place for each area vector and colour,
-//! and to the second for their sum, which counts as spread alike for all directions.
-//! Where some face away, the directional moments that clusters of the hierarchy have, too, bound what shows.
+//! At a point whose unit normal is n, an emitter of radiosity B and area vector S at the place x from there gives `B
+//! (S·−x)+ (n·x)+ / (π |x|⁴)`. Emitters that all face the point and lie above its horizon need no clamping, and the sum
+//! over them is expanded about the centre of their power: to the first order in the place for each area vector and
+//! colour, and to the second for their sum, which counts as spread alike for all directions. Where some face away,
+//! directional moments as those of clusters bound the projected power.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -17,17 +17,18 @@ use crate::{
     transport::luminance,
 };
 
-/// Nearer than this many radii the expansion says nothing.
+/// Distance in radii up to which the expansion is not used. Smaller, and its error estimate is wrong; larger, and cuts
+/// have more nodes.
 const NEAREST: f32 = 1.5;
 
-/// Error of the expansion, relative to the irradiance, in multiples of `(spread/distance)² · radius/distance`: the terms of
-/// the third order that are left out have coefficients of up to this size. Smaller, and the error of a cut is above its
-/// tolerance; larger, and cuts have more nodes than they need.
+/// Error of the expansion, relative to the irradiance, in multiples of `(spread/distance)² · radius/distance`: the
+/// omitted terms of the third order have coefficients of up to this size. Smaller, and the error of a cut exceeds its
+/// tolerance; larger, and cuts have more nodes than needed.
 const TRUNCATION: f32 = 8.0;
 
-/// A point is told from one in the plane of the emitters if it lies this far before it, frame units: at the rim of the frame
-/// single precision resolves less than half of it, and shadow rays begin ten times as far off. Smaller, and points beside many
-/// lamps in one ceiling look at each of them; larger, and surfaces just before an emitter stay dark.
+/// Height over the plane of the emitters, in frame units, up to which a point lies in it: single precision resolves
+/// less than half of that at the rim of the frame, and shadow rays begin ten times as far off. Smaller, and points
+/// beside many lamps in one ceiling evaluate each of them; larger, and surfaces just before an emitter stay dark.
 const RESOLUTION: f32 = 1e-5;
 
 /// The light of some emitters from afar.
@@ -37,30 +38,30 @@ pub(super) struct Multipole {
     pub(super) expansion: Expansion,
 }
 
-/// Where some emitters are and how they face: all that most nodes of a tree are asked for.
+/// Bounds of some emitters, and of their normals: all that a walk over a tree reads of most nodes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent {
     /// Centre of the power (luminance).
     centre: Vec3,
-    /// Radius of a sphere about the centre that holds all emitters.
+    /// Radius of a sphere about the centre that contains all emitters.
     radius: f32,
     /// Luminance of the power.
     pub(super) power: f32,
-    /// Root of the mean of `|e|²` over the power (luminance), with e the place relative to the centre.
+    /// Root of the mean of `|e|²` over the power (luminance), with e the position relative to the centre.
     spread: f32,
-    /// Normals differ from this one by no more than the angle, radians; π where it says nothing.
+    /// The normals of all emitters lie within this angle of the axis, radians; π for any normals.
     axis: Vec3,
     angle: f32,
     /// Sine and cosine of the angle.
     sin_cos: (f32, f32),
-    /// How far emitters lie from the plane through the centre that the axis is normal to, at most.
+    /// Largest distance of emitters from the plane through the centre with the axis as normal.
     thickness: f32,
 }
 
 /// Moments of the light of some emitters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expansion {
-    /// Mean of `e eᵀ` over the power (luminance), with e the place relative to the centre.
+    /// Mean of `e eᵀ` over the power (luminance), with e the position relative to the centre.
     second: Mat3,
     /// Moments of `B S`.
     directional: Moments<Vec4>,
@@ -68,7 +69,7 @@ pub(super) struct Expansion {
     first: [[Vec4; 3]; 3],
 }
 
-/// What a point sees of a multipole.
+/// The geometry of a multipole relative to a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
     /// The centre relative to the point, and its squared distance.
@@ -76,14 +77,14 @@ pub(super) struct Sight {
     squared: f32,
     /// Height of the centre over the horizon of the point.
     height: f32,
-    /// Largest cosines at the emitters and at the point.
+    /// Largest cosines at the emitters and at the point, at most 1.
     most_cosines: [f32; 2],
     /// Whether all emitters lie above the horizon and face the point.
     is_whole: bool,
 }
 
 impl Multipole {
-    /// Of one emitter.
+    /// The multipole of one emitter.
     pub(crate) fn of(emitter: &Emitter) -> Self {
         let centre = emitter.corners.iter().sum::<Vec3>() / 3.0;
         let outwards = emitter.corners.map(|corner| corner - centre);
@@ -109,7 +110,7 @@ impl Multipole {
         Self { extent, expansion }
     }
 
-    /// Of the emitters of both.
+    /// The multipole of the emitters of both.
     pub(super) fn merged(&self, other: &Self) -> Self {
         let [one, two] = [&self.extent, &other.extent];
         let power = one.power + two.power;
@@ -159,7 +160,7 @@ impl Multipole {
 }
 
 impl Extent {
-    /// What a receiver sees of it; `None` where that is nothing for certain.
+    /// Its geometry relative to a receiver; `None` if it certainly gives no light there.
     pub(super) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
         let separation = self.centre - receiver.point;
         let squared = separation.length_squared();
@@ -196,7 +197,7 @@ impl Extent {
         })
     }
 
-    /// How far the luminance of the irradiance by an expansion may be off, about; infinite where nothing is known.
+    /// Approximate error of the irradiance (luminance) by an expansion; infinite where that is not used.
     pub(super) fn error(&self, expansion: &Expansion, sight: &Sight) -> f32 {
         let distance = sight.squared.sqrt();
         if distance <= NEAREST * self.radius {
@@ -211,25 +212,25 @@ impl Extent {
         let (least_shown, most_shown) = expansion.directional.bounds(-sight.separation / distance);
         let unknown =
             luminance(most_shown - least_shown) * sight.most_cosines[1] / (PI * sight.squared);
-        // Without terms of first and second order, and cut off by the horizon.
+        // Without terms of first and second order, and clamped at the horizon.
         let ratio = self.radius / distance;
         most * (truncation + ratio) + unknown
     }
 
-    /// Luminance of the irradiance without occlusion at most, if all emitters were as far away as the centre.
+    /// Upper bound of the unoccluded irradiance (luminance), if all emitters were as far away as the centre.
     pub(super) fn most_irradiance(&self, sight: &Sight) -> f32 {
         let [of_emitters, of_receiver] = sight.most_cosines;
         self.power * of_emitters * of_receiver / (PI * sight.squared)
     }
 
-    /// Whether a point is so far away that the emitters are seen about alike.
+    /// Whether a point is further away than the diameter.
     pub(super) fn is_far(&self, sight: &Sight) -> bool {
         sight.squared > (2.0 * self.radius).powi(2)
     }
 }
 
 impl Expansion {
-    /// Irradiance at a receiver without occlusion.
+    /// Unoccluded irradiance at a receiver with this unit normal, W/m².
     pub(super) fn irradiance(&self, sight: &Sight, normal: Vec3) -> Vec4 {
         let (y, height) = (sight.separation, sight.height);
         let scale = 1.0 / (PI * sight.squared * sight.squared);

@@ -1,8 +1,8 @@
-//! Emitters that together make one flat lamp.
+//! Panels: emitters that together make one flat lamp.
 //!
-//! The irradiance of a polygon is a sum over its edges, and where two triangles of one radiosity meet in a plane, the
-//! terms of their common edge cancel. So of a lamp of many triangles only the outline counts, as long as most of it lies
-//! above the receiver's horizon.
+//! The irradiance of a polygon is a sum over its edges (Lambert's formula), and where two triangles of one radiosity
+//! meet in a plane, the terms of their common edge cancel. So the outline determines the irradiance of a lamp of many
+//! triangles, as long as most of it lies above the receiver's horizon.
 
 use std::{collections::HashMap, f32::consts::PI, ops::Range};
 
@@ -15,36 +15,40 @@ use crate::{
     solver::places::Receiver,
 };
 
-/// Normals whose cosine is at least this belong to one plane.
+/// Least cosine between normals of one plane. Smaller, and curved lamps count as flat; larger, and rounding splits
+/// panels.
 const SAME_PLANE: f32 = 1.0 - 1e-6;
 
-/// Within this many radii shadow rays are better spread by the irradiance of each triangle than by area.
+/// Distance in radii up to which shadow rays are distributed by the irradiance of each triangle instead of by area.
+/// Smaller, and shadows near lamps are noisy; larger, and large lamps cost time.
 const NEAR: f32 = 2.0;
 
-/// Beyond this many radii a panel counts as a point, as triangles do.
+/// Distance in radii from which a panel counts as a point. Smaller is inexact; larger suffers from rounding.
 const FAR: f32 = 128.0;
 
-/// A point that is less high over a panel than this share of its radius is not told from one behind it.
+/// Height over the plane of a panel, as a share of its radius, up to which a point may be in it. Smaller suffers from
+/// rounding; larger evaluates single emitters more often.
 const LOW: f32 = 1e-3;
 
-/// Edges of which the sine of the angle is no larger run on as one.
+/// Largest sine of the angle between edges that are joined to one. Smaller, and outlines have more edges; larger, and
+/// curved outlines lose area.
 const STRAIGHT: f32 = 1e-5;
 
-/// Emitters that are looked at across an edge to find the one that continues another. All, and thousands on one edge
-/// take the square of their number.
+/// Most emitters at one edge that are compared with each of its emitters. More, and thousands on one edge take
+/// quadratic time; fewer, and panels fall apart there.
 const MOST_NEIGHBOURS: usize = 64;
 
-/// A corner of an emitter: its place in the scene's list of points, and where that is.
+/// A corner of an emitter: the index of its point in the mesh, and its position.
 type Corner = (u32, Vec3);
 
-/// Emitters of one material and radiosity that lie in one plane and hang together by edges.
+/// Emitters of one material and radiosity that lie in one plane and are connected by edges.
 #[derive(Clone, Debug)]
 pub(super) struct Panel {
-    /// Which emitters.
+    /// Its emitters.
     pub emitters: Range<usize>,
-    /// Area of all of them.
+    /// Total area.
     area: f32,
-    /// Edges that no two emitters share, in the order of their front's corners.
+    /// Edges that no two emitters share, oriented as the corners of the front.
     outline: Vec<[Vec3; 2]>,
     pub(super) normal: Vec3,
     pub(super) centre: Vec3,
@@ -52,7 +56,7 @@ pub(super) struct Panel {
 }
 
 impl Panel {
-    /// Irradiance of the whole panel for radiosity 1; `None` where its emitters are better looked at one by one.
+    /// Irradiance of the whole panel for a radiosity of 1, 0…1; `None` where its emitters must be evaluated one by one.
     pub(crate) fn irradiance(&self, receiver: &Receiver) -> Option<f32> {
         if self.emitters.len() == 1 {
             return None;
@@ -76,7 +80,7 @@ impl Panel {
                 |[start, _]: &[Vec3; 2]| (*start - receiver.point).dot(receiver.normal) >= 0.0;
             match self.outline.iter().filter(|edge| is_above(edge)).count() {
                 0 => return Some(0.0),
-                // Of shadow rays that are spread by area, most would go below the horizon.
+                // Most shadow rays distributed by area would go below the horizon.
                 count if count < self.outline.len() && elevation < 0.0 => return None,
                 _ => {}
             }
@@ -92,7 +96,7 @@ impl Panel {
     }
 }
 
-/// Sort emitters so that those of a panel follow each other, and find the panels. Both stay in the order of the first
+/// Find the panels, and sort emitters so that those of a panel are consecutive. Both are in the order of the first
 /// emitter of each panel.
 pub(super) fn panels(emitters: &[Emitter]) -> (Vec<Emitter>, Vec<Panel>) {
     let (mut sets, mut is_inner) = (
@@ -179,7 +183,7 @@ fn panel(
     }
 }
 
-/// The same outline with fewer edges: those that run on straight become one.
+/// The same outline with collinear edges joined.
 fn straightened(mut edges: Vec<[Corner; 2]>) -> Vec<[Corner; 2]> {
     let mut starting: HashMap<u32, Vec<usize>> = HashMap::new();
     for (index, [start, _]) in edges.iter().enumerate() {
@@ -187,13 +191,13 @@ fn straightened(mut edges: Vec<[Corner; 2]>) -> Vec<[Corner; 2]> {
     }
     let mut is_part = vec![false; edges.len()];
     for index in 0..edges.len() {
-        // Where outlines touch in a corner, nobody can say which edge goes on.
+        // Where outlines touch in a corner, the continuation is ambiguous.
         while let Some(&[next]) = starting.get(&edges[index][1].0).map(Vec::as_slice) {
             let ([start, end], [_, last]) = (edges[index], edges[next]);
             let (along, on) = (end.1 - start.1, last.1 - end.1);
-            let bend = along.cross(on).length();
+            let sine = along.cross(on).length();
             let is_straight =
-                along.dot(on) > 0.0 && bend <= STRAIGHT * along.length() * on.length();
+                along.dot(on) > 0.0 && sine <= STRAIGHT * along.length() * on.length();
             if !is_straight || next == index || is_part[index] || is_part[next] {
                 break;
             }
@@ -225,7 +229,8 @@ mod tests {
         scene::{MaterialId, TriangleId},
     };
 
-    /// A lamp of `n` by `n` squares from 0 to 1 in the plane z = 1 that looks down, without those that `is_hole` names.
+    /// A lamp of `n` by `n` squares from 0 to 1 in the plane z = 1, facing down, without the squares for which
+    /// `is_hole` holds.
     fn lamp(n: usize, is_hole: impl Fn(usize, usize) -> bool) -> Vec<Emitter> {
         let vertex = |x: usize, y: usize| (x * (n + 1) + y) as u32;
         let point = |vertex: u32| {
@@ -256,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_panel_only_the_outline_is_left() {
+    fn a_panel_is_reduced_to_its_outline() {
         for n in [1, 2, 5, 16] {
             let (emitters, panels) = panels(&lamp(n, |_, _| false));
             assert_eq!((panels.len(), panels[0].outline.len()), (1, 4), "{n}");
@@ -279,11 +284,11 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_or_bends_is_no_panel() {
+    fn emitters_that_differ_or_meet_at_an_angle_are_no_panel() {
         let mut colors = lamp(1, |_, _| false);
         colors[1].radiosity = Vec4::splat(2.0);
-        let mut bent = lamp(1, |_, _| false);
-        bent[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize_or_zero();
+        let mut tilted = lamp(1, |_, _| false);
+        tilted[1].normal = Vec3::new(0.0, 0.1, -1.0).normalize_or_zero();
         let mut materials = lamp(1, |_, _| false);
         materials[1].material = MaterialId(1);
         // The two sides of one triangle.
@@ -296,13 +301,13 @@ mod tests {
             normal: Vec3::Z,
             ..sides[0]
         };
-        for emitters in [colors, bent, materials, sides] {
+        for emitters in [colors, tilted, materials, sides] {
             assert_eq!(panels(&emitters).1.len(), 2);
         }
     }
 
     #[test]
-    fn a_panel_gives_as_much_as_its_emitters_or_is_taken_apart() {
+    fn a_panel_gives_as_much_light_as_its_emitters_where_it_is_used() {
         let (emitters, panels) = panels(&lamp(6, |x, y| x == 1 && y > 3));
         let mut random = Random::new(3, 0);
         let mut wholes = 0;

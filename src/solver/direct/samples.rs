@@ -1,14 +1,14 @@
-//! What shadow rays find at a point: which part of the light arrives, and how sure that is.
+//! Samples of direct light at a point: the visible fraction of the unoccluded light, and its standard error.
 
 use glam::Vec4;
 
 use crate::{geometry::SphericalTriangle, hierarchy::luminance};
 
-/// Shadow rays from a point to one target. How much unoccluded light comes from there is known, so of their weights only the
-/// ratios count: else a few rays that weigh much would speak for all targets.
+/// Shadow rays from a point to one target. The unoccluded light of the target is known, so only the ratios of their
+/// weights count: otherwise a few rays of large weight would determine the fraction for all targets.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bundle {
-    /// The emitter, where it fills a large angle.
+    /// The spherical triangle of the emitter, if its solid angle is large.
     pub(super) seen: Option<SphericalTriangle>,
     /// Rays tried.
     pub(crate) rays: u32,
@@ -16,14 +16,14 @@ pub(super) struct Bundle {
     visible: u32,
     /// Weights of the rays shot.
     weight: f32,
-    /// The same by colour, each with a luminance of 1.
+    /// The same by colour, for colours of luminance 1.
     sent: Vec4,
-    /// Of those that got through.
+    /// The same of the visible rays.
     arrived: Vec4,
 }
 
 impl Bundle {
-    /// Before the first ray, to an emitter where it fills a large angle.
+    /// An empty bundle; `seen` is the spherical triangle of an emitter with a large solid angle.
     pub(super) fn towards(seen: Option<SphericalTriangle>) -> Self {
         Self {
             seen,
@@ -42,10 +42,10 @@ impl Bundle {
     }
 }
 
-/// How often successive rays of one range had different outcomes.
+/// Number of changes of the outcome between successive rays of one range.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Outcomes {
-    /// Of the first ray and the last one so far.
+    /// Outcomes of the first and of the last ray so far.
     ends: Option<(bool, bool)>,
     changes: u32,
 }
@@ -57,7 +57,7 @@ impl Outcomes {
         self.ends = Some((first, is_visible));
     }
 
-    /// The first ray follows the last one, so that there are as many pairs as rays.
+    /// The changes, with the first ray following the last one, so that there are as many pairs as rays.
     pub(super) fn changes(&self) -> u32 {
         self.changes
             + self
@@ -66,33 +66,34 @@ impl Outcomes {
     }
 }
 
-/// How many shadow rays of one or several points got through.
+/// Counts of the shadow rays of one or several points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub shot: u32,
     pub visible: u32,
-    /// Pairs of rays to neighbouring strata, as many as rays, of which one got through and the other did not.
+    /// Pairs of rays to neighbouring strata with different outcomes; there are as many pairs as rays.
     pub changes: u32,
 }
 
-/// Standard errors by which rays of one point may differ from those of its neighbours. Smaller takes chance for a border,
-/// which biases the light where few rays get through; larger shoots more rays beside the borders of shadows.
+/// Difference of a point's rays from those of its neighbours that chance explains, in standard errors. Smaller takes
+/// chance for a shadow border, which biases the light where few rays are visible; larger misses points that differ.
 const LIKELY_DEVIATIONS: f32 = 3.0;
 
 impl Tally {
-    /// Whether some got through and others did not.
+    /// Whether some rays are visible and others are not.
     pub(super) fn is_mixed(self) -> bool {
         self.visible > 0 && self.visible < self.shot
     }
 
-    /// The part that got through; 0 of none.
+    /// The visible fraction; 0 without rays.
     fn fraction(self) -> f32 {
         self.visible as f32 / self.shot.max(1) as f32
     }
 
-    /// Variance of a ray within its stratum, 0…¼: half the mean square of the differences between neighbouring strata (the
-    /// estimator of successive differences; Wolter, "Introduction to Variance Estimation", ch. 8), and no more than among all
-    /// strata, since a sequence of low discrepancy alternates. `more` adds half a hit and half a miss.
+    /// Variance of a ray within its stratum, 0…¼: half the mean square of the differences between neighbouring strata
+    /// (the estimator of successive differences; Wolter, "Introduction to Variance Estimation", ch. 8), and at most
+    /// that among all strata, since a sequence of low discrepancy alternates. `more` rays are added, half of them
+    /// visible.
     fn variance(self, more: f32) -> f32 {
         let shot = (self.shot as f32 + more).max(1.0);
         let fraction = (self.visible as f32 + 0.5 * more) / shot;
@@ -100,7 +101,8 @@ impl Tally {
         within.min(fraction * (1.0 - fraction))
     }
 
-    /// Whether chance explains how these rays differ from others: by the part of the others, with half a hit and half a miss more.
+    /// Whether chance explains the difference of these rays from others, given the visible fraction of the others, with
+    /// half a hit and half a miss added.
     pub(super) fn is_like(self, others: Self) -> bool {
         let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
         let expected = (others.visible as f32 + 0.5) / count;
@@ -118,28 +120,28 @@ impl std::ops::AddAssign for Tally {
     }
 }
 
-/// What the shadow rays of a point found.
+/// Direct light of a point, estimated by its shadow rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DirectLight {
-    /// Irradiance without occlusion; before the first ray what is expected, 0 for nothing.
+    /// Unoccluded irradiance, W/m²; before the first ray an expected value, 0 if there is none.
     pub(super) exact: Vec4,
-    /// Weights of all rays by colour.
+    /// Weights of all rays, by colour.
     sent: Vec4,
-    /// Weights of the rays that got through by colour.
+    /// Weights of the visible rays, by colour.
     arrived: Vec4,
-    /// Rays tried: those that carry nothing are not shot.
+    /// Rays tried: those of weight 0 are not shot.
     pub tried: u32,
     /// Rays shot.
     pub shot: u32,
-    /// Rays that got through.
+    /// Visible rays.
     visible: u32,
     /// As [`Tally::changes`].
     pub(super) changes: u32,
 }
 
 impl DirectLight {
-    /// Before the first ray, where about this irradiance is expected without occlusion: the light of many emitters is then
-    /// evaluated no finer than that calls for, without asking first how much there is.
+    /// The light before the first ray, with an expected unoccluded irradiance, to which the error of the light of many
+    /// emitters is then relative.
     pub(super) fn expected(exact: Vec4) -> Self {
         Self {
             exact,
@@ -147,6 +149,7 @@ impl DirectLight {
         }
     }
 
+    /// Add a bundle of rays.
     pub(super) fn count(&mut self, bundle: &Bundle) {
         self.shot += bundle.shot;
         self.visible += bundle.visible;
@@ -157,8 +160,8 @@ impl DirectLight {
         }
     }
 
-    /// The light of several parts of the emitters together, the colours of each multiplied by a factor. Of parts that
-    /// are switched off nothing remains but that rays were tried.
+    /// The sum of the light of several groups of emitters, the colours of each times a factor. Groups with a factor of
+    /// 0 add only their tried rays.
     pub(super) fn mixed(parts: impl Iterator<Item = (Self, Vec4)>) -> Self {
         let mut mixed = Self::default();
         for (part, factor) in parts {
@@ -168,7 +171,7 @@ impl DirectLight {
                 continue;
             }
             mixed.exact += exact;
-            // As rays of the new colours would have been counted: each with a luminance of about 1.
+            // As rays of the new colours would count: each with a luminance of about 1.
             mixed.sent += exact;
             mixed.arrived += exact * part.fraction();
             mixed.shot += part.shot;
@@ -177,7 +180,7 @@ impl DirectLight {
         }
         let total = luminance(mixed.exact);
         if total > 0.0 {
-            // Of what arrives whole without a ray only the ratio counts.
+            // Without rays only the ratio of the weights counts.
             let by_ray = mixed.shot.max(1) as f32 / total;
             mixed.sent *= by_ray;
             mixed.arrived *= by_ray;
@@ -185,7 +188,7 @@ impl DirectLight {
         mixed
     }
 
-    /// Nothing blocks: no ray is needed to know that everything arrives.
+    /// Set the fraction to 1 without a ray, in a clear scene.
     pub(super) fn arrive_whole(&mut self) {
         (self.sent, self.arrived) = (Vec4::ONE, Vec4::ONE);
     }
@@ -200,7 +203,7 @@ impl DirectLight {
         self.exact
     }
 
-    /// The part of the unoccluded irradiance that arrives, by colour, 0…1.
+    /// The visible fraction of the unoccluded irradiance, by colour, 0…1.
     pub(super) fn fraction(&self) -> Vec4 {
         let ratio = |arrived: f32, sent: f32| {
             if sent > 0.0 {
@@ -217,7 +220,7 @@ impl DirectLight {
         )
     }
 
-    /// What its rays found.
+    /// Counts of its rays.
     pub(super) fn tally(&self) -> Tally {
         Tally {
             shot: self.shot,
@@ -226,9 +229,10 @@ impl DirectLight {
         }
     }
 
-    /// Standard error of the luminance as the rays of its neighbours have it, unless its own are unlikely beside them. So
-    /// whether more rays are shot does not depend on what its own found, which would bias the light: where few get through, most
-    /// points would take their first rays for all, and the others would lose by more.
+    /// Standard error of the luminance, estimated by the rays of its neighbours, unless its own are unlikely beside
+    /// them. So whether more rays are shot does not depend on its own outcomes, which would bias the light: where few
+    /// rays are visible, most points would stop after their first rays, and only points with visible rays would get
+    /// more.
     pub(super) fn error_among(&self, neighbours: Tally) -> f32 {
         let own = self.tally();
         if neighbours.shot == 0 || !own.is_like(neighbours) {
@@ -238,13 +242,13 @@ impl DirectLight {
         luminance(self.exact) * variance.sqrt()
     }
 
-    /// Square of the standard error of the fraction: 0 where all rays agree.
+    /// Square of the standard error of the fraction; 0 if all rays have the same outcome.
     fn fraction_variance(&self) -> f32 {
         self.tally().variance(0.0) / self.shot.max(1) as f32
     }
 
-    /// Standard error of the fraction as far as so few rays can tell, with half a hit and half a miss more: so that it is
-    /// above 0 where all agree.
+    /// Standard error of the fraction, with half a hit and half a miss added, so that it is above 0 even if all rays
+    /// have the same outcome.
     pub(super) fn fraction_doubt(&self) -> f32 {
         (self.tally().variance(1.0) / (self.shot as f32 + 1.0)).sqrt()
     }
@@ -265,7 +269,7 @@ mod tests {
     use super::*;
     use crate::geometry::Random;
 
-    /// What rays find one after the other.
+    /// Tally of successive outcomes.
     fn tally(outcomes: impl Iterator<Item = bool>) -> Tally {
         let (mut tally, mut changes) = (Tally::default(), Outcomes::default());
         for is_visible in outcomes {
@@ -278,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_rays_that_strata_do_not_tell_apart_is_that_of_independent_ones() {
+    fn the_noise_of_rays_without_a_pattern_is_that_of_independent_ones() {
         let mut random = Random::new(1, 0);
         for part in [0.1, 0.5, 0.8] {
             let variance = tally((0..20_000).map(|_| random.uniform() < part)).variance(0.0);
@@ -291,13 +295,13 @@ mod tests {
     }
 
     #[test]
-    fn noise_within_strata_is_estimated_and_not_that_among_them() {
+    fn the_noise_within_strata_is_estimated_and_not_that_among_them() {
         const STRATA: u32 = 32;
         let mut random = Random::new(2, 0);
         let (mut error, mut estimate) = (0.0, 0.0);
         const TRIALS: u32 = 4000;
         for _ in 0..TRIALS {
-            // A shadow that covers the light from one place to another.
+            // A shadow over a random interval of the light.
             let ends = [0.1, 0.6].map(|end| end + 0.2 * random.uniform());
             let is_visible = |stratum: u32| {
                 let at = (stratum as f32 + random.uniform()) / STRATA as f32;

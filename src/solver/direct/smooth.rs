@@ -1,9 +1,9 @@
-//! Shadow fractions smoothed over the mesh, as far as their own noise explains how neighbours differ.
+//! Visible fractions smoothed over the mesh, as far as their noise explains differences of neighbours.
 //!
-//! A few shadow rays leave a grain in penumbrae, which triangles draw out into streaks. Neighbouring vertices of a
-//! smooth surface see nearly the same fraction of the light, so they exchange some of it: fully while they differ by no
-//! more than the noise of the surer one, and less the further they are off. What one gives the other takes, so that where few
-//! rays get through, vertices that saw nothing make up for those that saw too much.
+//! A few shadow rays leave grain in penumbrae, which triangles stretch into streaks. Neighbouring vertices of a smooth
+//! surface have nearly the same visible fraction, so they exchange part of the difference: fully while it is below the
+//! smaller standard error of both, and less the larger it is. The exchange conserves the sum, so that where few rays
+//! are visible, the smoothed light has no bias.
 
 use glam::Vec4;
 
@@ -13,13 +13,14 @@ use crate::{
     solver::places::agreement,
 };
 
-/// Rounds of averaging. None leaves visible grain, many widen narrow penumbrae and draw their borders as saw teeth.
+/// Rounds of smoothing. Fewer leave visible grain; more widen narrow penumbrae and draw their borders as saw teeth.
 const ROUNDS: u32 = 1;
 
-/// Standard errors by which neighbours may differ before they count by half. Smaller leaves grain, larger blurs borders.
+/// Difference at which neighbours exchange half, in standard errors. Smaller leaves grain; larger blurs borders.
 const HALF_DEVIATIONS: f32 = 3.0;
 
-/// Weight of a vertex's own value; each neighbour that agrees has 2, since inner edges belong to two elements.
+/// Weight of a vertex's own value; each neighbour that agrees has 2, since inner edges belong to two elements. Smaller
+/// blurs borders; larger leaves grain.
 const OWN_WEIGHT: f32 = 2.0;
 
 /// The visible fraction at one vertex.
@@ -28,13 +29,13 @@ struct Fraction {
     color: Vec4,
     /// Mean over the colours.
     mean: f32,
-    /// Square of the standard error of the mean; above 0 where all rays agree.
+    /// Square of the standard error of the mean; above 0 even if all rays have the same outcome.
     variance: f32,
-    /// Whether some rays got through and others did not.
+    /// Whether some rays are visible and others are not.
     is_mixed: bool,
 }
 
-/// Visible fractions of the vertices, by colour; those of vertices without samples are 0.
+/// Smoothed visible fractions of the vertices, by colour; 0 for vertices without samples.
 pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) -> Vec<Vec4> {
     let mut fractions: Vec<Fraction> = samples
         .iter()
@@ -69,7 +70,7 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
         .collect()
 }
 
-/// One round of exchange. The variance stays that of the rays: it says how far neighbours may differ.
+/// One round of exchange. The variance remains that of the rays.
 fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
     let weight = |a: Fraction, b: Fraction| {
         let variance = 2.0 * a.variance.min(b.variance);
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_vertex_loses_its_neighbours_gain() {
+    fn smoothing_conserves_the_sum() {
         let fractions = [fraction(0.0, 8.0), fraction(0.125, 8.0), fraction(0.0, 8.0)];
         let smoothed = round(&fractions, &[[0, 1], [1, 2]]);
         let sum: f32 = smoothed.iter().map(|fraction| fraction.mean).sum();
@@ -124,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn hardly_anything_leaks_into_what_many_rays_found_dark() {
+    fn hardly_any_light_leaks_to_vertices_that_many_rays_found_dark() {
         let fractions = [fraction(0.0, 32.0), fraction(0.5, 32.0)];
         let smoothed = round(&fractions, &[[0, 1]]);
         assert!(smoothed[0].mean < 0.01, "{}", smoothed[0].mean);

@@ -1,4 +1,4 @@
-//! The elements with the light that falls on them straight from emitters.
+//! The elements with their direct light.
 
 use std::f32::consts::PI;
 
@@ -11,18 +11,17 @@ use crate::{
     solver::sums::ordered_sum,
 };
 
-/// The elements with the light that falls on them straight from emitters: what stays as it is while light is exchanged over
-/// links.
+/// The elements with their direct light: the constant part of the exchange of light over links.
 #[derive(Clone, Copy)]
 pub(crate) struct Surfaces<'a> {
     /// The elements, with their reflectance and emission.
     pub(crate) hierarchy: &'a Hierarchy,
-    /// `None` where no emitter is sampled.
+    /// `None` if no emitter is sampled.
     pub(crate) direct: Option<&'a DirectField>,
 }
 
 impl<'a> Surfaces<'a> {
-    /// The elements of a hierarchy with a field of direct light, where there is one.
+    /// The elements of a hierarchy with a field of direct light, if there is one.
     pub(crate) fn new(hierarchy: &'a Hierarchy, direct: &'a Option<DirectField>) -> Self {
         Self {
             hierarchy,
@@ -30,13 +29,13 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Direct irradiance of a leaf, by samples.
+    /// Direct irradiance of a leaf, W/m²; 0 without a field.
     pub(crate) fn direct(&self, element: usize) -> Vec4 {
         self.direct
             .map_or(Vec4::ZERO, |field| field.element(self.hierarchy, element))
     }
 
-    /// The same of all leaves; 0 for other elements.
+    /// The same by element; 0 for elements that are not leaves.
     pub(crate) fn direct_of_leaves(&self) -> Vec<Vec4> {
         let elements = self.hierarchy.mesh.elements.par_iter().enumerate();
         elements
@@ -57,8 +56,8 @@ impl<'a> Surfaces<'a> {
             .is_some_and(|field| field.lights.is_sampled(patch))
     }
 
-    /// Radiosity of a leaf under some irradiance, but for emission that is sampled, and with an active share of 1: nothing where it lies
-    /// within a solid.
+    /// Radiosity of a leaf under this irradiance, without sampled emission, W/m², with an active share of 1; all 0
+    /// inside a solid.
     pub(crate) fn radiosity(&self, element: usize, irradiance: Vec4) -> Vec4 {
         if self.hierarchy.mesh.elements[element].is_inside_solid() {
             return Vec4::ZERO;
@@ -72,7 +71,7 @@ impl<'a> Surfaces<'a> {
         (reflected + emitted).extend(1.0)
     }
 
-    /// Power of the emitters that no link carries, summed over the colours.
+    /// Power of the sampled emitters, summed over the colours.
     pub(crate) fn sampled_power(&self) -> f64 {
         let Some(field) = self.direct else {
             return 0.0;
@@ -84,7 +83,8 @@ impl<'a> Surfaces<'a> {
         field.lights.sampled_patches().map(of_patch).sum()
     }
 
-    /// No more power than this can be under way: what is emitted, if everything reflected as the brightest surface does.
+    /// Upper bound of the total power, summed over the colours: the emitted power, if all surfaces reflected as the
+    /// brightest one does.
     pub(crate) fn most_power(&self) -> f64 {
         let patches = &self.hierarchy.patches;
         let brightest = self.hierarchy.largest_reflectance();

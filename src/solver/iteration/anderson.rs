@@ -1,8 +1,8 @@
 //! Anderson acceleration of a fixed point `x = g(x)` over colours (Anderson 1965; Walker & Ni 2011).
 //!
-//! Of the last few iterates the combination is taken whose residual `g(x) − x` would be smallest if `g` were linear.
-//! Each colour channel has coefficients of its own, since channels hardly know of each other. Sums are in double
-//! precision and in fixed order, so that the same values come out on any number of threads.
+//! The next iterate is the combination of the last few whose residual `g(x) − x` would be smallest if `g` were linear.
+//! Each colour channel has its own coefficients, since channels hardly depend on each other. Sums are in double
+//! precision and in fixed order, so that the result is the same on any number of threads.
 
 use std::collections::VecDeque;
 
@@ -14,20 +14,21 @@ use crate::{hierarchy::Channels as _, solver::sums::ordered_sum};
 /// Values that one task combines.
 const CHUNK: usize = 4096;
 
-/// A direction whose part that is new, squared, is a smaller share than this adds nothing but rounding.
-/// Larger, and slow modes are thrown away; smaller, and single precision is amplified.
+/// Smallest squared share of a direction that is independent of the newer ones; other directions are omitted. Larger,
+/// and slow modes are lost; smaller, and rounding of single precision is amplified.
 const LEAST_NEW: f64 = 1e-10;
 
-/// Iterates that differ by a smaller share of all light than this differ by rounding.
+/// Smallest change of an iterate, as a share of all light, from which a contraction is measured. Smaller, and rounding
+/// counts; larger, and fast iterations have none.
 const LEAST_CHANGE: f64 = 1e-5;
 
-/// Differences between two successive iterates, and between their images.
+/// Differences between the residuals of two successive iterates, and between their images.
 struct Change {
     residual: Vec<Vec3>,
     image: Vec<Vec3>,
 }
 
-/// The memory of an accelerated iteration.
+/// State of an accelerated iteration.
 pub(crate) struct Anderson {
     depth: usize,
     changes: VecDeque<Change>,
@@ -36,7 +37,7 @@ pub(crate) struct Anderson {
 }
 
 impl Anderson {
-    /// Without memory. With a depth of 0 the iteration is the plain one.
+    /// Before the first iterate; `depth` iterates are remembered. With 0 the iteration is not accelerated.
     pub(crate) fn new(depth: usize) -> Self {
         Self {
             depth,
@@ -45,13 +46,13 @@ impl Anderson {
         }
     }
 
-    /// Bytes that the memory grows to for so many values.
+    /// Largest memory in bytes for `count` values.
     pub(crate) const fn memory_bytes(depth: usize, count: usize) -> usize {
         2 * (depth + 1) * count * size_of::<Vec3>()
     }
 
-    /// The next iterate from the present one and its image; not negative, and with the image's fourth channel.
-    /// `weights` are the shares by which squares are summed.
+    /// The next iterate from the present one and its image: finite, not negative, and with the image's fourth channel.
+    /// `weights` are those of the sums of squares.
     pub(crate) fn next(&mut self, weights: &[f32], at: &[Vec4], image: &[Vec4]) -> Vec<Vec4> {
         let residual = map(image, at, |image, at| (image - at).color());
         let image_colors: Vec<Vec3> = image.par_iter().map(|image| image.color()).collect();
@@ -86,8 +87,8 @@ impl Anderson {
             .collect()
     }
 
-    /// Ratio of the last two images' distance to that of the iterates: below 1 where the iteration contracts. Nothing
-    /// before the second iterate, or where iterates differ by rounding only.
+    /// Ratio of the distance between the last two images to that between the iterates: below 1 where the iteration
+    /// contracts. `None` before the second iterate, or if iterates differ by rounding only.
     pub(super) fn contraction(&self, weights: &[f32]) -> Option<f32> {
         let change = self.changes.back()?;
         let (_, image) = self.last.as_ref()?;
@@ -103,7 +104,7 @@ impl Anderson {
         is_measurable.then(|| (between_images / between_iterates) as f32)
     }
 
-    /// How much of each remembered change to take back, by channel: the least squares solution of
+    /// The share of each remembered change to subtract, by channel: the least squares solution of
     /// `residual = Σ share · change of the residual`.
     fn shares(&self, weights: &[f32], residual: &[Vec3]) -> Vec<Vec3> {
         let count = self.changes.len();
@@ -129,7 +130,7 @@ impl Anderson {
     }
 }
 
-/// Element by element.
+/// A function of two slices, element by element.
 fn map<A: Copy + Sync, B: Copy + Sync>(
     first: &[A],
     second: &[B],
@@ -150,18 +151,18 @@ fn weighted_product(weights: &[f32], first: &[Vec3], second: &[Vec3]) -> DVec3 {
     })
 }
 
-/// Solve symmetric equations by elimination. What depends on those before it is left out, and gets 0; so does
-/// everything where a number is not finite.
+/// Solve symmetric equations by elimination. Unknowns that depend on others are omitted and get 0; all get 0 if a
+/// number is not finite.
 fn solve(
     count: usize,
     entry: impl Fn(usize, usize) -> f64,
     right: impl Fn(usize) -> f64,
 ) -> Vec<f64> {
-    // Newest first, so that old directions are those left out; scaled to a unit diagonal.
+    // Newest first, so that old directions are omitted; scaled to a unit diagonal.
     let order: Vec<usize> = (0..count).rev().collect();
     let scale: Vec<f64> = order.iter().map(|&i| entry(i, i).max(0.0).sqrt()).collect();
     let scaled = |value: f64, by: f64| if by > 0.0 { value / by } else { 0.0 };
-    // The matrix with the right side beside it.
+    // The matrix, augmented by the right side.
     let mut rows: Vec<Vec<f64>> = (0..count)
         .map(|i| {
             (0..count)
@@ -170,7 +171,7 @@ fn solve(
                 .collect()
         })
         .collect();
-    // Eliminate what is below the diagonal.
+    // Eliminate the entries below the diagonal.
     let mut used = vec![false; count];
     for pivot in 0..count {
         used[pivot] = rows[pivot][pivot] > LEAST_NEW;
@@ -193,7 +194,7 @@ fn solve(
             .sum();
         solution[pivot] = (rows[pivot][count] - known) / rows[pivot][pivot];
     }
-    // Back in the order and the scale that they came in.
+    // Restore order and scale.
     let mut shares = vec![0.0; count];
     for (position, &index) in order.iter().enumerate() {
         shares[index] = scaled(solution[position], scale[position]);
@@ -238,8 +239,8 @@ mod tests {
         panic!("no end");
     }
 
-    /// A closed scene: rows add to `reflectance`, so that the solution is 1 / (1 − reflectance) everywhere.
-    fn closed(reflectance: f32, seed: u64) -> (Vec<Vec<f32>>, Vec<f32>) {
+    /// An enclosure: rows add to `reflectance`, so that the solution is 1 / (1 − reflectance) everywhere.
+    fn enclosure(reflectance: f32, seed: u64) -> (Vec<Vec<f32>>, Vec<f32>) {
         let mut random = Random::new(seed, 0);
         let matrix = (0..40)
             .map(|_| {
@@ -254,7 +255,7 @@ mod tests {
     #[test]
     fn white_walls_take_few_sweeps() {
         for seed in 0..20 {
-            let (matrix, expected) = closed(0.999, seed);
+            let (matrix, expected) = enclosure(0.999, seed);
             let (plain, _) = sweeps(&matrix, &expected, 0);
             let (accelerated, _) = sweeps(&matrix, &expected, 3);
             assert!(plain > 5000, "seed {seed}: {plain}");
@@ -264,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_chain_of_rooms_takes_few_sweeps() {
-        // Light walks from room to room: slow modes of many shapes, not one.
+        // Light passes from room to room: there are several slow modes.
         let count = 12;
         let mut matrix = vec![vec![0.0; count]; count];
         for room in 0..count {
@@ -288,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_directions_are_left_out() {
+    fn dependent_directions_are_omitted() {
         let matrix = [[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 0.0]];
         let right = [2.0, 1.0, 0.0];
         let found = solve(3, |i, j| matrix[i][j], |i| right[i]);

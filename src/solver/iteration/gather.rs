@@ -1,8 +1,8 @@
-//! One sweep: light gathered over all links, then pushed down to the leaves.
+//! One sweep: light is gathered over all links, then pushed down to the leaves.
 //!
-//! Clusters collect the vector irradiances of their links as moments, elements as plain irradiance. Pushing adds what a
-//! cluster has to its children and lets each face take its share by its own normal (eq. 15), for all links at once.
-//! The paper's other way, each vector pushed to each face at once, is [`Push::AtOnce`].
+//! Clusters sum the vector irradiances of their links as moments, elements as irradiance. Pushing adds the moments of a
+//! cluster to those of its children, and projects them to the normal of each face (eq. 15), for all links together.
+//! The paper's other way, pushing each vector to each face at once, is [`Push::AtOnce`].
 
 use glam::Vec4;
 use rayon::prelude::*;
@@ -13,29 +13,28 @@ use crate::{
     transport::{Kernel, LinkStore, self_irradiance},
 };
 
-/// Nodes that one task gathers for.
+/// Fewest nodes for which one task gathers.
 const TASK_NODES: usize = 256;
 
-/// Clusters with links that one task gathers for.
-const TASK_HOLDERS: usize = 32;
+/// Fewest linked clusters for which one task gathers.
+const TASK_CLUSTERS: usize = 32;
 
-/// The clusters that have links of their own, for all sweeps over these links: most have none, and what is pushed passes
-/// them by.
-pub(super) struct Holders {
+/// The clusters that receive over links of their own, the same for all sweeps. Most clusters have none and are skipped.
+pub(super) struct LinkedClusters {
     /// The clusters, parents before children.
     clusters: Vec<u32>,
-    /// For each, the place in this list of the nearest one above it, or [`Self::NONE`].
+    /// For each, the index in `clusters` of its nearest ancestor there, or [`Self::NONE`].
     above: Vec<u32>,
-    /// By patch, the place of the nearest one that it belongs to, or [`Self::NONE`].
+    /// By patch, the index in `clusters` of the smallest one that contains it, or [`Self::NONE`].
     of_patch: Vec<u32>,
 }
 
-impl Holders {
+impl LinkedClusters {
     const NONE: u32 = u32::MAX;
 
-    /// Those of some links.
+    /// The linked clusters of some links.
     pub(crate) fn new(hierarchy: &Hierarchy, links: &LinkStore) -> Self {
-        let mut holders = Self {
+        let mut linked_clusters = Self {
             clusters: Vec::new(),
             above: Vec::new(),
             of_patch: vec![Self::NONE; hierarchy.patches.len()],
@@ -45,24 +44,24 @@ impl Holders {
             let above = nearest.get(cluster.parent as usize).copied();
             nearest[index] = above.unwrap_or(Self::NONE);
             if !links.of(NodeId(index as u32)).is_empty() {
-                holders.above.push(nearest[index]);
-                nearest[index] = holders.clusters.len() as u32;
-                holders.clusters.push(index as u32);
+                linked_clusters.above.push(nearest[index]);
+                nearest[index] = linked_clusters.clusters.len() as u32;
+                linked_clusters.clusters.push(index as u32);
             }
             if cluster.is_leaf() {
-                holders.of_patch[cluster.patches()].fill(nearest[index]);
+                linked_clusters.of_patch[cluster.patches()].fill(nearest[index]);
             }
         }
-        holders
+        linked_clusters
     }
 }
 
-/// Irradiance of every element, leaves and their parents alike (eqs 14 and 15), without direct samples. `None` when
-/// cancelled.
+/// Linked irradiance of every element, leaves and their ancestors (eqs 14 and 15), with the sum of form factors in the
+/// fourth channel. `None` when cancelled.
 pub(super) fn gather(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    holders: &Holders,
+    linked_clusters: &LinkedClusters,
     push: Push,
     cancel: &Cancel,
 ) -> Option<Vec<Vec4>> {
@@ -70,7 +69,7 @@ pub(super) fn gather(
     let mut irradiance = own_irradiance(kernel, links, cancel);
     cancel.proceed()?;
     let from_clusters = match push {
-        Push::Combined => push_moments(kernel, links, holders, cancel)?,
+        Push::Combined => push_moments(kernel, links, linked_clusters, cancel)?,
         Push::AtOnce => push_at_once(kernel, links, cancel),
     };
     cancel.proceed()?;
@@ -88,7 +87,7 @@ pub(super) fn gather(
     Some(irradiance)
 }
 
-/// What elements receive over their own links; nothing where cancelled.
+/// Irradiance of elements over their own links; incomplete when cancelled.
 fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let base = hierarchy.clusters.len() as u32;
@@ -118,21 +117,20 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
         .collect()
 }
 
-/// What patches receive from the links of clusters, through the moments of all clusters above them. `None` when
-/// cancelled.
+/// Irradiance of patches over the links of clusters, by the moments of all their ancestors. `None` when cancelled.
 fn push_moments(
     kernel: Kernel<'_>,
     links: &LinkStore,
-    holders: &Holders,
+    linked_clusters: &LinkedClusters,
     cancel: &Cancel,
 ) -> Option<Vec<Vec4>> {
     let hierarchy = kernel.hierarchy;
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
-    // What each cluster receives over its own links.
-    let mut incident: Vec<Moments<Vec4>> = holders
+    // The moments of each cluster over its own links.
+    let mut incident: Vec<Moments<Vec4>> = linked_clusters
         .clusters
         .par_iter()
-        .with_min_len(TASK_HOLDERS)
+        .with_min_len(TASK_CLUSTERS)
         .map(|&index| {
             if cancel.is_cancelled() {
                 return Moments::default();
@@ -141,20 +139,20 @@ fn push_moments(
         })
         .collect();
     cancel.proceed()?;
-    // Those above come first, with all that is above them.
-    for (place, &above) in holders.above.iter().enumerate() {
-        if above != Holders::NONE {
+    // Add the moments of the ancestors: these come first and are complete.
+    for (place, &above) in linked_clusters.above.iter().enumerate() {
+        if above != LinkedClusters::NONE {
             let above = incident[above as usize];
             incident[place].merge(&above);
         }
     }
-    // The share that each patch takes by its normal.
+    // The irradiance of each patch by its normal.
     let active = hierarchy.active_patches();
     let project = |patch: usize| {
-        let holder = incident.get(holders.of_patch[patch] as usize);
-        match holder {
-            Some(holder) if active.contains(&patch) => {
-                holder.project(hierarchy.patches[patch].normal, reading)
+        let nearest = incident.get(linked_clusters.of_patch[patch] as usize);
+        match nearest {
+            Some(nearest) if active.contains(&patch) => {
+                nearest.project(hierarchy.patches[patch].normal, reading)
             }
             _ => Vec4::ZERO,
         }
@@ -167,7 +165,7 @@ fn push_moments(
     Some(pushed)
 }
 
-/// The vector irradiances of all links of one cluster.
+/// Sum of the vector irradiances of all links of one cluster.
 fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Moments<Vec4> {
     let hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
@@ -187,7 +185,7 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     sum
 }
 
-/// What patches receive from the links of clusters, each vector pushed by itself; nothing where cancelled.
+/// Irradiance of patches over the links of clusters, each vector pushed separately; incomplete when cancelled.
 fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<Vec4> {
     let hierarchy = kernel.hierarchy;
     let leaves: Vec<usize> = (0..hierarchy.clusters.len())
@@ -225,7 +223,7 @@ fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<V
     irradiance
 }
 
-/// Eq. 15 for one link of a cluster and some of its patches.
+/// Add the irradiance over one link of a cluster to some of its patches (eq. 15).
 fn push_one(
     kernel: Kernel<'_>,
     cluster: usize,

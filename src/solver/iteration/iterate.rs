@@ -1,6 +1,6 @@
-//! The iteration: light gathered over the links that there are, until it settles.
+//! The iteration: light is gathered over the links until it converges.
 //!
-//! Compared on furnaces and on rooms painted white, to a residual of 1e-4, in sweeps of the first step:
+//! Sweeps of the first step to a residual of 1e-4, in furnaces and in white rooms:
 //!
 //! | scene | plain | Anderson 1 | 2 | 3 | 5 |
 //! |---|---|---|---|---|---|
@@ -10,126 +10,131 @@
 //! | `cornell`, all 0.999 | 55 | 31 | 16 | 15 | 11 |
 //! | `room-1022`, all 0.999 (worst of three steps) | over 100 | over 100 | 86 | 30 | 24 |
 //!
-//! Chebyshev's iteration over 0…reflectance took 7 and 16 sweeps in furnaces of 0.5 and 0.9 and diverged elsewhere:
-//! the operator has eigenvalues below 0 too, and nothing cheap bounds them. GMRES on differences did not settle in 60
-//! sweeps even at 0.5: its directions have both signs, and bounded tables do not answer those linearly. Anderson's
-//! combinations stay near light that can be.
+//! Chebyshev's iteration over 0…reflectance took 7 and 16 sweeps in furnaces of 0.5 and 0.9 and diverged elsewhere: the
+//! operator also has negative eigenvalues without a cheap bound. GMRES on differences did not converge in 60 sweeps
+//! even at 0.5: its directions have both signs, for which bounded tables are not linear. Anderson's combinations stay
+//! near physical light.
 
 use glam::Vec4;
 use rayon::prelude::*;
 
 use super::{
     anderson::Anderson,
-    gather::{self, Holders},
+    gather::{self, LinkedClusters},
     light::LinkedLight,
 };
 use crate::{
     hierarchy::Hierarchy,
-    solver::{Cancel, SolveSettings, coverage::Closures, direct::Surfaces, sums::area_total},
+    solver::{
+        Cancel, Note, SolveSettings, coverage::CoverageMap, direct::Surfaces, sums::area_total,
+    },
 };
 
-/// Iterates that acceleration remembers: 24 bytes each for every element. See above; below 3 white rooms take many
-/// sweeps, above 5 little is gained.
+/// Iterates that acceleration remembers, with 24 bytes each for every element (see above). Smaller than 3, and white
+/// rooms take many sweeps; larger than 5, and little is gained.
 const DEPTH: usize = 4;
 
-/// Sweeps of one step at most. Fewer, and mazes of white walls stop early; more, and an iteration that does not settle
+/// Most sweeps of one step. Fewer, and mazes of white walls stop early; more, and an iteration that does not converge
 /// is given up late.
 const MOST_SWEEPS: u32 = 100;
 
-/// Residuals below this are rounding of single precision: sweeps cannot lower them.
+/// Residual below which the light counts as converged for any tolerance: that of single precision. Smaller is never
+/// reached; larger ignores small tolerances.
 const ROUNDING: f64 = 2e-7;
 
-/// A sweep may return this share more light than was sent before it counts as growth: noise of direct light and
-/// rounding. Surfaces that reflect less than all they get return less.
+/// Relative excess of the returned over the sent power from which a sweep counts as growing. Smaller, and noise of
+/// direct light and rounding count; larger, and growth is noticed late.
 const GROWTH_SLACK: f64 = 1e-3;
 
-/// Unscaled links may return this share more than is sent before it is worth a note: visibility is noisy.
+/// Relative excess of the power that unscaled links return from which a note is made. Smaller, and noise of the
+/// visibility counts; larger, and links that create energy stay unnoticed.
 const UNSCALED_SLACK: f64 = 0.02;
 
-/// Sweeps in a row that must return more than was sent: of uneven light, single sweeps may.
+/// Successive growing sweeps after which the light counts as growing. Fewer, and single sweeps of uneven light count;
+/// more, and growth is noticed late.
 const GROWING_SWEEPS: u32 = 5;
 
-/// Factor by which all light may exceed what emitters can keep up, for the noise of direct light.
+/// Factor by which the power may exceed the largest possible one. Smaller, and noise of direct light counts as growth;
+/// larger, and growth is noticed late.
 pub(crate) const CEILING_SLACK: f64 = 1.1;
 
-/// What an iteration needs beside the light.
+/// Input of an iteration, beside the light.
 #[derive(Clone, Copy)]
 pub(crate) struct Iteration<'a> {
-    /// What exchanges light.
+    /// The elements, with their direct light.
     pub surfaces: Surfaces<'a>,
-    /// What form factors are scaled to.
-    pub closures: &'a Closures,
+    /// Coverage to which form factors are scaled.
+    pub coverage: &'a CoverageMap,
     /// How tables are read and irradiance is pushed.
     pub settings: &'a SolveSettings,
-    /// To which part of the power the light must settle, as the tolerance of the settings is.
+    /// Residual at which the light counts as converged, relative to the total power.
     pub tolerance: f32,
-    /// Stops it.
+    /// The request to stop.
     pub cancel: &'a Cancel,
 }
 
-/// How an iteration went.
+/// Figures of an iteration.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Convergence {
-    /// Sweeps that it took.
+    /// Number of sweeps.
     pub sweeps: u32,
-    /// What the last sweep changed, relative to the power that arrived.
+    /// Change of power by the last sweep, relative to the power that arrived.
     pub residual: f32,
-    /// Largest ratio by which a sweep changed the distance of two lights; 0 where nothing tells it.
+    /// Largest contraction (see [`Anderson::contraction`]); 0 if none was measured.
     pub contraction: f32,
-    /// What had to be done to keep it stable, one sentence each.
-    pub notes: Vec<String>,
+    /// Measures to stay stable.
+    pub notes: Vec<Note>,
 }
 
-/// What one sweep did to the light.
+/// Result of one sweep.
 struct Sweep {
-    /// Irradiance of all elements after it.
+    /// Linked irradiance of all elements after it.
     image: Vec<Vec4>,
     /// Power that was sent, over links and from sampled emitters.
     sent: f64,
-    /// Power that was reflected of what arrived.
+    /// The reflected part of the power that arrived.
     returned: f64,
-    /// As `returned`, had the links not been scaled to the closure.
+    /// As `returned`, without scaling to the coverage.
     returned_unscaled: f64,
     /// Power that arrived, direct light included.
     arrived: f64,
-    /// Sum of the changes of power.
+    /// Sum of the absolute changes of power.
     change: f64,
 }
 
 /// How the iteration ended.
 enum Ending {
-    /// It settled.
-    Settled,
-    /// It did not settle within the sweeps that it has.
-    Unsettled,
-    /// Each sweep made light.
+    /// The light converged.
+    Converged,
+    /// The light did not converge within [`MOST_SWEEPS`].
+    NotConverged,
+    /// Sweeps created light.
     Growing,
 }
 
-/// Gather, push and pull until the light settles. Where it grows instead, rows are bounded, and light gets through as area
-/// does; where even that does not help, the light from before stays. `None` when cancelled.
+/// Gather, push and pull until the light converges. If it grows instead, it is iterated again with sums of form factors
+/// bounded by 1 and the visibility of the area for all light; if it still grows, the light from before stays. `None`
+/// when cancelled.
 pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Option<Convergence> {
     let before = linked.irradiance.clone();
     let mut convergence = Convergence::default();
     for bounds_rows in [false, true] {
-        match settle(linked, iteration, bounds_rows, &mut convergence)? {
-            Ending::Settled => break,
-            Ending::Unsettled => {
-                convergence.notes.push(format!(
-                    "the iteration has not converged after {} sweeps: the residual is {:.1e}",
-                    convergence.sweeps, convergence.residual
-                ));
+        match converge(linked, iteration, bounds_rows, &mut convergence)? {
+            Ending::Converged => break,
+            Ending::NotConverged => {
+                convergence.notes.push(Note::NotConverged {
+                    sweeps: convergence.sweeps,
+                    residual: convergence.residual,
+                });
                 break;
             }
             Ending::Growing => {
                 linked.irradiance.clone_from(&before);
                 linked.pull(iteration.surfaces);
                 linked.links.level(iteration.surfaces.hierarchy);
-                convergence.notes.push(if bounds_rows {
-                    "the light still grows: that of the last step stays".to_owned()
-                } else {
-                    "the light grows from sweep to sweep: form factors of each element are bounded by 1"
-                        .to_owned()
+                convergence.notes.push(match bounds_rows {
+                    false => Note::GrowthBounded,
+                    true => Note::GrowthUnbounded,
                 });
             }
         }
@@ -137,8 +142,8 @@ pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Opt
     Some(convergence)
 }
 
-/// One iteration, with or without a bound on the sums of form factors.
-fn settle(
+/// One iteration, with or without a bound of the sums of form factors.
+fn converge(
     linked: &mut LinkedLight,
     iteration: Iteration<'_>,
     bounds_rows: bool,
@@ -150,18 +155,18 @@ fn settle(
         cancel,
         ..
     } = iteration;
-    // What is the same in all sweeps.
+    // The same in all sweeps.
     let hierarchy = surfaces.hierarchy;
     let weights = leaf_areas(hierarchy);
-    let holders = Holders::new(hierarchy, &linked.links);
+    let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let direct = surfaces.direct_of_leaves();
     let ceiling = CEILING_SLACK * surfaces.most_power();
     let mut acceleration = Anderson::new(DEPTH);
     let mut growing = 0;
     for _ in 0..MOST_SWEEPS {
-        // Gather, and let the acceleration propose the next light.
+        // Gather, and find the accelerated light.
         cancel.proceed()?;
-        let sweep = sweep(linked, iteration, &holders, &direct, bounds_rows)?;
+        let sweep = sweep(linked, iteration, &linked_clusters, &direct, bounds_rows)?;
         convergence.sweeps += 1;
         cancel.proceed()?;
         let next = acceleration.next(&weights, &linked.irradiance, &sweep.image);
@@ -174,54 +179,60 @@ fn settle(
         if let Some(ratio) = acceleration.contraction(&weights) {
             convergence.contraction = convergence.contraction.max(ratio);
         }
-        // Give up where sweeps make light.
+        // Stop where sweeps create light.
         growing = if sweep.returned > sweep.sent * (1.0 + GROWTH_SLACK) {
             growing + 1
         } else {
             0
         };
         let is_bounded = sweep.sent <= ceiling && sweep.returned.is_finite();
-        // Where rows are bounded, no place can get more than the brightest sends: only in sum it may, for a while.
+        // With bounded sums no irradiance exceeds the largest radiosity: only the total power may grow, for a while.
         if (growing >= GROWING_SWEEPS && !bounds_rows) || !is_bounded {
             return Some(Ending::Growing);
         }
-        // Go on from the proposed light, or end with what was gathered.
-        let is_settled = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
-        linked.irradiance = if is_settled { sweep.image } else { next };
+        // Continue with the accelerated light, or end with the gathered light.
+        let is_converged = residual <= ROUNDING || residual.max(error) <= f64::from(tolerance);
+        linked.irradiance = if is_converged { sweep.image } else { next };
         linked.pull(surfaces);
-        if is_settled {
+        if is_converged {
             note_unscaled_growth(convergence, sweep.returned_unscaled / sweep.sent);
-            return Some(Ending::Settled);
+            return Some(Ending::Converged);
         }
     }
-    Some(Ending::Unsettled)
+    Some(Ending::NotConverged)
 }
 
-/// Gather once, and measure what came of it beside the direct light of the leaves; `None` when cancelled.
+/// Gather once, and measure the result together with the direct light of the leaves; `None` when cancelled.
 fn sweep(
     linked: &LinkedLight,
     iteration: Iteration<'_>,
-    holders: &Holders,
+    linked_clusters: &LinkedClusters,
     direct: &[Vec4],
     bounds_rows: bool,
 ) -> Option<Sweep> {
     let Iteration {
         surfaces,
-        closures,
+        coverage,
         settings,
         tolerance: _,
         cancel,
     } = iteration;
     let hierarchy = surfaces.hierarchy;
     let kernel = linked.kernel(hierarchy, settings.method.reading());
-    let mut image = gather::gather(kernel, &linked.links, holders, settings.push, cancel)?;
+    let mut image = gather::gather(
+        kernel,
+        &linked.links,
+        linked_clusters,
+        settings.push,
+        cancel,
+    )?;
     let returned = |image: &[Vec4]| {
         area_total(hierarchy, |leaf| {
             hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])
         })
     };
     let returned_unscaled = returned(&image);
-    closures.scale(hierarchy, &linked.power, &mut image, bounds_rows);
+    coverage.scale(hierarchy, &linked.power, &mut image, bounds_rows);
     cancel.proceed()?;
     Some(Sweep {
         sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf))
@@ -234,6 +245,7 @@ fn sweep(
     })
 }
 
+/// Sum of the absolute differences of two irradiances, times area.
 fn power_between(hierarchy: &Hierarchy, a: &[Vec4], b: &[Vec4]) -> f64 {
     area_total(hierarchy, |leaf| (a[leaf] - b[leaf]).abs())
 }
@@ -252,17 +264,14 @@ fn leaf_areas(hierarchy: &Hierarchy) -> Vec<f32> {
         .collect()
 }
 
-/// Say so where only the scaling to the closure keeps the light from growing.
+/// Add a note if only the scaling to the coverage prevents growth.
 fn note_unscaled_growth(convergence: &mut Convergence, gain: f64) {
     if gain > 1.0 + UNSCALED_SLACK {
-        convergence.notes.push(format!(
-            "the links are too coarse to keep energy: by themselves they would return {gain:.2} times the light that \
-             is sent, sweep after sweep; scaled to the closure they do not"
-        ));
+        convergence.notes.push(Note::CoarseLinks { gain });
     }
 }
 
-/// Bytes that an iteration needs beside what a solve holds: its memory, the light before and after, and the direct light.
+/// Memory of an iteration in bytes, beside that of the solve: acceleration, light before and after, and direct light.
 pub(crate) const fn iteration_bytes(element_count: usize) -> usize {
     const VECTORS: usize = 4;
     Anderson::memory_bytes(DEPTH, element_count) + VECTORS * element_count * size_of::<Vec4>()

@@ -1,4 +1,4 @@
-//! Light over links, and what it is computed from.
+//! Light over links, with the links and tables from which it is computed.
 
 use glam::{Vec3, Vec4};
 
@@ -8,22 +8,23 @@ use crate::{
     transport::{Kernel, LinkStore},
 };
 
-/// Light over links, and what it is computed from.
+/// Light over links, with the links and tables from which it is computed.
 #[derive(Default)]
 pub(crate) struct LinkedLight {
-    /// Over which pairs of nodes light travels.
+    /// The pairs of nodes that exchange light.
     pub(crate) links: LinkStore,
-    /// Irradiance of every element over links, scaled so that form factors add to the closure; the fourth channel is their raw sum.
+    /// Linked irradiance of every element, scaled to the coverage, W/m²; the fourth channel is the unscaled sum of form
+    /// factors.
     pub(crate) irradiance: Vec<Vec4>,
-    /// By element, what its radiosity is multiplied by before links carry it (see `balance`); 1 without links.
+    /// Factor of the sent radiosity by element (see `balance`); 1 without links.
     pub(super) sending: Vec<f32>,
-    /// What links carry: reflected light, and emission where it is linked.
+    /// Source tables: reflected light, and emission that is not sampled.
     pub(crate) power: Tables,
 }
 
 impl LinkedLight {
-    /// New elements inherit the irradiance, and the factor of what they send, of the one that was divided; the first have
-    /// no light.
+    /// Give new elements the irradiance and the factor of the element that was divided; those of the first mesh are
+    /// dark.
     pub(crate) fn extend(&mut self, hierarchy: &Hierarchy) {
         for index in self.irradiance.len()..hierarchy.mesh.elements.len() {
             let parent = hierarchy.mesh.elements[index].parent as usize;
@@ -34,17 +35,17 @@ impl LinkedLight {
         }
     }
 
-    /// Irradiance of a leaf, direct light included.
+    /// Irradiance of a leaf, direct light included, W/m².
     pub(crate) fn total(&self, surfaces: Surfaces<'_>, leaf: usize) -> Vec4 {
         self.irradiance[leaf] + surfaces.direct(leaf)
     }
 
-    /// Radiosity of a leaf but for emission that is sampled, with an active share of 1: nothing where it lies within a solid.
+    /// Radiosity of a leaf without sampled emission, W/m², with an active share of 1; all 0 inside a solid.
     pub(crate) fn radiosity(&self, surfaces: Surfaces<'_>, leaf: usize) -> Vec4 {
         surfaces.radiosity(leaf, self.total(surfaces, leaf))
     }
 
-    /// Bring the source tables up to date with the irradiance of the leaves.
+    /// Update the source tables to the irradiance of the leaves.
     pub(crate) fn pull(&mut self, surfaces: Surfaces<'_>) {
         let (irradiance, sending) = (&self.irradiance, &self.sending);
         self.power.pull(surfaces.hierarchy, |leaf| {
@@ -52,7 +53,7 @@ impl LinkedLight {
         });
     }
 
-    /// What reads the source tables.
+    /// The kernel that reads the source tables.
     pub(crate) fn kernel<'a>(
         &'a self,
         hierarchy: &'a Hierarchy,
@@ -65,7 +66,8 @@ impl LinkedLight {
         }
     }
 
-    /// Tables of the square of the luminance that is sent: gathered over links, they tell how much rays to the same sources differ.
+    /// Tables of the squared luminance of the sent radiosity: gathered over links, they give the variance of the
+    /// radiosity that rays meet.
     pub(crate) fn squares(&self, hierarchy: &Hierarchy) -> Tables {
         let mut squares = Tables::default();
         squares.pull(hierarchy, |leaf| {
@@ -75,7 +77,8 @@ impl LinkedLight {
         squares
     }
 
-    /// Mean irradiance (luminance), to which thresholds relate. Before any link it is guessed from the direct light.
+    /// Mean irradiance (luminance), to which thresholds relate. Before any link it is estimated from the direct light
+    /// and the source tables.
     pub(crate) fn mean_irradiance(&self, surfaces: Surfaces<'_>) -> f32 {
         let hierarchy = surfaces.hierarchy;
         let mean = sums::scale(hierarchy, |leaf| self.total(surfaces, leaf));
@@ -86,11 +89,11 @@ impl LinkedLight {
         let power = sums::area_sum(hierarchy, |leaf| self.power.elements[leaf]);
         let power = power / hierarchy.importance.area.max(f64::MIN_POSITIVE);
         let brightest = self.power.brightest(hierarchy, Hierarchy::ROOT);
-        // Far surroundings send most of their light past the scene.
+        // Far emitters send most of their light past the scene.
         mean + luminance(power.as_vec3().extend(0.0)).min(luminance(brightest))
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         self.power.memory_bytes()
             + self.links.memory_bytes()

@@ -1,4 +1,4 @@
-//! Light over links: gathered, pushed, pulled, until it settles.
+//! Light over links: gathered, pushed and pulled until it converges.
 
 mod anderson;
 mod balance;

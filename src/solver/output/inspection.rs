@@ -1,13 +1,13 @@
-//! A question about a node and its answer: links, path, row sum. Plain values, for whoever draws them.
+//! A query about a node and its answer: links, path, sum of form factors.
 
 use glam::Vec3;
 
 use crate::hierarchy::NodeId;
 
-/// What to look into.
+/// The node to inspect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Subject {
-    /// The leaf below an element that holds a point: elements may be divided between a picture and a question.
+    /// The leaf of an element that contains a point: the element may be divided after the snapshot.
     Element {
         /// The element, as a node.
         node: NodeId,
@@ -18,7 +18,7 @@ pub enum Subject {
     Cluster(NodeId),
 }
 
-/// Where a node is, frame units.
+/// The position of a node, frame units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// The node.
@@ -27,65 +27,66 @@ pub struct Place {
     pub min: Vec3,
     /// Upper corner of its box.
     pub max: Vec3,
-    /// The point that stands for it.
+    /// Its centroid.
     pub centre: Vec3,
 }
 
-/// A link that lights what is inspected.
+/// A link that lights the inspected node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InspectedLink {
-    /// Where the light comes from; equal to the receiver for light within a cluster.
+    /// The sending node; equal to the receiver for light within a cluster.
     pub source: Place,
-    /// Who holds the link: what is inspected, or a node above it.
+    /// The receiver of the link: the inspected node or an ancestor.
     pub receiver: Place,
-    /// Unoccluded fraction, 0…1.
+    /// Factor of the unoccluded light (see [`Link::light_factor`](crate::transport::Link::light_factor)).
     pub visibility: f32,
-    /// Its share of the irradiance of what is inspected, W/m², linear RGB.
+    /// Its part of the irradiance of the inspected node, W/m², linear RGB.
     pub irradiance: Vec3,
-    /// Its share of the sum of form factors, visibility included.
+    /// Its part of the sum of form factors, visibility included.
     pub form_factor: f32,
-    /// Estimated error of the receiver's irradiance (luminance); infinite where it is not known.
+    /// Estimated error of the receiver's irradiance (luminance); infinite if it is unknown.
     pub error: f32,
 }
 
-/// One node on the way from the root.
+/// One node on the path from the root.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathNode {
-    /// Where it is.
+    /// Its position.
     pub place: Place,
-    /// Depth; the root has 0. Elements go on below the clusters.
+    /// Depth; the root has 0. Elements continue below the clusters.
     pub level: u32,
-    /// Patches below it, or `None` for an element.
+    /// Number of its patches, or `None` for an element.
     pub patch_count: Option<u32>,
     /// Area of its patches, or its own, square frame units.
     pub area: f32,
-    /// Luminance of the power that leaves it, over links and over samples, frame units.
+    /// Luminance of the power that leaves it, over links and by sampled emission, W/m² times square frame units.
     pub power: f32,
-    /// Where most of what links carry from it goes, a unit vector; +z where it goes everywhere alike.
+    /// Mean direction of the power that links carry from it, a unit vector; +z if it has none.
     pub main_direction: Vec3,
-    /// Lower and upper bound of the luminance of the power that links carry from it along that direction (eq. 8).
+    /// Lower and upper bound of the luminance of the projected power along that direction (eq. 8).
     pub power_bounds: [f32; 2],
-    /// Links that it receives over.
+    /// Number of links over which it receives.
     pub link_count: u32,
-    /// Sum of their estimated errors (luminance irradiance).
+    /// Sum of their estimated errors (luminance of the irradiance).
     pub error: f32,
 }
 
-/// The answer.
+/// The answer to a query.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
-    /// What was asked.
+    /// The query.
     pub subject: Subject,
     /// The last whole step.
     pub step: u32,
-    /// All links that light it, the strongest first.
+    /// All links that light the node, the strongest first.
     pub links: Vec<InspectedLink>,
-    /// Irradiance over links: the sum of their shares, W/m².
+    /// Irradiance over links: the sum of their parts, W/m².
     pub linked: Vec3,
-    /// Irradiance by samples, straight from emitters, W/m²; 0 for clusters.
+    /// Direct irradiance of sampled emitters, W/m²; 0 for clusters.
     pub direct: Vec3,
-    /// Sum of form factors. 1 for a leaf of a closed scene; a cluster also receives below itself, and has less.
+    /// Sum of form factors: about 1 for a leaf of an enclosed scene; less for a cluster, whose descendants have links
+    /// of their own.
     pub row_sum: f32,
-    /// From the root to what is inspected.
+    /// The path from the root to the inspected node.
     pub path: Vec<PathNode>,
 }

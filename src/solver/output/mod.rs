@@ -1,13 +1,15 @@
-//! Plain data handed out: what a solve shows and tells of itself.
+//! Plain data that a solve hands out: snapshots, reports, inspections, omissions.
 
 mod inspection;
-mod left_out;
+mod note;
+mod omitted;
 mod relit;
 mod snapshot;
 mod step_report;
 
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
-pub use left_out::LeftOut;
+pub use note::Note;
+pub use omitted::Omitted;
 pub use relit::Relit;
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, VertexLight};
 pub use step_report::StepReport;

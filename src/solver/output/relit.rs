@@ -1,15 +1,15 @@
-//! What relighting returns.
+//! The result of relighting.
 
 use super::step_report::StepReport;
 
-/// What came of relighting.
+/// The result of relighting.
 #[derive(Clone, Debug)]
 pub struct Relit {
-    /// The figures of the last step, but for what has changed.
+    /// The figures of the last step, updated.
     pub report: StepReport,
-    /// Whether [`Solver::finish_relighting`](crate::solver::Solver::finish_relighting) would tell more of the light within elements.
+    /// Whether [`Solver::finish_relighting`](crate::solver::Solver::finish_relighting) would improve the light within
+    /// elements.
     pub is_rough: bool,
-    /// Whether light reaches what was left out of the solve: it is missing, and only a solve that begins anew for these
-    /// appearances will show it.
+    /// Whether light reaches omitted patches: it is missing until a new solve is started for these appearances.
     pub needs_restart: bool,
 }

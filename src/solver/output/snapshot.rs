@@ -1,12 +1,13 @@
-//! What a solve shows of itself: a display mesh with light at its vertices and the cluster tree.
+//! The snapshot of a solve: a display mesh with light at its vertices, and the cluster tree.
 //!
-//! Parts that did not change between two snapshots are shared, so that a reader can tell by pointer what to upload.
+//! Parts that did not change between two snapshots are shared, so that a reader can compare pointers to find what
+//! changed.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::left_out::LeftOut;
+use super::omitted::Omitted;
 use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
@@ -22,7 +23,7 @@ pub struct DisplayMesh {
     pub reflectance: Vec<Vec3>,
     /// Emitted radiance at the vertex, likewise.
     pub emission: Vec<Vec3>,
-    /// What each material multiplies its textures by, or empty where that is as the scene says.
+    /// Appearance by material, which multiplies its textures; empty for that of the scene.
     pub appearances: Vec<Appearance>,
     /// Triangles, counter-clockwise from the lit side.
     pub indices: Vec<[u32; 3]>,
@@ -32,7 +33,7 @@ pub struct DisplayMesh {
     pub is_back: Vec<bool>,
     /// The element under each display triangle, as a node of the hierarchy.
     pub element_of: Vec<u32>,
-    /// The last vertices repeat these, with the texture coordinates of the other side of a seam.
+    /// The last vertices are copies of these, with the texture coordinates of the other side of a seam.
     pub repeated: Vec<u32>,
 }
 
@@ -41,13 +42,13 @@ pub struct DisplayMesh {
 pub struct VertexLight {
     /// Total irradiance, W/m².
     pub irradiance: Vec<Vec3>,
-    /// The part that comes straight from emitters, W/m².
+    /// The direct part, from sampled emitters, W/m².
     pub direct: Vec<Vec3>,
     /// Estimated error of the irradiance (luminance), W/m².
     pub uncertainty: Vec<f32>,
 }
 
-/// One node of the tree, for display.
+/// One cluster, for display.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClusterBox {
     /// Lower corner in frame units.
@@ -58,19 +59,19 @@ pub struct ClusterBox {
     pub level: u32,
     /// Index of the parent in the list, `u32::MAX` for the root.
     pub parent: u32,
-    /// Number of patches below it.
+    /// Number of its patches.
     pub patch_count: u32,
     /// Sum of the patch areas, square frame units.
     pub area: f32,
-    /// Luminance of the power that leaves it, over links and over samples, frame units.
+    /// Luminance of the power that leaves it, over links and by sampled emission, W/m² times square frame units.
     pub power: f32,
     /// 1 − |Σ S| / Σ |S| : 0 when all normals agree, 1 when they cancel.
     pub direction_spread: f32,
-    /// Links that this node receives over.
+    /// Number of links over which it receives.
     pub link_count: u32,
-    /// Links by which this node sends to others, or to itself.
+    /// Number of links over which it sends to others, or to itself.
     pub source_count: u32,
-    /// Sum of the estimated errors of the links that it receives over (luminance irradiance).
+    /// Sum of the estimated errors of the links over which it receives (luminance of the irradiance).
     pub error: f32,
     /// Luminance of the power along the box normals, +x −x +y −y +z −z.
     pub face_power: [f32; 6],
@@ -79,20 +80,20 @@ pub struct ClusterBox {
 /// The state after a step.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Number of the step, from 1; before that 0, when the light is that of sampled emitters alone.
+    /// Number of the step, from 1; 0 before the first step, when there is direct light only.
     pub step: u32,
-    /// The mesh; the same `Arc` as before where elements did not change.
+    /// The mesh; the same `Arc` as before if elements did not change.
     pub mesh: Arc<DisplayMesh>,
     /// Light at its vertices.
     pub light: Arc<VertexLight>,
-    /// The cluster tree, children after parents; patches and elements left out.
+    /// The clusters, parents before children, without patches and elements.
     pub clusters: Arc<Vec<ClusterBox>>,
-    /// What the scene does not need and was left out.
-    pub left_out: Arc<Vec<LeftOut>>,
+    /// The parts that the scene does not need.
+    pub omitted: Arc<Vec<Omitted>>,
 }
 
 impl Snapshot {
-    /// Whether there is light to show: after a step, or before the first where light was sampled.
+    /// Whether there is light to display: after a step, or before the first if any direct light arrives.
     pub fn is_lit(&self) -> bool {
         self.step > 0
             || self
@@ -102,7 +103,7 @@ impl Snapshot {
                 .any(|light| *light != Vec3::ZERO)
     }
 
-    /// Bytes held.
+    /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         let (mesh, light) = (&self.mesh, &self.light);
         size_of_val(mesh.positions.as_slice())

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::note::Note;
+
 /// Figures of one step. Quantities in world units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StepReport {
@@ -13,39 +15,39 @@ pub struct StepReport {
     pub solve_s: f64,
     /// Link threshold of this step.
     pub epsilon: f32,
-    /// Links in use.
+    /// Number of links.
     pub links: u64,
-    /// Clusters, patches and elements.
+    /// Number of nodes: clusters, patches and elements.
     pub nodes: u64,
-    /// Leaves that receive light.
+    /// Number of leaves that receive light.
     pub elements: u64,
-    /// Vertices of the display mesh.
+    /// Number of vertices of the mesh.
     pub vertices: u64,
     /// Rays shot so far.
     pub shadow_rays: u64,
-    /// Bytes held by the solver.
+    /// Memory of the solver in bytes.
     pub memory_bytes: u64,
     /// Sweeps of the iteration in this step.
     pub sweeps: u32,
-    /// What gathering once more changes, relative to the total power: the residual of the equation that is solved.
+    /// Change of power by the last sweep, relative to the total power: the residual of the radiosity equation.
     pub residual: f32,
-    /// Largest ratio by which a sweep changed the distance of two lights; below 1 while the iteration contracts, 0 where
-    /// too few sweeps were needed to tell.
+    /// Largest ratio of the distance between the images of two iterates to that between the iterates; below 1 while the
+    /// iteration contracts, 0 after too few sweeps to measure it.
     pub contraction: f32,
-    /// Power arriving over links and samples, relative to the power that left for it; 1 in a closed scene.
+    /// Arriving power relative to emitted and reflected power; 1 in an enclosed scene.
     pub energy_balance: f64,
-    /// Smallest sum of form factors over the elements; 1 in a closed scene.
+    /// Smallest sum of form factors of an element; 1 in an enclosed scene.
     pub row_sum_min: f32,
     /// Area-weighted mean of the sums of form factors.
     pub row_sum_mean: f32,
-    /// Largest sum of form factors.
+    /// Largest sum of form factors of an element.
     pub row_sum_max: f32,
-    /// Sum of the link error estimates, root mean square over the area, relative to the mean irradiance.
+    /// Sum of the estimated errors of the links, root mean square over the area, relative to the mean irradiance.
     pub estimated_error: f32,
-    /// Whether a further step can change anything.
+    /// Whether this is the last step.
     pub is_final: bool,
-    /// Whether the memory limit kept the step from being finer: further ones would fare alike.
+    /// Whether the memory limit prevented finer links or elements; further steps would be limited alike.
     pub is_full: bool,
-    /// What the solver had to do to stay stable, one sentence each.
-    pub notes: Vec<String>,
+    /// Measures to stay stable or within the memory limit.
+    pub notes: Vec<Note>,
 }

@@ -1,7 +1,7 @@
-//! How far values agree within their noise.
+//! Agreement of noisy values.
 
-/// How much a neighbour counts whose value is off by a gap, 0…1: by half where that is so many standard errors, of which the
-/// square is `variance`.
+/// Weight of a neighbour whose value differs by `gap`, 0…1: ½ where the gap is `half_deviations` standard errors;
+/// `variance` is the square of the standard error.
 pub(crate) fn agreement(gap: f32, variance: f32, half_deviations: f32) -> f32 {
     let noise = variance * half_deviations * half_deviations;
     noise / (noise + gap * gap).max(f32::MIN_POSITIVE)

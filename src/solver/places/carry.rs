@@ -1,17 +1,18 @@
-//! Values at vertices: carried over to those that nothing tells of, and moved until they add to what elements receive.
+//! Values at vertices: carried over to vertices without a value, and projected to the means of elements.
 
 use glam::Vec4;
 
 use crate::hierarchy::{Element, Hierarchy, Mesh};
 
-/// Elements over which light is carried at most: vertices under an object and those beside them.
+/// Most elements over which light is carried: to vertices under an object, and to those beside them. Fewer leave dark
+/// vertices; more cost time for vertices that are not visible.
 const CARRIED: u32 = 2;
 
-/// Give vertices of elements that lie within a solid in part, at which no leaf `tells` what its corner there receives,
-/// the mean of those of these elements at which one does.
+/// Give vertices of contact elements whose value is unknown the mean of the known vertices of these elements. The value
+/// of a vertex is known if `is_known` holds for an element and its corner there (0…2).
 pub(crate) fn carry_over(
     mesh: &Mesh,
-    tells: impl Fn(&Element, usize) -> bool,
+    is_known: impl Fn(&Element, usize) -> bool,
     values: &mut [Vec4],
 ) {
     let is_contact = |leaf: &usize| mesh.elements[*leaf].is_contact();
@@ -19,15 +20,15 @@ pub(crate) fn carry_over(
     if contacts.is_empty() {
         return;
     }
-    // Vertices that some leaf tells of.
-    let mut told = vec![false; values.len()];
+    // Vertices whose value some leaf knows.
+    let mut known = vec![false; values.len()];
     for leaf in mesh.active_leaves() {
         let element = &mesh.elements[leaf];
         for (side, vertex) in element.vertices.into_iter().enumerate() {
-            told[vertex as usize] |= tells(element, side);
+            known[vertex as usize] |= is_known(element, side);
         }
     }
-    // Means over the elements in contact, from vertices that are told to those that are not.
+    // Means over the contact elements, from known vertices to unknown ones.
     for _ in 0..CARRIED {
         let mut sums = vec![(Vec4::ZERO, 0.0f32); values.len()];
         for &leaf in &contacts {
@@ -37,7 +38,7 @@ pub(crate) fn carry_over(
                 .vertices
                 .into_iter()
                 .map(|vertex| vertex as usize)
-                .partition(|&vertex| told[vertex]);
+                .partition(|&vertex| known[vertex]);
             for &from in &from {
                 for &to in &to {
                     sums[to].0 += values[from] * area;
@@ -47,18 +48,19 @@ pub(crate) fn carry_over(
         }
         for (vertex, (sum, weight)) in sums.into_iter().enumerate() {
             if weight > 0.0 {
-                (values[vertex], told[vertex]) = (sum / weight, true);
+                (values[vertex], known[vertex]) = (sum / weight, true);
             }
         }
     }
 }
 
-/// Share of an element's mean that its centroid tells by the rule of degree 2; the corners tell the rest.
+/// Weight of the centroid in the quadrature rule of degree 2 over a triangle; the corners share the rest.
 const CENTRE_SHARE: f32 = 0.75;
 
-/// Move the values of vertices so that, taken linearly between them, they add to what the elements receive. Vertices lie
-/// in corners and at contacts, where light is less: as they are, they would show all surfaces too dark. Of each element
-/// with a known centroid: index and value there. Values stay between those around them.
+/// Change the values of vertices so that their linear interpolation has the means of the elements. Vertices lie in
+/// corners and at contacts, where light is less: without the change all surfaces would be too dark. `centres` has the
+/// index of each element with a value at its centroid, and that value. Values stay within the range of those about
+/// them.
 pub(crate) fn project(
     hierarchy: &Hierarchy,
     values: &mut [Vec4],

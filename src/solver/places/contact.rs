@@ -1,7 +1,8 @@
-//! Where one object stands on another or reaches into it: what lies within a solid gets no light, and nobody sees it.
+//! Contacts: where one object stands on another or reaches into it.
 //!
-//! An element that reaches out from under an object is dark in part. As a whole it would show a smudge beside the
-//! object; so it is divided until what is left of it is small, and that shows the light of its open corners.
+//! A contact element is one that lies partly inside a solid or behind a wall: its part inside gets no light, and is not
+//! visible. Its mean would be too dark beside the object, so it is divided until it is small, and then takes the light
+//! of its corners outside.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -14,17 +15,17 @@ use crate::{
     solver::{Cancel, limits::Limits},
 };
 
-/// Elements that lie under an object in part are divided while the root of their share of the area is more than this
-/// many times the tolerance of the mesh. Smaller costs elements along every contact; larger shows through beside it.
+/// Contact elements are divided while the square root of their share of the area is more than this many times the
+/// tolerance of the mesh. Smaller costs elements along every contact; larger leaves visible dark patches beside it.
 const CONTACT_TOLERANCE: f32 = 1.0;
 
-/// Whether an element lies within a solid is looked at if it is this many times larger than those that are not divided
-/// for it, or a whole patch was, or what was divided did. Smaller costs rays on every triangle of dense meshes, whose
-/// contacts are fine anyway.
-const LOOKED_AT: f32 = 64.0;
+/// Elements are probed if they, or their whole patches, are this many times larger than the smallest contact elements
+/// that are divided, or if their parents are inside solids in part. Smaller costs rays on every triangle of dense
+/// meshes, whose contacts are fine anyway; larger misses contacts.
+const PROBED_SIZE: f32 = 64.0;
 
-/// Tangents of the probes' directions against the normal. Of the first, one at least must meet a back before the others
-/// are shot; they look further down, between the first.
+/// Tangents of the angles between the probe rays and the normal, along two axes. The others, which are flatter, are
+/// shot only if one of the first meets a back.
 const PROBES: [[f32; 2]; 8] = [
     [0.0, 0.0],
     [0.9, 0.1],
@@ -36,20 +37,22 @@ const PROBES: [[f32; 2]; 8] = [
     [0.1, 2.6],
 ];
 
-/// Tangents of the directions in which it is counted how many solids a point lies in: along no edge of usual scenes.
+/// Tangents of the rays that count the solids about a point: along no edge of usual scenes.
 const SOLID_PROBES: [[f32; 2]; 3] = [[0.173, 0.291], [-0.419, 0.137], [0.083, -0.531]];
 
-/// See [`PROBES`].
+/// Number of the first rays of [`PROBES`]. Fewer miss contacts; more cost rays everywhere.
 const FIRST_PROBES: usize = 4;
 
-/// Backs that the probes must meet, and as many again for each that meets what may be lit.
+/// Fewest backs that the probe rays must meet, and as many again for each that meets a lit side. Smaller takes places
+/// before walls for places behind them; larger misses those that are behind.
 const LEAST_BACKS: usize = 2;
 
-/// Probes that may meet what may be lit.
+/// Most probe rays that may meet a lit side. Smaller misses places behind walls into which another object reaches;
+/// larger takes places before walls for places behind them.
 const MOST_LIT: usize = 1;
 
-/// Divide elements that lie under an object in part; `limits` are those of the last step. Returns the rays shot, and whether
-/// all could be divided; `None` when cancelled.
+/// Divide contact elements; `limits` are those of the last step. Returns the rays shot, and whether memory allowed all
+/// divisions; `None` when cancelled.
 pub(crate) fn divide_contacts(
     scene: &Scene,
     hierarchy: &mut Hierarchy,
@@ -78,8 +81,8 @@ pub(crate) fn divide_contacts(
     }
 }
 
-/// Find out which leaves lie within solids; `limits` are those of the last step. Of small ones it is only asked where what
-/// was divided did. Returns the rays shot; `None` when cancelled.
+/// Find which new leaves lie inside solids or behind walls; `limits` are those of the last step. Small ones are probed
+/// only if their parents are contact elements (see [`PROBED_SIZE`]). Returns the rays shot; `None` when cancelled.
 pub(crate) fn probe_contacts(
     scene: &Scene,
     hierarchy: &mut Hierarchy,
@@ -94,26 +97,26 @@ pub(crate) fn probe_contacts(
         .active_leaves()
         .filter(|&leaf| elements[leaf].inside_solid == Element::UNPROBED)
         .collect();
-    let is_looked_at = |leaf: usize| {
+    let is_probed = |leaf: usize| {
         let element = &elements[leaf];
         let above = elements.get(element.parent as usize);
         let whole = elements[element.patch as usize].area_vector.length();
-        element.area_vector.length() > LOOKED_AT * least
+        element.area_vector.length() > PROBED_SIZE * least
             || above.is_some_and(|parent| match parent.inside_solid {
-                Element::UNPROBED => whole > LOOKED_AT * least,
-                covered => covered != 0,
+                Element::UNPROBED => whole > PROBED_SIZE * least,
+                inside_solid => inside_solid != 0,
             })
     };
-    let (wanted, spared): (Vec<usize>, Vec<usize>) =
-        fresh.into_iter().partition(|&leaf| is_looked_at(leaf));
+    let (wanted, skipped): (Vec<usize>, Vec<usize>) =
+        fresh.into_iter().partition(|&leaf| is_probed(leaf));
     let ray_count = probe_leaves(scene, hierarchy, rays, &wanted, cancel)?;
-    for leaf in spared {
+    for leaf in skipped {
         hierarchy.mesh.elements[leaf].inside_solid = 0;
     }
     Some(ray_count)
 }
 
-/// Find out which of some leaves lie within solids. Returns the rays shot; `None` when cancelled.
+/// Find which of some leaves lie inside solids or behind walls. Returns the rays shot; `None` when cancelled.
 fn probe_leaves(
     scene: &Scene,
     hierarchy: &mut Hierarchy,
@@ -134,15 +137,15 @@ fn probe_leaves(
         .collect();
     cancel.proceed()?;
     let mut ray_count = 0;
-    for (&leaf, (covered, shot)) in leaves.iter().zip(probed) {
-        hierarchy.mesh.elements[leaf].inside_solid = covered;
+    for (&leaf, (inside_solid, shot)) in leaves.iter().zip(probed) {
+        hierarchy.mesh.elements[leaf].inside_solid = inside_solid;
         ray_count += shot;
     }
     Some(ray_count)
 }
 
-/// Look at some elements, however small, and at all that lies on them: rays from there told that they lie within a solid.
-/// Returns the rays shot; `None` when cancelled.
+/// Probe the leaves of some elements, whatever their size, after other rays from them began inside a solid. Returns the
+/// rays shot; `None` when cancelled.
 pub(crate) fn probe_within(
     scene: &Scene,
     hierarchy: &mut Hierarchy,
@@ -165,14 +168,15 @@ pub(crate) fn probe_within(
     probe_leaves(scene, hierarchy, rays, &leaves, cancel)
 }
 
-/// Elements in contact that are no larger are not divided, frame units. The same in all steps, by the limits of the last.
+/// Area up to which contact elements are not divided, square frame units. The same in all steps, by the limits of the
+/// last.
 fn least_contact(hierarchy: &Hierarchy, limits: Limits) -> f32 {
     let root = CONTACT_TOLERANCE * limits.tolerance;
     (root * root * hierarchy.importance.area as f32).max(limits.min_area)
 }
 
-/// Which corners of an element, and whether its centroid, lie within a solid or behind a wall, as [`Element::inside_solid`] has
-/// it; and the rays shot. `scene` where it has solids.
+/// The corners of an element, and its centroid, that lie inside a solid or behind a wall, as bits of
+/// [`Element::inside_solid`]; and the rays shot. `scene` is `None` if it has no solids.
 fn probe(
     scene: Option<&Scene>,
     rays: &RayTree,
@@ -182,25 +186,25 @@ fn probe(
     if rays.is_clear() {
         return (0, 0);
     }
-    let (mut covered, mut shot) = (0, 0);
+    let (mut inside_solid, mut shot) = (0, 0);
     for (place, point) in places(hierarchy, element).into_iter().enumerate() {
         let in_solid = scene.map_or((false, 0), |scene| {
             is_in_solid(scene, rays, hierarchy, element, point)
         });
-        let (is_covered, count) = match in_solid {
+        let (is_inside, count) = match in_solid {
             (true, count) => (true, count),
             (false, count) => {
                 let (is_behind, more) = is_behind_wall(rays, hierarchy, element, point);
                 (is_behind, count + more)
             }
         };
-        covered |= u8::from(is_covered) << place;
+        inside_solid |= u8::from(is_inside) << place;
         shot += count;
     }
-    (covered, shot)
+    (inside_solid, shot)
 }
 
-/// Where an element is probed: its corners, a little inside, and its centroid.
+/// The places at which an element is probed: its corners, offset inwards, and its centroid.
 fn places(hierarchy: &Hierarchy, element: usize) -> [Vec3; 4] {
     let corners = hierarchy.mesh.corners(element);
     let element = &hierarchy.mesh.elements[element];
@@ -209,25 +213,25 @@ fn places(hierarchy: &Hierarchy, element: usize) -> [Vec3; 4] {
     [a, b, c, element.centroid]
 }
 
-/// Of an element that lies within a solid in part, the probed places that do not; nothing of others.
-pub(crate) fn open_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
-    let covered = hierarchy.mesh.elements[element].inside_solid;
+/// The probed places of a contact element that are outside solids; none of other elements.
+pub(crate) fn outside_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3> {
+    let inside_solid = hierarchy.mesh.elements[element].inside_solid;
     if !hierarchy.mesh.elements[element].is_contact() {
         return Vec::new();
     }
-    let is_open = |(place, _): &(usize, Vec3)| covered & (1 << place) == 0;
+    let is_outside = |(place, _): &(usize, Vec3)| inside_solid & (1 << place) == 0;
     let places = places(hierarchy, element).into_iter().enumerate();
-    places.filter(is_open).map(|(_, point)| point).collect()
+    places.filter(is_outside).map(|(_, point)| point).collect()
 }
 
-/// A unit direction off a normal, by the tangents of its angles with it along two axes of the plane.
+/// A unit direction tilted from a normal by these tangents along two axes of its plane.
 fn tilted(normal: Vec3, [x, y]: [f32; 2]) -> Vec3 {
     let tangent = normal.any_orthonormal_vector();
     (normal + tangent * x + normal.cross(tangent) * y).normalize_or_zero()
 }
 
-/// Whether a point of an element lies within a solid of the scene. A ray may slip through an edge: so if one says that it
-/// does, two of three must. And the rays shot.
+/// Whether a point of an element lies inside a solid of the scene, by two of three rays, since a ray may slip through
+/// an edge; and the rays shot.
 fn is_in_solid(
     scene: &Scene,
     rays: &RayTree,
@@ -249,8 +253,8 @@ fn is_in_solid(
     }
 }
 
-/// Whether a point of an element lies behind a wall: backs are met from there and nothing that is lit, or one among many:
-/// another that reaches into the wall. And the rays shot.
+/// Whether a point of an element lies behind a wall: rays from there meet backs, and no lit side except one of another
+/// object that reaches into the wall. And the rays shot.
 pub(crate) fn is_behind_wall(
     rays: &RayTree,
     hierarchy: &Hierarchy,

@@ -1,4 +1,4 @@
-//! Where light is evaluated, and what counts how much there.
+//! The places at which light is evaluated, and their weights.
 
 mod agreement;
 mod carry;
@@ -10,8 +10,8 @@ mod shares;
 pub(crate) use agreement::agreement;
 pub(crate) use carry::{carry_over, project};
 pub(crate) use contact::{
-    divide_contacts, is_behind_wall, open_places, probe_contacts, probe_within,
+    divide_contacts, is_behind_wall, outside_places, probe_contacts, probe_within,
 };
-pub(crate) use offsets::{Moved, OffsetPlaces};
+pub(crate) use offsets::{OffsetPlace, OffsetPlaces};
 pub(crate) use receivers::{INSET, Receiver, centre_of, inset};
 pub(crate) use shares::{share_root, vertex_share_roots};

@@ -1,4 +1,4 @@
-//! Places of vertices that lie behind a wall: further within their elements, before it.
+//! Offset places of vertices behind a wall: further inside their elements, before the wall.
 
 use std::{collections::HashMap, ops::Range};
 
@@ -7,34 +7,34 @@ use glam::Vec3;
 use super::receivers::{Receiver, inset, vertex_places};
 use crate::hierarchy::{Element, Hierarchy};
 
-/// Where light is evaluated for vertices that lie behind a wall.
+/// Places at which light of vertices behind a wall is evaluated.
 #[derive(Default)]
 pub(crate) struct OffsetPlaces {
-    pub(crate) moved: HashMap<u32, Moved>,
-    /// The element at which a vertex was looked at last, or `u32::MAX`.
-    pub(crate) looked_at: Vec<u32>,
+    pub(crate) by_vertex: HashMap<u32, OffsetPlace>,
+    /// By vertex, the element in which an offset place was last sought, or `u32::MAX`.
+    pub(crate) probed_at: Vec<u32>,
 }
 
-/// Where light is evaluated for one of them.
+/// The place at which light of one vertex is evaluated.
 #[derive(Clone, Copy)]
-pub(crate) struct Moved {
+pub(crate) struct OffsetPlace {
     pub(crate) place: Vec3,
     /// Share of the way to the centroid.
     pub(crate) inset: f32,
 }
 
 impl OffsetPlaces {
-    /// Where light of the corners of a leaf is evaluated; `corners` are where they are.
+    /// The places at which light of the corners of a leaf is evaluated; `corners` are their positions.
     pub(crate) fn places(&self, element: &Element, corners: [Vec3; 3]) -> [Vec3; 3] {
         let usual = inset(element, corners);
         [0, 1, 2].map(|side| {
-            let moved = self.moved.get(&element.vertices[side]);
-            let inset = moved.map_or(usual, |moved| moved.inset);
+            let offset = self.by_vertex.get(&element.vertices[side]);
+            let inset = offset.map_or(usual, |offset| offset.inset);
             corners[side].lerp(element.centroid, inset)
         })
     }
 
-    /// As [`vertex_places`], but for vertices behind walls before these.
+    /// As [`vertex_places`], with the offset places of vertices behind walls.
     pub(crate) fn vertex_places(
         &self,
         hierarchy: &Hierarchy,
@@ -43,15 +43,16 @@ impl OffsetPlaces {
     ) -> Vec<(u32, Receiver)> {
         let mut places = vertex_places(hierarchy, elements, is_wanted);
         for (vertex, receiver) in &mut places {
-            if let Some(moved) = self.moved.get(vertex) {
-                receiver.point = moved.place;
+            if let Some(offset) = self.by_vertex.get(vertex) {
+                receiver.point = offset.place;
             }
         }
         places
     }
 
-    /// Bytes held, about.
+    /// Approximate memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
-        size_of_val(self.looked_at.as_slice()) + self.moved.len() * size_of::<(u32, Moved)>()
+        size_of_val(self.probed_at.as_slice())
+            + self.by_vertex.len() * size_of::<(u32, OffsetPlace)>()
     }
 }

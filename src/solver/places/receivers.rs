@@ -1,5 +1,4 @@
-//! Where light of the mesh is evaluated: a little inside the corners of leaves, and at their centroids; and what counts how
-//! much there.
+//! The places at which light of the mesh is evaluated: near the corners of leaves, and at their centroids.
 
 use std::ops::Range;
 
@@ -11,22 +10,24 @@ use crate::{
     scene::TriangleId,
 };
 
-/// Corners are moved this share of the way to the centroid before light is evaluated there: exactly on an edge, a
-/// neighbour at an angle would be seen edge-on, or from within the object that stands on it.
+/// Share of the way to the centroid at which light of a corner is evaluated: exactly on an edge, a neighbour at an
+/// angle would be seen edge-on, or the place would be inside the object that stands on it. Smaller, and rounding
+/// decides that; larger, and corners get light of another place.
 pub(crate) const INSET: f32 = 0.02;
 
-/// Distance from its edges at which light of an element is evaluated at least, if it is so wide: what is nearer than
-/// [`RAY_OFFSET`] a ray does not see, and a wall stands on many an edge.
+/// Least distance from the edges at which light of a wide element is evaluated: rays do not see surfaces nearer than
+/// [`RAY_OFFSET`], and walls often stand on edges. Smaller, and light leaks through walls; larger, and corners of small
+/// elements get light of another place.
 const CLEARANCE: f32 = 2.0 * RAY_OFFSET;
 
-/// But never further than this share of the way to the centroid. More, and small elements show light of another place; less,
-/// and narrow ones along walls show light of beyond.
+/// Largest share of the way to the centroid for that distance. Larger, and small elements get light of another place;
+/// smaller, and narrow ones along walls get light from behind these.
 const MOST_INSET: f32 = 0.2;
 
-/// Where direct light is wanted.
+/// A place at which light is evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Receiver {
-    /// A point of a surface.
+    /// A point of a surface, frame units.
     pub point: Vec3,
     /// Unit normal there.
     pub normal: Vec3,
@@ -34,7 +35,7 @@ pub(crate) struct Receiver {
     pub triangle: TriangleId,
 }
 
-/// Share of the way to the centroid at which light of the corners of an element is evaluated; `corners` are where they are.
+/// Share of the way to the centroid at which light of the corners of an element is evaluated, 0…1.
 pub(crate) fn inset(element: &Element, [a, b, c]: [Vec3; 3]) -> f32 {
     let longest = (a - b).length().max((b - c).length()).max((c - a).length());
     // From the centroid to an edge is a third of the height above that.
@@ -46,15 +47,15 @@ pub(crate) fn inset(element: &Element, [a, b, c]: [Vec3; 3]) -> f32 {
     }
 }
 
-/// Where to sample each corner that is wanted of the leaves among some elements: a little inside the leaf whose normal
-/// is nearest to the mean normal about the vertex, of those that are not within a solid there.
+/// The place of each wanted vertex of the leaves among some elements: near the vertex, inside the leaf whose normal is
+/// nearest to the mean normal about the vertex; leaves that are outside solids at that corner come first.
 pub(crate) fn vertex_places(
     hierarchy: &Hierarchy,
     elements: Range<usize>,
     is_wanted: &[bool],
 ) -> Vec<(u32, Receiver)> {
     let mesh = &hierarchy.mesh;
-    // The leaves about the vertices, and mean normals there.
+    // The leaves about the wanted vertices, and mean normals there.
     let about_wanted: Vec<usize> = mesh
         .leaves_among(elements)
         .filter(|&leaf| {
@@ -68,11 +69,14 @@ pub(crate) fn vertex_places(
             normals[vertex as usize] += mesh.elements[leaf].area_vector;
         }
     }
-    // By vertex, the leaf that fits best.
-    /// How fit a leaf is, and which one it is.
+    // The best leaf by vertex.
+    /// The fitness of a leaf, and its index.
     type Choice = ((bool, f32), u32);
     let mut chosen: Vec<Option<Choice>> = vec![None; mesh.vertices.len()];
-    for leaf in about_wanted.into_iter().filter(|&leaf| mesh.is_held(leaf)) {
+    for leaf in about_wanted
+        .into_iter()
+        .filter(|&leaf| mesh.is_active(leaf))
+    {
         let (element, normal) = (&mesh.elements[leaf], hierarchy.patch_of(leaf).normal);
         for (side, vertex) in element.vertices.into_iter().enumerate() {
             let vertex = vertex as usize;
@@ -86,7 +90,7 @@ pub(crate) fn vertex_places(
             }
         }
     }
-    // A little inside the leaf that was chosen.
+    // The place inside the chosen leaf.
     let receiver = |(vertex, choice): (usize, Option<Choice>)| {
         let (_, leaf) = choice?;
         let patch = hierarchy.patch_of(leaf as usize);
@@ -110,7 +114,7 @@ pub(crate) fn vertex_places(
         .collect()
 }
 
-/// The centroid of an element, as a place to be lit.
+/// The centroid of an element.
 pub(crate) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
     let patch = hierarchy.patch_of(element);
     Receiver {

@@ -1,14 +1,14 @@
-//! How much of the area of the scene elements and vertices stand for.
+//! Shares of the scene's area by element and by vertex.
 
 use crate::hierarchy::Hierarchy;
 
-/// Root of an element's share of the area: what an error on it counts.
+/// Square root of an element's share of the area: the weight of an error on it.
 pub(crate) fn share_root(hierarchy: &Hierarchy, element: usize) -> f32 {
     let area = hierarchy.mesh.elements[element].area_vector.length();
     hierarchy.share_of_area(element, area).sqrt()
 }
 
-/// The same for each vertex: a third of the leaves about it is its own.
+/// The same by vertex, whose area is a third of that of the leaves about it.
 pub(crate) fn vertex_share_roots(hierarchy: &Hierarchy) -> Vec<f32> {
     let mesh = &hierarchy.mesh;
     let shares = mesh.sums_about_vertices(|leaf| {

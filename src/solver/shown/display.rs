@@ -1,4 +1,4 @@
-//! From the state of a solve to what is shown of it.
+//! The snapshot of a solve, made from its state.
 
 use std::{f32::consts::PI, sync::Arc};
 
@@ -10,7 +10,7 @@ use crate::{
     hierarchy::{Channels as _, Cluster, Hierarchy, NodeId},
     scene::{Appearance, Scene, TriangleId},
     solver::{
-        Cancel, ClusterBox, DisplayMesh, LeftOut, Snapshot, VertexLight,
+        Cancel, ClusterBox, DisplayMesh, Omitted, Snapshot, VertexLight,
         direct::Surfaces,
         iteration::LinkedLight,
         vertices::{LeafLight, VertexMeans},
@@ -18,52 +18,52 @@ use crate::{
     transport::luminance,
 };
 
-/// A triangle of the mesh that is shown: its element and its vertices.
-pub(super) type ClosedTriangle = (u32, [u32; 3]);
+/// A triangle of the display mesh: its element and its vertices.
+pub(super) type DisplayTriangle = (u32, [u32; 3]);
 
-/// The triangles of elements and of what closes their edges, where these have changed since a mesh was made.
+/// The triangles of a crack-free mesh of the elements; `None` if the elements are those of the current display mesh.
 pub(crate) fn changed_triangles(
     hierarchy: &mut Hierarchy,
-    held: &DisplayMesh,
-) -> Option<Vec<ClosedTriangle>> {
-    let has_changed = held.indices.is_empty()
-        || held.own_vertex_count() != hierarchy.mesh.vertices.len()
-        || hierarchy.mesh.leaves().count() != leaf_count(held);
-    has_changed.then(|| hierarchy.mesh.closed_triangles())
+    current: &DisplayMesh,
+) -> Option<Vec<DisplayTriangle>> {
+    let has_changed = current.indices.is_empty()
+        || current.own_vertex_count() != hierarchy.mesh.vertices.len()
+        || hierarchy.mesh.leaves().count() != leaf_count(current);
+    has_changed.then(|| hierarchy.mesh.crack_free_triangles())
 }
 
-/// What a snapshot is made of.
+/// The state from which a snapshot is made.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
-    /// What is lit.
+    /// The scene.
     pub scene: &'a Scene,
-    /// How materials look, by material.
+    /// Appearance by material.
     pub appearances: &'a [Appearance],
     /// The elements, with their direct light.
     pub surfaces: Surfaces<'a>,
     /// Light over links.
     pub linked: &'a LinkedLight,
-    /// What leaves found over links.
+    /// Linked light of the leaves.
     pub leaves: &'a [LeafLight],
-    /// By what linked light at each vertex is multiplied; empty for 1.
+    /// Factor of the linked light by vertex; empty for 1.
     pub factors: &'a [Vec4],
-    /// What the plan left out.
-    pub left_out: &'a Arc<Vec<LeftOut>>,
-    /// The step that is shown.
+    /// The omissions of the plan.
+    pub omitted: &'a Arc<Vec<Omitted>>,
+    /// Number of the step.
     pub step: u32,
 }
 
 impl View<'_> {
-    /// The snapshot after a step: with a new mesh of these triangles (see [`changed_triangles`]), or where there are none,
-    /// with that of the snapshot before. `None` when cancelled.
+    /// The snapshot after a step: with a new mesh of these triangles (see [`changed_triangles`]), or, for `None`, with
+    /// that of the snapshot before. `None` when cancelled.
     pub(crate) fn show(
         &self,
-        triangles: Option<Vec<ClosedTriangle>>,
+        triangles: Option<Vec<DisplayTriangle>>,
         before: &Snapshot,
         cancel: &Cancel,
     ) -> Option<Snapshot> {
         let hierarchy = self.surfaces.hierarchy;
-        // None of these needs the others.
+        // These three are independent.
         let ((mesh, means), direct) = rayon::join(
             || {
                 rayon::join(
@@ -87,12 +87,16 @@ impl View<'_> {
             mesh,
             light: Arc::new(light),
             clusters: Arc::new(clusters?),
-            left_out: self.left_out.clone(),
+            omitted: self.omitted.clone(),
         })
     }
 
-    /// The mesh that is shown, from elements with the triangles that close their edges.
-    fn display_mesh(&self, triangles: Vec<ClosedTriangle>, cancel: &Cancel) -> Option<DisplayMesh> {
+    /// The display mesh of some triangles; `None` when cancelled.
+    fn display_mesh(
+        &self,
+        triangles: Vec<DisplayTriangle>,
+        cancel: &Cancel,
+    ) -> Option<DisplayMesh> {
         let hierarchy = self.surfaces.hierarchy;
         let mesh = &hierarchy.mesh;
         let count = mesh.vertices.len();
@@ -105,7 +109,7 @@ impl View<'_> {
             texcoords: vec![Vec2::NAN; if seams.is_some() { count } else { 0 }],
             ..DisplayMesh::default()
         };
-        // Triangles, with vertices of their own where texture coordinates differ.
+        // Triangles, with copies of vertices where texture coordinates differ.
         for (element, vertices) in triangles {
             let patch = hierarchy.patch_of(element as usize);
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
@@ -134,7 +138,7 @@ impl View<'_> {
             *normal = normal.normalize_or_zero();
         }
         repeat(&mut display.normals, count, &display.repeated);
-        // Vertices of no triangle.
+        // Vertices without a triangle.
         for uv in display.texcoords.iter_mut().filter(|uv| uv.is_nan()) {
             *uv = Vec2::ZERO;
         }
@@ -142,7 +146,7 @@ impl View<'_> {
         Some(display)
     }
 
-    /// Texture coordinates of a point on a triangle, by its barycentric coordinates there.
+    /// Texture coordinates of a point of a triangle.
     fn texcoord_at(&self, triangle: TriangleId, point: Vec3) -> Vec2 {
         let uv = self.scene.texcoords[triangle.index()];
         let [a, b, c] = self.scene.corners(triangle);
@@ -198,6 +202,7 @@ impl View<'_> {
         light
     }
 
+    /// Figures of all clusters; `None` when cancelled.
     fn cluster_boxes(&self, cancel: &Cancel) -> Option<Vec<ClusterBox>> {
         let clusters = &self.surfaces.hierarchy.clusters;
         let mut boxes: Vec<ClusterBox> = Vec::with_capacity(clusters.len());
@@ -218,7 +223,7 @@ impl View<'_> {
         Some(boxes)
     }
 
-    /// Add what tables leave out, since no link carries it: the emission of sampled emitters.
+    /// Add the power of sampled emitters, which the tables do not contain.
     fn add_sampled_emission(&self, boxes: &mut [ClusterBox]) {
         let Surfaces { hierarchy, direct } = self.surfaces;
         let Some(field) = direct else { return };
@@ -263,12 +268,12 @@ impl View<'_> {
     }
 }
 
-/// Number of leaves in a mesh: display triangles of one element follow each other.
+/// Number of leaves in a mesh: display triangles of one element are consecutive.
 fn leaf_count(mesh: &DisplayMesh) -> usize {
     mesh.element_of.chunk_by(|a, b| a == b).count()
 }
 
-/// Give the vertices of a display mesh the colours of the elements about them.
+/// Set the colours of the vertices of a display mesh to the area-weighted means of the elements about them.
 pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: &mut DisplayMesh) {
     let count = display.positions.len();
     let base = hierarchy.clusters.len() as u32;
@@ -296,7 +301,7 @@ pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: 
     display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
 }
 
-/// A colour that is safe to show: finite and not negative.
+/// A colour that is safe to display: finite and not negative.
 fn displayable(color: Vec4) -> Vec3 {
     color
         .color()

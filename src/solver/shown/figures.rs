@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use crate::{
     hierarchy::{Channels as _, Hierarchy, luminance},
     solver::{
-        StepReport,
+        Note, StepReport,
         direct::Surfaces,
         iteration::LinkedLight,
         sums::{area_total, mean},
@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// Fill in what can be read off the light after a step.
+/// Fill in the figures that follow from links and light.
 pub(crate) fn fill(
     report: &mut StepReport,
     surfaces: Surfaces<'_>,
@@ -30,14 +30,13 @@ pub(crate) fn fill(
     fill_row_sums(report, hierarchy, linked);
 }
 
-/// Say that the memory limit kept the step from being finer.
+/// Note that the memory limit prevented finer links or elements.
 pub(crate) fn note_full(report: &mut StepReport) {
     report.is_full = true;
-    let note = "the memory limit is reached; refinement stops here with what fits";
-    report.notes.push(note.to_owned());
+    report.notes.push(Note::MemoryLimit);
 }
 
-/// Power that arrives at all leaves relative to power that left: emission and reflection.
+/// Power that arrives at all leaves relative to the emitted and reflected power.
 fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let hierarchy = surfaces.hierarchy;
     let arrived = area_total(hierarchy, |leaf| linked.total(surfaces, leaf));
@@ -71,7 +70,7 @@ fn estimated_error(surfaces: Surfaces<'_>, linked: &LinkedLight, leaves: &[LeafL
     }
 }
 
-/// Sums of form factors: what leaves receive when everything sends 1.
+/// Fill in the sums of form factors: the irradiance of leaves if every radiosity were 1.
 fn fill_row_sums(report: &mut StepReport, hierarchy: &Hierarchy, linked: &LinkedLight) {
     let (mut least, mut most) = (f32::INFINITY, 0.0f32);
     let (mut sum, mut whole) = (0.0f64, 0.0f64);

@@ -1,4 +1,4 @@
-//! What is made of the state: the display mesh, figures, answers about a node.
+//! Output from the state: the display mesh, figures of a step, inspection of a node.
 
 mod display;
 mod figures;

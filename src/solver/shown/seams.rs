@@ -1,8 +1,8 @@
 //! Vertices on texture seams.
 //!
-//! All triangles about a vertex share its light, but not always its texture coordinates: where a picture is cut open, or
-//! begins again after whole periods, those on either side have others. Such a vertex is shown once for each, the
-//! repetitions after all others.
+//! All triangles about a vertex share its light, but not always its texture coordinates: at a seam of the picture, or
+//! where it repeats, those on either side differ. Such a vertex has a copy for each further pair of coordinates; copies
+//! follow all other vertices.
 
 use std::collections::HashMap;
 
@@ -10,27 +10,27 @@ use glam::Vec2;
 
 use crate::solver::DisplayMesh;
 
-/// Texture coordinates that differ by less are one, in periods of the picture. Smaller, and rounding opens seams where
-/// there are none; larger, and a picture is pulled by more than a pixel of 1024.
+/// Texture coordinates that differ by less, in periods of the picture, are equal. Smaller, and rounding makes seams;
+/// larger, and a picture is distorted by more than a pixel of 1024.
 const SAME_PLACE: f32 = 1.0 / 1024.0;
 
-/// The repetitions of the vertices of a display mesh.
+/// The copies of the vertices of a display mesh.
 #[derive(Default)]
 pub(super) struct Seams {
     repetitions: HashMap<u32, Vec<u32>>,
 }
 
 impl Seams {
-    /// The vertex, or the repetition of it, that has these texture coordinates; made where there is none. A vertex without
-    /// coordinates, which are not numbers then, takes them.
+    /// The vertex, or its copy, with these texture coordinates; a new copy if there is none. A vertex whose coordinates
+    /// are NaN takes them.
     pub(super) fn vertex_with(&mut self, vertex: u32, uv: Vec2, mesh: &mut DisplayMesh) -> u32 {
-        let held = &mut mesh.texcoords[vertex as usize];
-        if held.is_nan() {
-            *held = uv;
+        let present = &mut mesh.texcoords[vertex as usize];
+        if present.is_nan() {
+            *present = uv;
         }
         let has_them = |vertex: u32| {
-            let held = mesh.texcoords[vertex as usize];
-            held == uv || held.abs_diff_eq(uv, SAME_PLACE)
+            let present = mesh.texcoords[vertex as usize];
+            present == uv || present.abs_diff_eq(uv, SAME_PLACE)
         };
         if has_them(vertex) {
             return vertex;
@@ -48,7 +48,7 @@ impl Seams {
     }
 }
 
-/// Let values of the first `count` vertices hold for their repetitions, too.
+/// Copy values of the first `count` vertices to their copies.
 pub(super) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32]) {
     values.truncate(count);
     for &vertex in repeated {
@@ -57,15 +57,15 @@ pub(super) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32
 }
 
 impl DisplayMesh {
-    /// Vertices that are no repetitions.
+    /// Number of vertices that are not copies.
     pub(super) fn own_vertex_count(&self) -> usize {
         self.positions.len() - self.repeated.len()
     }
 
-    /// The vertex that a vertex repeats, or itself.
+    /// The vertex of which a vertex is a copy, or itself.
     pub(super) fn own_vertex(&self, vertex: u32) -> usize {
-        let beyond = (vertex as usize).checked_sub(self.own_vertex_count());
-        beyond.map_or(vertex, |place| self.repeated[place]) as usize
+        let repetition = (vertex as usize).checked_sub(self.own_vertex_count());
+        repetition.map_or(vertex, |place| self.repeated[place]) as usize
     }
 }
 
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_vertex_is_repeated_once_for_each_place_in_the_picture() {
+    fn a_vertex_has_one_copy_for_each_place_in_the_picture() {
         let mut mesh = DisplayMesh {
             positions: vec![Vec3::X, Vec3::Y],
             texcoords: vec![Vec2::NAN; 2],

@@ -1,12 +1,12 @@
-//! Indirect light at vertices, gathered once more by rays where links are found to be wrong.
+//! Final gather: indirect light at vertices from rays, where the linked light is wrong.
 //!
-//! A link knows of what stands between its ends only which part gets through, and it takes that part for the same all
-//! over its receiver. In the corner between a floor and what stands on it that shows: light from beyond the object
-//! leaks into the corner, however small the elements there are, and into closed rooms. So a few cosine-weighted rays from
-//! each vertex look at the radiosity of what they meet. Where vertices and their neighbours together find something else
-//! than the links, many rays do. What rays met is remembered, so that it can be asked again once the light there has been
-//! corrected, too: in a closed room that links light through its walls, nothing remains in the end. What is kept is a
-//! factor by vertex, so that it holds for other lights on the same links, too.
+//! A link has one visibility for all of its receiver. In the corner between a floor and an object this is visible:
+//! light from behind the object leaks into the corner, however small its elements are, and likewise into enclosed
+//! rooms. So a few cosine-weighted rays from each vertex read the radiosity of the surfaces that they meet. Where
+//! vertices and their neighbours together differ from the linked light, many rays are shot. The hits are stored, so
+//! that their radiosity can be evaluated again after the light there has been corrected, too: in a dark enclosed room
+//! into which links leak light, nothing remains in the end. The result is a factor by vertex, which also applies to
+//! other light on the same links.
 
 use std::f32::consts::PI;
 
@@ -14,7 +14,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    gathered::{Gathered, factors},
+    gather_estimate::{GatherEstimate, factors},
     reconstruct::{LeafLight, VertexMeans},
 };
 use crate::{
@@ -30,53 +30,53 @@ use crate::{
     transport::luminance,
 };
 
-/// Rays from each vertex. Fewer miss shallow corners, more cost time everywhere.
-const LOOKING: u32 = 16;
+/// Rays from each vertex at first. Fewer miss shallow corners; more cost time everywhere.
+const MOST_PROBE_RAYS: u32 = 16;
 
-/// Rays from all vertices, about: of large meshes fewer are shot from each. Fewer tell less than links do, more take longer
-/// than all steps before.
-const MOST_LOOKING: usize = 1 << 21;
+/// Approximate limit of the first rays from all vertices, for large meshes. Fewer are less precise than links; more
+/// take longer than all steps before.
+const MOST_PROBE_RAYS_IN_ALL: usize = 1 << 21;
 
-/// Rays from each vertex at least.
-const LEAST_LOOKING: u32 = 2;
+/// Fewest rays from each vertex. Fewer find nothing; more take long for large meshes.
+const LEAST_PROBE_RAYS: u32 = 2;
 
-/// One of so many rays may meet a back. From a vertex that lies within something what rays find is dark, and would show
-/// around it.
+/// Fewest rays per ray that meets a back; vertices with more backs are inside an object, and have no estimate, since it
+/// would darken their surroundings. Fewer leave dark spots; more exclude vertices near one-sided surfaces.
 const RAYS_OF_BACK: u32 = 4;
 
-/// Rays from a vertex in a corner at most. Fewer leave grain, more cost time there.
-const GATHERING: u32 = 256;
+/// Most rays from a vertex in a corner. Fewer leave grain; more cost time there.
+const MOST_GATHER_RAYS: u32 = 256;
 
-/// Standard errors by which what a vertex and its neighbours find must differ from what links tell to be a corner.
-/// Smaller gathers by chance, larger misses corners.
+/// Difference from which the estimates of a vertex and its neighbours make a corner, in standard errors. Smaller shoots
+/// many rays by chance; larger misses corners.
 const DEVIATIONS: f32 = 1.5;
 
-/// Part of the light that leaves a vertex that must be indirect for rays to look at it: what a lamp reflects is not seen beside
-/// what it emits.
+/// Smallest indirect part of the light that leaves a vertex for which rays are shot: the light that a lamp reflects is
+/// not visible beside its emission. Smaller costs rays; larger leaves errors of links on bright surfaces.
 const LEAST_INDIRECT: f32 = 0.1;
 
-/// Times that all rays are asked again at most. Fewer leave light in closed white rooms, more change nothing that shows.
+/// Most rounds of evaluation. Fewer leave light in enclosed white rooms; more change nothing visible.
 const MOST_ROUNDS: u32 = 64;
 
-/// Rays are asked again until that changes no vertex by more than this part of the tolerance of sweeps, times the scene's
-/// mean. Larger leaves light in closed rooms, where each round takes away what walls absorb; smaller takes time.
-const SETTLED: f32 = 0.1;
+/// Largest change of a vertex at which rounds end, in multiples of the tolerance of sweeps times the scene's mean.
+/// Larger leaves light in enclosed rooms, where each round removes what walls absorb; smaller takes time.
+const CONVERGED_SHARE: f32 = 0.1;
 
-/// Rounds that are remembered to accelerate them. Fewer take longer in white rooms, more gain nothing.
+/// Rounds that acceleration remembers. Fewer take longer in white rooms; more gain nothing.
 const DEPTH: usize = 3;
 
 /// What a ray met.
 #[derive(Clone, Copy)]
 enum Met {
-    /// Nothing that sends light.
+    /// Nothing, or an inactive surface.
     Nothing,
     /// The back of a one-sided surface.
     Back,
-    /// A leaf, with the shares that its first two corners have in the light there.
+    /// A leaf, with the first two barycentric coordinates of the point.
     Leaf(u32, [f32; 2]),
 }
 
-/// What a leaf sends, from the light at its corners.
+/// A leaf as a source: its radiosity follows from the irradiance at its corners.
 #[derive(Clone, Copy, Default)]
 struct Sender {
     vertices: [u32; 3],
@@ -85,8 +85,7 @@ struct Sender {
 }
 
 impl Sender {
-    /// Radiosity where the first two corners have these shares, of irradiance `received` at vertices and linear between
-    /// them.
+    /// Radiosity at these barycentric coordinates for the irradiance `received` at vertices, interpolated linearly.
     fn radiosity(&self, [a, b]: [f32; 2], received: &[Vec4]) -> Vec4 {
         let [first, second, third] = self.vertices.map(|vertex| received[vertex as usize]);
         let irradiance = first * a + second * b + third * (1.0 - a - b);
@@ -94,74 +93,74 @@ impl Sender {
     }
 }
 
-/// A vertex that rays look at.
-struct Look {
+/// A vertex from which rays are shot.
+struct VertexProbe {
     vertex: usize,
     place: Receiver,
     /// Linked irradiance.
     linked: Vec4,
-    /// Luminance of all irradiance.
+    /// Luminance of the total irradiance.
     all: f32,
-    /// Root of the vertex's share of the area.
+    /// Square root of the vertex's share of the area.
     weight: f32,
-    /// Variance of the luminance that one ray meets, as links tell it; 0 where they carry no emission.
+    /// Variance of the radiosity (luminance) that one ray meets, known from links; 0 where links carry no emission.
     variance: f32,
     met: Vec<Met>,
-    found: Gathered,
+    found: GatherEstimate,
 }
 
-impl Look {
-    /// Whether noise of what was found would show.
+impl VertexProbe {
+    /// Whether noise of the estimate is visible.
     fn is_noisy(&self, limits: Limits) -> bool {
         let (_, variance) = self.found.gap(self.linked, self.variance);
-        limits.is_noise_seen(variance.sqrt(), self.all, self.weight)
+        limits.is_noise_visible(variance.sqrt(), self.all, self.weight)
     }
 }
 
-/// What a final gather needs.
+/// Input of a final gather.
 #[derive(Clone, Copy)]
 pub(crate) struct FinalGather<'a> {
-    /// What rays meet, with its direct light.
+    /// The elements, with their direct light.
     pub surfaces: Surfaces<'a>,
-    /// What leaves found over links.
+    /// Linked light of the leaves.
     pub leaves: &'a [LeafLight],
-    /// The same for the square of the luminance, where links carry emission: a few rays do not find a small lamp, and only links
-    /// tell how much it counts. Empty elsewhere.
+    /// The same for the square of the luminance, if links carry emission: a few rays miss a small lamp, so that only
+    /// links give their variance. Empty otherwise.
     pub squares: &'a [LeafLight],
-    /// What blocks.
+    /// The occluders.
     pub rays: &'a RayTree,
-    /// Which noise shows.
+    /// The visibility of errors and noise.
     pub limits: Limits,
-    /// Change of irradiance (luminance) of a vertex below which rays are not asked again.
-    pub settled: f32,
-    /// Stops it.
+    /// Change of irradiance (luminance) of a vertex at which rounds end.
+    pub converged_change: f32,
+    /// The request to stop.
     pub cancel: &'a Cancel,
 }
 
-/// What a final gather finds.
-pub(crate) struct Gathering {
-    /// By vertex, what linked light is to be multiplied by; empty for 1.
+/// Result of a final gather.
+pub(crate) struct GatherFactors {
+    /// Factor of the linked light by vertex; empty for 1.
     pub factors: Vec<Vec4>,
     /// Rays shot.
     pub ray_count: u64,
 }
 
-/// Change of irradiance of a vertex that is too small to ask rays again, for a tolerance of sweeps and the mean irradiance.
-pub(crate) fn settled_change(tolerance: f32, mean_irradiance: f32) -> f32 {
-    SETTLED * tolerance * mean_irradiance
+/// Change of irradiance (luminance) of a vertex at which rounds end, for a tolerance of sweeps and a mean irradiance.
+pub(crate) fn converged_change(tolerance: f32, mean_irradiance: f32) -> f32 {
+    CONVERGED_SHARE * tolerance * mean_irradiance
 }
 
 impl FinalGather<'_> {
-    /// Find by what linked light at vertices is to be multiplied; `None` when cancelled. Where nothing blocks, links tell all.
-    pub(crate) fn run(self) -> Option<Gathering> {
+    /// Find the factors of the linked light; `None` when cancelled. In a clear scene they are 1.
+    pub(crate) fn run(self) -> Option<GatherFactors> {
         if self.rays.is_clear() {
-            return Some(Gathering {
+            return Some(GatherFactors {
                 factors: Vec::new(),
                 ray_count: 0,
             });
         }
         let hierarchy = self.surfaces.hierarchy;
-        // Light at vertices as links and shadow rays tell it.
+        // Light at vertices from links and from shadow rays.
         let linked = VertexMeans::new(hierarchy, self.leaves, &[]).irradiance;
         let direct: Vec<Vec4> = match self.surfaces.direct {
             Some(field) => field
@@ -173,43 +172,45 @@ impl FinalGather<'_> {
         };
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         // A few rays from each vertex.
-        let mut looks = self.looks(&linked);
-        let looking = MOST_LOOKING / looks.len().max(1);
-        let looking = (looking as u32).clamp(LEAST_LOOKING, LOOKING);
+        let mut probes = self.probes(&linked);
+        let probe_rays = MOST_PROBE_RAYS_IN_ALL / probes.len().max(1);
+        let probe_rays = (probe_rays as u32).clamp(LEAST_PROBE_RAYS, MOST_PROBE_RAYS);
         let senders = self.senders();
-        let mut ray_count = self.shoot(&mut looks, |_| looking)?;
-        ask(&mut looks, &senders, &received);
-        looks.retain(|look| look.found.backs * RAYS_OF_BACK <= look.found.rays);
-        // Many where these differ from links.
+        let mut ray_count = self.shoot(&mut probes, |_| probe_rays)?;
+        evaluate(&mut probes, &senders, &received);
+        probes.retain(|probe| probe.found.backs * RAYS_OF_BACK <= probe.found.rays);
+        // Many where these differ from the linked light.
         let edges = edges(hierarchy);
-        let is_corner = in_corners(&edges, hierarchy.mesh.vertices.len(), &looks, self.limits);
-        let mut most = looking;
-        while most < GATHERING {
+        let is_corner = in_corners(&edges, hierarchy.mesh.vertices.len(), &probes, self.limits);
+        let mut most = probe_rays;
+        while most < MOST_GATHER_RAYS {
             most *= 2;
-            let more = |look: &Look| match is_corner[look.vertex] && look.is_noisy(self.limits) {
+            let more = |probe: &VertexProbe| match is_corner[probe.vertex]
+                && probe.is_noisy(self.limits)
+            {
                 true => most,
-                false => look.found.rays,
+                false => probe.found.rays,
             };
-            ray_count += self.shoot(&mut looks, more)?;
-            ask(&mut looks, &senders, &received);
+            ray_count += self.shoot(&mut probes, more)?;
+            evaluate(&mut probes, &senders, &received);
         }
-        // What they mean for the light, until that agrees with itself.
+        // The factors for which the light is consistent.
         let light = [&linked, &direct].map(Vec::as_slice);
-        let factors = self.settled_factors(&mut looks, &senders, &edges, light)?;
-        Some(Gathering { factors, ray_count })
+        let factors = self.converged_factors(&mut probes, &senders, &edges, light)?;
+        Some(GatherFactors { factors, ray_count })
     }
 
-    /// Correct linked and direct light at the vertices by what rays found, ask them again, and so on until nothing changes.
-    /// Returns factors by vertex.
-    fn settled_factors(
+    /// Correct the linked light at the vertices by the estimates and evaluate the rays again, until the light
+    /// converges. Returns factors by vertex.
+    fn converged_factors(
         &self,
-        looks: &mut [Look],
+        probes: &mut [VertexProbe],
         senders: &[Sender],
         edges: &[[usize; 2]],
         [linked, direct]: [&[Vec4]; 2],
     ) -> Option<Vec<Vec4>> {
         let mesh = &self.surfaces.hierarchy.mesh;
-        let tells = |element: &Element, side| !element.is_inside_solid_at(side);
+        let is_known = |element: &Element, side| !element.is_inside_solid_at(side);
         let areas = mesh.areas_about_vertices();
         let mut received: Vec<Vec4> = linked.iter().zip(direct).map(|(a, b)| a + b).collect();
         let mut acceleration = Anderson::new(DEPTH);
@@ -217,11 +218,11 @@ impl FinalGather<'_> {
         loop {
             self.cancel.proceed()?;
             let mut ratios = vec![None; mesh.vertices.len()];
-            for look in &*looks {
-                ratios[look.vertex] = Some(look.found.over(look.linked, look.variance));
+            for probe in &*probes {
+                ratios[probe.vertex] = Some(probe.found.over(probe.linked, probe.variance));
             }
             let mut factors = factors(ratios, edges);
-            carry_over(mesh, tells, &mut factors);
+            carry_over(mesh, is_known, &mut factors);
             let lights = linked.iter().zip(direct).zip(&factors);
             let corrected: Vec<Vec4> = lights.map(|((l, d), factor)| l * *factor + d).collect();
             let changes = corrected.iter().zip(&received);
@@ -229,22 +230,22 @@ impl FinalGather<'_> {
                 .map(|(new, old)| luminance((new - old).abs()))
                 .fold(0.0, f32::max);
             round += 1;
-            if change <= self.settled || round >= MOST_ROUNDS {
+            if change <= self.converged_change || round >= MOST_ROUNDS {
                 return Some(factors);
             }
             received = acceleration.next(&areas, &received, &corrected);
-            ask(looks, senders, &received);
+            evaluate(probes, senders, &received);
         }
     }
 
-    /// The vertices at which enough light is indirect, by linked irradiance.
-    fn looks(&self, linked: &[Vec4]) -> Vec<Look> {
+    /// The vertices at which enough light is indirect, given the linked irradiance.
+    fn probes(&self, linked: &[Vec4]) -> Vec<VertexProbe> {
         let Surfaces { hierarchy, direct } = self.surfaces;
         let mesh = &hierarchy.mesh;
         let weights = vertex_share_roots(hierarchy);
         let emitted = emitted_as_irradiance(hierarchy);
         let squares = VertexMeans::new(hierarchy, self.squares, &[]).irradiance;
-        let look = |(vertex, place): (u32, Receiver)| {
+        let probe = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
             let direct = match direct {
                 Some(field) => field.corner(vertex),
@@ -253,7 +254,7 @@ impl FinalGather<'_> {
             let all = luminance(linked + direct);
             let leaving = all + emitted[vertex as usize];
             let square = luminance(squares[vertex as usize]);
-            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| Look {
+            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| VertexProbe {
                 vertex: vertex as usize,
                 place,
                 linked,
@@ -261,7 +262,7 @@ impl FinalGather<'_> {
                 weight: weights[vertex as usize],
                 variance: (square - luminance(linked).powi(2)).max(0.0),
                 met: Vec::new(),
-                found: Gathered::default(),
+                found: GatherEstimate::default(),
             })
         };
         let all = vec![true; mesh.vertices.len()];
@@ -269,25 +270,29 @@ impl FinalGather<'_> {
         let none = OffsetPlaces::default();
         let offsets = direct.map_or(&none, |field| &field.offsets);
         let places = offsets.vertex_places(hierarchy, elements, &all);
-        places.into_iter().filter_map(look).collect()
+        places.into_iter().filter_map(probe).collect()
     }
 
-    /// Shoot rays until each vertex has had as many as are wanted. Returns the rays shot; `None` when cancelled.
-    fn shoot(&self, looks: &mut [Look], wanted: impl Fn(&Look) -> u32 + Sync) -> Option<u64> {
-        let shot: Vec<u32> = looks
+    /// Shoot rays until each vertex has had the wanted number. Returns the rays shot; `None` when cancelled.
+    fn shoot(
+        &self,
+        probes: &mut [VertexProbe],
+        wanted: impl Fn(&VertexProbe) -> u32 + Sync,
+    ) -> Option<u64> {
+        let shot: Vec<u32> = probes
             .par_iter_mut()
             .with_min_len(16)
-            .map(|look| {
+            .map(|probe| {
                 if self.cancel.is_cancelled() {
                     return 0;
                 }
-                let mut random = Random::new(self.limits.seed, look.vertex as u64);
+                let mut random = Random::new(self.limits.seed, probe.vertex as u64);
                 let shift = random.uniform_2d();
-                let (before, rays) = (look.met.len() as u32, wanted(look));
+                let (before, rays) = (probe.met.len() as u32, wanted(probe));
                 for index in before..rays {
                     let square = low_discrepancy_2d(index, shift);
-                    let direction = cosine_direction(look.place.normal, square);
-                    look.met.push(self.meet(&look.place, direction));
+                    let direction = cosine_direction(probe.place.normal, square);
+                    probe.met.push(self.meet(&probe.place, direction));
                 }
                 rays - before
             })
@@ -319,7 +324,7 @@ impl FinalGather<'_> {
         Met::Leaf(leaf as u32, [a, b])
     }
 
-    /// What each element sends over links if it is a leaf.
+    /// All leaves outside solids as sources, by element.
     fn senders(&self) -> Vec<Sender> {
         let hierarchy = self.surfaces.hierarchy;
         let elements = &hierarchy.mesh.elements;
@@ -343,7 +348,7 @@ impl FinalGather<'_> {
     }
 }
 
-/// By vertex, the irradiance (luminance) of which the elements about it would reflect as much light as they emit.
+/// By vertex, the irradiance (luminance) for which the elements about it would reflect as much light as they emit.
 fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
     let mesh = &hierarchy.mesh;
     let power = |leaf: usize, radiosity: Vec3| {
@@ -357,52 +362,53 @@ fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
         .collect()
 }
 
-/// Count the radiosity of what rays met, of irradiance `received` at vertices.
-fn ask(looks: &mut [Look], senders: &[Sender], received: &[Vec4]) {
+/// Evaluate the estimates from the hits of all rays, for the irradiance `received` at vertices.
+fn evaluate(probes: &mut [VertexProbe], senders: &[Sender], received: &[Vec4]) {
     let radiosity = |met: &Met| match *met {
         Met::Nothing => Some(Vec4::ZERO),
         Met::Back => None,
         Met::Leaf(leaf, shares) => Some(senders[leaf as usize].radiosity(shares, received)),
     };
-    looks.par_iter_mut().with_min_len(64).for_each(|look| {
-        look.found = Gathered::default();
-        for met in &look.met {
-            look.found.count(radiosity(met));
+    probes.par_iter_mut().with_min_len(64).for_each(|probe| {
+        probe.found = GatherEstimate::default();
+        for met in &probe.met {
+            probe.found.count(radiosity(met));
         }
     });
 }
 
-/// Vertices at the ends of the edges of leaves; inner edges come twice.
+/// The edges of leaves, as pairs of vertices; inner edges come twice.
 fn edges(hierarchy: &Hierarchy) -> Vec<[usize; 2]> {
     let mesh = &hierarchy.mesh;
     let of = |leaf: usize| mesh.elements[leaf].edges();
     mesh.active_leaves().flat_map(of).collect()
 }
 
-/// Vertices that find something else than links tell, together with their neighbours, and these neighbours.
+/// Whether the estimates of a vertex and its neighbours differ from the linked light, or those of a neighbour do; by
+/// vertex.
 fn in_corners(
     edges: &[[usize; 2]],
     vertex_count: usize,
-    looks: &[Look],
+    probes: &[VertexProbe],
     limits: Limits,
 ) -> Vec<bool> {
-    // Gap, its variance, and how many.
+    // The difference, its variance, and the number of vertices.
     let mut own = vec![(0.0f32, 0.0f32, 0.0f32); vertex_count];
-    for look in looks {
-        let (gap, variance) = look.found.gap(look.linked, look.variance);
-        own[look.vertex] = (gap, variance, 1.0);
+    for probe in probes {
+        let (gap, variance) = probe.found.gap(probe.linked, probe.variance);
+        own[probe.vertex] = (gap, variance, 1.0);
     }
     let mut pooled = own.clone();
     for &[vertex, next] in edges {
-        // An inner edge comes once from each end, so each neighbour is taken once, but at borders.
+        // An inner edge comes once from each end, so each neighbour is added once, except at borders.
         let (sum, next) = (&mut pooled[vertex], own[next]);
         *sum = (sum.0 + next.0, sum.1 + next.1, sum.2 + next.2);
     }
     let mut differs = vec![false; vertex_count];
-    for look in looks {
-        let (gap, variance, number) = pooled[look.vertex];
-        let is_seen = limits.is_seen(gap.abs() / number.max(1.0), look.all, look.weight);
-        differs[look.vertex] = is_seen && gap * gap > DEVIATIONS * DEVIATIONS * variance;
+    for probe in probes {
+        let (gap, variance, number) = pooled[probe.vertex];
+        let is_visible = limits.is_visible(gap.abs() / number.max(1.0), probe.all, probe.weight);
+        differs[probe.vertex] = is_visible && gap * gap > DEVIATIONS * DEVIATIONS * variance;
     }
     let mut wanted = differs.clone();
     for &[a, b] in edges {

@@ -1,9 +1,9 @@
-//! Light at vertices: from links, and from rays in the last step.
+//! Light at vertices: from links, and in the last step from rays.
 
 mod final_gather;
-mod gathered;
+mod gather_estimate;
 mod reconstruct;
 
-pub(crate) use final_gather::{FinalGather, settled_change};
+pub(crate) use final_gather::{FinalGather, converged_change};
 pub(crate) use reconstruct::{LeafLight, VertexMeans, link_irradiance, own_irradiance};
-pub(crate) use reconstruct::{divide_bent, gather_leaves};
+pub(crate) use reconstruct::{divide_by_interpolation_error, gather_leaves};

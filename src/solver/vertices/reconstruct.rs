@@ -1,8 +1,8 @@
-//! From links to light at vertices.
+//! Light at vertices from links.
 //!
-//! Each leaf gathers once more, over its own links and those of everything above it, now at its own place and not at
-//! the clusters' centroids: light of clusters at its centroid, light of links to elements at each of its corners. A
-//! vertex takes the mean of the leaves that share it, so light is never carried over a crease or a material border.
+//! Each leaf gathers once more over its own links and those of its ancestors, at its own position instead of the
+//! centroids of clusters: over links of clusters at its centroid, over links of elements at each of its corners. A
+//! vertex takes the mean of the leaves that share it; vertices are not shared across creases and borders of materials.
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
     solver::{
         Cancel,
-        coverage::{Closure, Closures},
+        coverage::{CoverageMap, HemisphereCoverage},
         direct::{SPREAD_SHARE, Surfaces},
         limits::Limits,
         places::{OffsetPlaces, carry_over, project, share_root},
@@ -20,38 +20,39 @@ use crate::{
     transport::{Kernel, Link, LinkStore, Sights, luminance, self_irradiance},
 };
 
-/// Patches of the clusters whose leaves are visited by one task; fewer in small scenes.
+/// Most patches of a group whose leaves one task visits; fewer in small scenes.
 const TASK_PATCHES: u32 = 256;
 
-/// A cluster looks alike from a group of leaves if it is further away than this many times their radius. Smaller, and
-/// seams show between groups; larger, and the same is worked out again and again.
+/// Distance, in radii of a group of leaves, from which the projected power of a cluster is evaluated once for the
+/// group. Smaller, and seams between groups are visible; larger, and it is evaluated for each leaf.
 const SIGHT_DISTANCE: f32 = 8.0;
 
-/// The same in coarse steps, whose links err by more.
+/// The same in coarse steps, whose links have larger errors.
 const COARSE_SIGHT_DISTANCE: f32 = 4.0;
 
-/// What an element that lies within a solid in part counts at a vertex beside others: links see it as a whole.
+/// Weight of a contact element beside others at a vertex: links see it as a whole. Smaller, and rounding decides;
+/// larger, and vertices beside contacts are too dark.
 const CONTACT_TRUST: f32 = 1e-3;
 
-/// What a leaf found.
+/// Linked light of a leaf.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LeafLight {
     /// The leaf.
     pub element: u32,
-    /// Linked irradiance at its corners.
+    /// Linked irradiance at its corners, W/m²; the sum of form factors in the fourth channel.
     pub corners: [Vec4; 3],
-    /// Linked irradiance at its centroid.
+    /// The same at its centroid.
     pub centre: Vec4,
     /// Sum of the errors of its links (luminance).
     pub error: f32,
 }
 
-/// Linked irradiance of all leaves, in the order of the tree, where their direct light is evaluated; `None` when cancelled.
+/// Linked light of all leaves, in the order of the tree, at the places of their direct light; `None` when cancelled.
 pub(crate) fn gather_leaves(
     kernel: Kernel<'_>,
     surfaces: Surfaces<'_>,
     links: &LinkStore,
-    closures: &Closures,
+    coverage: &CoverageMap,
     is_coarse: bool,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
@@ -69,7 +70,7 @@ pub(crate) fn gather_leaves(
             let mut walk = Walk {
                 kernel,
                 links,
-                closures,
+                coverage,
                 offsets,
                 sight_distance,
                 path: Vec::new(),
@@ -86,11 +87,11 @@ pub(crate) fn gather_leaves(
     Some(found.into_iter().flatten().collect())
 }
 
-/// Scale the light of the leaves of one cell so that their form factors add to the closure; `nearby` is the mean radiosity
-/// of the neighbourhood.
-fn scale_to_closure(
+/// Scale the light of the leaves of one cell so that their form factors add to its coverage; `nearby` is the mean
+/// radiosity of the neighbourhood.
+fn scale_to_coverage(
     hierarchy: &Hierarchy,
-    closure: Closure,
+    coverage: HemisphereCoverage,
     nearby: Vec3,
     leaves: &mut [LeafLight],
 ) {
@@ -102,28 +103,29 @@ fn scale_to_closure(
     });
     for leaf in leaves {
         for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
-            *value = closure.scaled(*value, sums, nearby);
+            *value = coverage.scaled(*value, sums, nearby);
         }
     }
 }
 
-/// Links of a node, and what is left of those above it, as far as they are worked out for all leaves below together.
+/// Links of a node, and those of its ancestors that are not evaluated yet; some are evaluated for all leaves of the
+/// node together.
 #[derive(Default)]
 struct Chain<'a> {
-    /// Irradiance that is the same everywhere.
+    /// Isotropic irradiance, the same for all leaves.
     even: Vec4,
-    /// Sources that are far enough to look alike from everywhere, with their transmissions.
+    /// Sources far enough for one sight for all leaves, with their transmissions.
     sights: Sights,
-    /// The others.
+    /// The other links.
     rest: Vec<&'a Link>,
-    /// Links of elements, whose light is wanted at the corners of the leaves.
+    /// Links of the node if it is an element: they are evaluated at the corners of the leaves.
     own: &'a [Link],
     /// Sum of the errors of the links of clusters.
     error: f32,
 }
 
 impl<'a> Chain<'a> {
-    /// As new, with its memory.
+    /// Empty, with its memory for reuse.
     fn emptied(mut self) -> Self {
         self.sights.clear();
         self.rest.clear();
@@ -134,7 +136,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Take a link over. It is worked out if its source is further than `far` from a centre.
+    /// Add a link, as a sight if its source is a cluster further than `far` from a centre.
     fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, far: f32) {
         match kernel.hierarchy.kind(link.source) {
             Kind::Cluster(index)
@@ -147,7 +149,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Irradiance over the links that are worked out.
+    /// Irradiance over the evaluated links.
     fn known(&self, point: Vec3, normal: Vec3) -> Vec4 {
         self.sights.add_to(self.even, point, normal)
     }
@@ -157,19 +159,19 @@ impl<'a> Chain<'a> {
 struct Walk<'a> {
     kernel: Kernel<'a>,
     links: &'a LinkStore,
-    closures: &'a Closures,
+    coverage: &'a CoverageMap,
     offsets: &'a OffsetPlaces,
     /// See [`SIGHT_DISTANCE`].
     sight_distance: f32,
-    /// Of the nodes above the current one.
+    /// Chains of the ancestors of the current node.
     path: Vec<Chain<'a>>,
-    /// Those that are no longer needed, for their memory.
+    /// Unused chains, for their memory.
     spare: Vec<Chain<'a>>,
     found: Vec<LeafLight>,
 }
 
 impl<'a> Walk<'a> {
-    /// Visit all leaves below a cluster.
+    /// Visit all leaves of a cluster.
     fn enter(&mut self, group: usize) {
         let hierarchy = self.kernel.hierarchy;
         let mut above: Vec<usize> = Vec::new();
@@ -196,14 +198,14 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Cut the path to a length.
+    /// Shorten the path to a length.
     fn leave(&mut self, depth: usize) {
         while self.path.len() > depth {
             self.spare.extend(self.path.pop().map(Chain::emptied));
         }
     }
 
-    /// Add a node to the path, with the links that are not worked out above it.
+    /// Add a node to the path, with the links of its ancestors that are not evaluated yet.
     fn push(&mut self, centre: Vec3, radius: f32, mut chain: Chain<'a>) {
         let far = self.sight_distance * radius;
         if let Some(above) = self.path.last() {
@@ -214,6 +216,7 @@ impl<'a> Walk<'a> {
         self.path.push(chain);
     }
 
+    /// Add a cluster to the path.
     fn push_cluster(&mut self, index: usize) {
         let cluster = &self.kernel.hierarchy.clusters[index];
         let far = self.sight_distance * cluster.radius;
@@ -235,7 +238,7 @@ impl<'a> Walk<'a> {
         let normal = hierarchy.patches[patch].normal;
         let base = hierarchy.clusters.len() as u32;
         let (first, above) = (self.found.len(), self.path.len());
-        // Elements with the length of the path above them: depth first, without recursion.
+        // Elements with the length of the path to them: depth first, without recursion.
         let mut pending = vec![(patch, above)];
         while let Some((index, depth)) = pending.pop() {
             let element = &hierarchy.mesh.elements[index];
@@ -252,16 +255,16 @@ impl<'a> Walk<'a> {
             pending.extend(element.children().rev().map(|child| (child, depth + 1)));
         }
         self.leave(above);
-        // Leaves come depth first, so those of a cell follow each other.
-        let cell = |leaf: &LeafLight| self.closures.cell(hierarchy, leaf.element as usize);
-        let nearby = self.closures.nearby(self.kernel.tables, patch);
+        // Leaves come depth first, so those of a cell are consecutive.
+        let cell = |leaf: &LeafLight| self.coverage.cell(hierarchy, leaf.element as usize);
+        let nearby = self.coverage.nearby(self.kernel.tables, patch);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-            let closure = self.closures.of(cell(&leaves[0]));
-            scale_to_closure(hierarchy, closure, nearby, leaves);
+            let coverage = self.coverage.of(cell(&leaves[0]));
+            scale_to_coverage(hierarchy, coverage, nearby, leaves);
         }
     }
 
-    /// What a leaf finds; `own` are its links.
+    /// Linked light of a leaf, before scaling; `own` are its links.
     fn leaf_light(&self, index: usize, normal: Vec3, own: &[Link]) -> LeafLight {
         let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
         let centroid = hierarchy.mesh.elements[index].centroid;
@@ -296,18 +299,18 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// What all faces of a cluster receive over its link with itself.
+/// Irradiance of all faces of a cluster over its link with itself.
 pub(crate) fn own_irradiance(kernel: Kernel<'_>, cluster: usize, link: &Link) -> Vec4 {
     let total = kernel.tables.clusters[cluster].total();
     self_irradiance(kernel.hierarchy, cluster, total) * link.transmission()
 }
 
-/// What a face receives over a link from another node, of its own or of what is above it.
+/// Irradiance of a face over a link of its own or of an ancestor, from another node.
 pub(crate) fn link_irradiance(kernel: Kernel<'_>, link: &Link, point: Vec3, normal: Vec3) -> Vec4 {
     kernel.irradiance(link.source, point, normal) * transmission(kernel, link)
 }
 
-/// What gets through over a link where form factors are evaluated anew.
+/// Factor by channel of the irradiance over a link when its form factor is evaluated again.
 fn transmission(kernel: Kernel<'_>, link: &Link) -> Vec4 {
     match kernel.hierarchy.kind(link.source) {
         Kind::Cluster(_) => link.transmission(),
@@ -324,8 +327,8 @@ pub(crate) struct VertexMeans {
 }
 
 impl VertexMeans {
-    /// Average what leaves found over the vertices that they share. Irradiance is multiplied by `factors`, or by
-    /// 1 where there are none. Vertices that only close an edge take the mean of its ends.
+    /// Average the light of leaves over the vertices that they share. Irradiance is multiplied by `factors`, or by 1 if
+    /// they are empty. Vertices that only prevent cracks take the mean of the ends of their edge.
     pub(crate) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight], factors: &[Vec4]) -> Self {
         let count = hierarchy.mesh.vertices.len();
         let (mut irradiance, mut error) = (vec![Vec4::ZERO; count], vec![0.0f32; count]);
@@ -345,7 +348,7 @@ impl VertexMeans {
                 weight[vertex as usize] += area;
             }
         }
-        // Of patches that no light reaches it is known that they receive nothing.
+        // Patches that no light reaches receive nothing.
         for patch in hierarchy.active_patches().end..hierarchy.patches.len() {
             for &vertex in &hierarchy.mesh.elements[patch].vertices {
                 weight[vertex as usize] += hierarchy.patches[patch].area;
@@ -355,7 +358,7 @@ impl VertexMeans {
             irradiance[index] /= weight[index];
             error[index] /= weight[index];
         }
-        // Vertices that only elements in contact tell of, and what the elements receive in the mean.
+        // Vertices of contact elements only, and the means of elements.
         carry_over(
             &hierarchy.mesh,
             |element, _| element.is_outside_solids(),
@@ -366,7 +369,7 @@ impl VertexMeans {
             .map(|leaf| (leaf.element as usize, leaf.centre))
             .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
         project(hierarchy, &mut irradiance, centres);
-        // What rays found over this.
+        // The factors of the final gather.
         for (value, factor) in irradiance.iter_mut().zip(factors) {
             *value *= *factor;
         }
@@ -381,25 +384,25 @@ impl VertexMeans {
     }
 }
 
-/// Divide leaves between whose corners the light that they found over links bends, as direct light may. Returns whether there
-/// was room: else none is divided.
-pub(crate) fn divide_bent(
+/// Divide leaves whose linked light has an interpolation error above the tolerance. Returns whether memory allowed it;
+/// otherwise none is divided.
+pub(crate) fn divide_by_interpolation_error(
     hierarchy: &mut Hierarchy,
     found: &[LeafLight],
     limits: Limits,
     mean: f32,
 ) -> bool {
-    let is_bent = |light: &LeafLight| {
+    let has_error = |light: &LeafLight| {
         let element = &hierarchy.mesh.elements[light.element as usize];
         let corners = light.corners.map(luminance);
         let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
-        let bend = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
+        let error = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
         let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
         element.area_vector.length() * 0.25 >= limits.min_area
-            && (bend + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
+            && (error + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
     };
-    let bent = found.iter().filter(|light| is_bent(light));
-    let wanted: Vec<u32> = bent.map(|light| light.element).collect();
+    let divided = found.iter().filter(|light| has_error(light));
+    let wanted: Vec<u32> = divided.map(|light| light.element).collect();
     let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
     if fits {
         hierarchy.mesh.divide(&wanted);

@@ -9,13 +9,13 @@ pub fn omissions_ui(ui: &mut egui::Ui, state: &State) {
     let Some(snapshot) = &state.run.snapshot else {
         return;
     };
-    if snapshot.left_out.is_empty() {
+    if snapshot.omitted.is_empty() {
         return;
     }
-    egui::CollapsingHeader::new(format!("Omitted ({})", snapshot.left_out.len()))
+    egui::CollapsingHeader::new(format!("Omitted ({})", snapshot.omitted.len()))
         .id_salt("omitted")
         .show(ui, |ui| {
-            for omission in snapshot.left_out.iter() {
+            for omission in snapshot.omitted.iter() {
                 let reason = counts_in(&without_flags(&omission.reason));
                 ui.label(counts_in(&omission.what))
                     .on_hover_text(format!("{reason}; {}", omission.bound));

@@ -183,7 +183,10 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
     });
     for note in report.into_iter().flat_map(|report| &report.notes) {
-        ui.colored_label(theme::warning(ui.visuals()), without_flags(note));
+        ui.colored_label(
+            theme::warning(ui.visuals()),
+            without_flags(&note.to_string()),
+        );
     }
 }
 

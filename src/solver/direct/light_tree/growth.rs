@@ -1,18 +1,19 @@
-//! How the tree over emitters is made: split from the root on, by places or by normals, whole panels first.
+//! Construction of the tree over emitters: top-down splits by position or by normal, whole panels first.
 
 use glam::{DVec3, Vec3};
 
 use super::{LEAF_EMITTERS, NONE, Node};
 use crate::solver::direct::{emitter::Emitter, multipole::Extent, panel::Panel};
 
-/// What a spread of normals counts beside one of places. Where a node is split by normals first, lamps far from each other
-/// stay together; where it is split by places alone, both sides of a sheet do.
+/// Weight of the variance of normals relative to that of positions. Larger, and lamps far from each other stay
+/// together; smaller, and both sides of a sheet do.
 const NORMAL_WEIGHT: f64 = 0.9;
 
-/// Depth from which nodes are split at the median, so that no tree is deeper than this plus 32.
+/// Depth from which nodes are split at the median, so that no tree is deeper than this plus 32. Smaller, and splits are
+/// worse; larger, and degenerate trees are deep.
 const MEDIAN_DEPTH: u32 = 48;
 
-/// An emitter on its way into the tree, or a panel.
+/// An emitter or a panel that is put into the tree.
 #[derive(Clone, Copy)]
 struct Item {
     place: Vec3,
@@ -20,18 +21,18 @@ struct Item {
     index: usize,
 }
 
-/// A tree on its way.
+/// A tree under construction.
 pub(super) struct Growth<'a> {
     emitters: &'a [Emitter],
     panels: &'a [Panel],
-    /// Emitters and panels in the order of the tree, as far as it has come.
+    /// Emitters and panels so far, in the order of the tree.
     pub(super) order: Vec<usize>,
     pub(super) panel_order: Vec<usize>,
     pub(super) nodes: Vec<Node>,
 }
 
 impl<'a> Growth<'a> {
-    /// The whole tree over emitters of which those of each panel follow each other.
+    /// The tree over emitters; those of each panel must be consecutive.
     pub(super) fn over(emitters: &'a [Emitter], panels: &'a [Panel]) -> Self {
         let mut growth = Self {
             emitters,
@@ -53,7 +54,7 @@ impl<'a> Growth<'a> {
         growth
     }
 
-    /// Grow the tree over some panels.
+    /// Add a subtree over some panels.
     fn panels_below(&mut self, items: &mut [Item], depth: u32) {
         if let [panel] = items {
             self.panel_order.push(panel.index);
@@ -89,7 +90,7 @@ impl<'a> Growth<'a> {
         self.end(index, NONE, false);
     }
 
-    /// Grow the tree over emitters of one panel; `panel` is its number where they are all of it.
+    /// Add a subtree over emitters of one panel; `panel` is its number if they are all of them.
     fn emitters_below(&mut self, items: &mut [Item], panel: u32, depth: u32) {
         let index = self.begin();
         if items.len() <= LEAF_EMITTERS {
@@ -103,6 +104,7 @@ impl<'a> Growth<'a> {
         self.end(index, panel, true);
     }
 
+    /// Add a node before its children. Returns its index.
     fn begin(&mut self) -> usize {
         self.nodes.push(Node {
             start: self.order.len() as u32,
@@ -115,6 +117,7 @@ impl<'a> Growth<'a> {
         self.nodes.len() - 1
     }
 
+    /// Complete a node after its children.
     fn end(&mut self, node: usize, panel: u32, is_even: bool) {
         let (end, next) = (self.order.len() as u32, self.nodes.len() as u32);
         let node = &mut self.nodes[node];
@@ -123,8 +126,8 @@ impl<'a> Growth<'a> {
     }
 }
 
-/// Sort at least two items into those before and behind a cut, and return how many come before. They are cut at the
-/// mean of the axis along which they differ most, of places or of normals.
+/// Partition at least two items, and return the size of the first part. They are split at the mean along the axis of
+/// the largest variance, of positions or of normals.
 fn split(items: &mut [Item], depth: u32) -> usize {
     let count = items.len() as f64;
     let statistics = |of: fn(&Item) -> Vec3| {

@@ -1,8 +1,9 @@
-//! A tree over emitters, so that thousands of lamps cost a point hardly more than a hundred.
+//! A tree over emitters, by which thousands of lamps cost hardly more at a point than a hundred.
 //!
-//! A point takes the coarsest nodes of which the error does not count (a cut, as in Walter et al., "Lightcuts", 2005):
-//! near emitters give their exact irradiance, far ones that of their multipole together. A shadow ray to a node goes
-//! to one of its emitters, chosen on the way down by how much light the two sides of each node give at most.
+//! The light at a point is that of the coarsest nodes whose errors are tolerated (a cut, as in Walter et al.,
+//! "Lightcuts", 2005): near emitters give their exact irradiance, far ones that of their common multipole. A shadow ray
+//! to a node goes to one of its emitters, chosen from the node down by the largest irradiance that the two children of
+//! each node can give.
 
 mod growth;
 #[cfg(test)]
@@ -19,15 +20,18 @@ use super::{
 };
 use crate::{geometry::point_irradiance, solver::places::Receiver, transport::luminance};
 
-/// Error of a node of a cut, as a share of all light at the point. Cuts have some hundred nodes, whose errors differ in sign but
-/// for round lamps: of thousands of lamps all light is then right to 0.3 % (root mean square), of flat ones to 0.07 %. With three
-/// times as much it is right to 0.6 %, and cuts have a fifth fewer nodes.
+/// Tolerated error of a node of a cut, as a share of all light at the point. Cuts have some hundred nodes, whose errors
+/// differ in sign except for round lamps: the light of thousands of lamps is then right to 0.3 % (root mean square),
+/// that of flat ones to 0.07 %. Larger is less exact (with three times as much to 0.6 %, and cuts have a fifth fewer
+/// nodes); smaller makes cuts larger.
 const CUT_TOLERANCE: f32 = 1e-4;
 
-/// Emitters that are looked at one by one, at most: the cut through a tree of so few has hardly fewer nodes.
+/// Most emitters that are evaluated without a cut: it would have hardly fewer nodes. Smaller, and few lamps are
+/// inexact; larger, and they cost time.
 const FEW_EMITTERS: usize = 64;
 
-/// Emitters of a leaf at most. With 1, nodes take twice the memory; with many, cuts are finer than they need be.
+/// Most emitters of a leaf. Fewer, and nodes take more memory, twice as much with 1; more, and cuts are finer than
+/// needed.
 const LEAF_EMITTERS: usize = 4;
 
 /// Stands for a missing panel.
@@ -39,11 +43,11 @@ struct Node {
     /// Its emitters.
     start: u32,
     end: u32,
-    /// The node that comes after all below this one. One of which that is the next is a leaf.
+    /// Index of the node after all descendants of this one: the next index for a leaf.
     next: u32,
-    /// The panel that its emitters make up, or [`NONE`].
+    /// The panel that consists of its emitters, or [`NONE`].
     panel: u32,
-    /// Whether all its emitters belong to one panel, and so give their light evenly by area.
+    /// Whether all its emitters belong to one panel, and so have one radiosity.
     is_even: bool,
     extent: Extent,
 }
@@ -51,26 +55,26 @@ struct Node {
 /// Emitters, and the tree over them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightTree {
-    /// In the order of the tree; those of a panel follow each other.
+    /// In the order of the tree; those of a panel are consecutive.
     pub(crate) emitters: Vec<Emitter>,
     panels: Vec<Panel>,
-    /// Depth first: a parent, all below its first child, all below its second child.
+    /// Depth first: a parent, the subtree of its first child, that of its second child.
     nodes: Vec<Node>,
-    /// By node. Most nodes of a walk are told by their extent alone.
+    /// By node, apart from the nodes: a walk reads few of them.
     expansions: Vec<Expansion>,
-    /// Area of all emitters before each.
+    /// Summed area of all emitters before each; one entry more than there are emitters.
     area_before: Vec<f64>,
 }
 
-/// What arrives without occlusion from a node of a cut.
+/// The unoccluded light of a part of a cut.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arriving {
-    /// Luminance of it and of all before it in the cut.
+    /// Luminance of the irradiance of this part and of all before it in the cut.
     pub(crate) until: f32,
     pub(crate) target: Target,
 }
 
-/// Where the light of a part of a cut comes from.
+/// The emitter or the node of a part of a cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Target {
     Emitter(u32),
@@ -78,7 +82,7 @@ pub(crate) enum Target {
 }
 
 impl LightTree {
-    /// The tree over emitters of which those of each panel follow each other.
+    /// The tree over emitters; those of each panel must be consecutive.
     pub(crate) fn new(emitters: &[Emitter], panels: &[Panel]) -> Self {
         let Growth {
             order,
@@ -112,7 +116,7 @@ impl LightTree {
         tree
     }
 
-    /// Multipoles of the nodes, children before parents.
+    /// Compute the multipoles of the nodes, children before parents.
     fn carry_up(&mut self) {
         let mut lights: Vec<Option<Multipole>> = vec![None; self.nodes.len()];
         for index in (0..self.nodes.len()).rev() {
@@ -140,15 +144,15 @@ impl LightTree {
         [node + 1, self.nodes[node + 1].next as usize]
     }
 
-    /// Irradiance at a receiver without occlusion; `cut` becomes where it comes from, in the order of the tree. Errors are
-    /// relative to a luminance: that of all light at the receiver, where `None`.
+    /// Unoccluded irradiance at a receiver, W/m²; `cut` is set to its parts, in the order of the tree. Errors are
+    /// relative to the luminance `scale`, or for `None` to that of all light at the receiver.
     pub(crate) fn unoccluded(
         &self,
         receiver: &Receiver,
         scale: Option<f32>,
         cut: &mut Vec<Arriving>,
     ) -> Vec4 {
-        // Where nothing arrives it is 0, and what is behind the receiver or faces away is passed over all the same.
+        // It is 0 where no light arrives; nodes behind the receiver or facing away are skipped even then.
         let tolerance = (self.emitters.len() > FEW_EMITTERS)
             .then(|| CUT_TOLERANCE * scale.unwrap_or_else(|| self.rough_irradiance(receiver)));
         cut.clear();
@@ -158,7 +162,8 @@ impl LightTree {
             until += luminance(irradiance);
             cut.push(Arriving { until, target });
         };
-        // From the root down, past nodes that give nothing: as one where the error does not count, as a panel, or each emitter.
+        // From the root down, without nodes that give no light: a node whose error is tolerated, a panel, or single
+        // emitters.
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             let index = at;
@@ -193,7 +198,7 @@ impl LightTree {
         sum
     }
 
-    /// Irradiance of one emitter; `None` where the receiver lies on it.
+    /// Unoccluded irradiance of one emitter; `None` if the receiver lies on it.
     fn exact(&self, emitter: usize, receiver: &Receiver) -> Option<Vec4> {
         let emitter = &self.emitters[emitter];
         (emitter.triangle != receiver.triangle).then(|| {
@@ -202,7 +207,7 @@ impl LightTree {
         })
     }
 
-    /// Luminance of the irradiance without occlusion, to some tens of percent: what errors are relative to.
+    /// Luminance of the unoccluded irradiance, to some tens of percent, to which errors are relative.
     fn rough_irradiance(&self, receiver: &Receiver) -> f32 {
         let (mut sum, mut at) = (0.0, 0);
         while let Some(node) = self.nodes.get(at) {
@@ -224,8 +229,8 @@ impl LightTree {
         sum
     }
 
-    /// An emitter of a target for a place from 0 to 1, and what it gives by area there for each unit of the chance to be
-    /// chosen, up to a factor that is the same for all of the target.
+    /// An emitter of a target for a uniform number `place` in 0…1, and its power per probability of being chosen,
+    /// relative to the power of the target.
     pub(crate) fn pick(&self, target: Target, receiver: &Receiver, place: f32) -> (usize, f32) {
         let mut index = match target {
             Target::Emitter(emitter) => return (emitter as usize, 1.0),
@@ -262,7 +267,7 @@ impl LightTree {
         self.pick_in_leaf(index, receiver, place, whole * chance)
     }
 
-    /// As [`Self::pick`], in a leaf that is reached with some chance, here times the power of the target.
+    /// As [`Self::pick`], in a leaf; `chance` is its probability of being reached times the power of the target.
     fn pick_in_leaf(
         &self,
         leaf: usize,
@@ -291,7 +296,7 @@ impl LightTree {
         (emitters.start + chosen, per_chance)
     }
 
-    /// The emitter that holds a place of the area of a node, given from 0 to 1.
+    /// The emitter of a node at a share `place` of its area, 0…1.
     fn at_area(&self, node: &Node, place: f32) -> usize {
         let before = &self.area_before[node.start as usize..node.end as usize];
         let first = before[0];
@@ -302,7 +307,7 @@ impl LightTree {
     }
 }
 
-/// The share of the first of two parts; as `otherwise` has it where both are 0.
+/// The share of the first of two parts; that of `otherwise` if both are 0.
 fn share_of(first: f32, second: f32, otherwise: impl Fn() -> f32) -> f32 {
     match first / (first + second) {
         share if share.is_finite() => share,

@@ -1,4 +1,4 @@
-//! A tree gives the light of its emitters.
+//! A tree gives the light of its emitters, and samples them in proportion to it.
 
 use glam::Vec3;
 
@@ -35,7 +35,7 @@ impl Lamps {
         });
     }
 
-    /// A square of some edge length about a centre, that looks along a direction.
+    /// A square with this edge length about a centre, facing a direction.
     fn square(&mut self, centre: Vec3, normal: Vec3, edge: f32, radiosity: Vec4) {
         let (u, v) = normal.any_orthonormal_pair();
         let (u, v) = (u * (edge * 0.5), v * (edge * 0.5));
@@ -73,7 +73,7 @@ fn ceiling(n: usize) -> Lamps {
     lamps
 }
 
-/// Round lamps of `20 · 16` faces each about random places.
+/// Round lamps of 288 faces each about random points.
 fn bulbs(count: usize) -> Lamps {
     let (mut lamps, mut random) = (Lamps::default(), Random::new(1, 0));
     for _ in 0..count {
@@ -105,7 +105,7 @@ fn bulbs(count: usize) -> Lamps {
     lamps
 }
 
-/// Sheets that shine on both sides.
+/// Sheets that emit on both sides.
 fn sheets() -> Lamps {
     let mut lamps = Lamps::default();
     for (x, y) in (0..20).flat_map(|x| (0..20).map(move |y| (x, y))) {
@@ -116,7 +116,7 @@ fn sheets() -> Lamps {
     lamps
 }
 
-/// Loose small faces of all colours and directions.
+/// Separate small faces of all colours and directions.
 fn swarm(count: usize) -> Lamps {
     let (mut lamps, mut random) = (Lamps::default(), Random::new(2, 0));
     for _ in 0..count {
@@ -128,7 +128,7 @@ fn swarm(count: usize) -> Lamps {
     lamps
 }
 
-/// Places on the walls, the floor and the ceiling of a room about the lamps, and within it.
+/// Places on the surfaces of a room about the lamps, and inside it.
 fn receivers(count: usize) -> Vec<Receiver> {
     let mut random = Random::new(3, 0);
     let mut receivers = Vec::new();
@@ -189,7 +189,7 @@ fn a_cut_gives_the_light_of_all_emitters_by_colour() {
 fn cuts_hardly_grow_with_the_number_of_lamps() {
     let size = |n: usize| {
         let (tree, mut cut) = (ceiling(n).tree(), Vec::new());
-        // Beside the lamps, there are as many near ones as there are lamps.
+        // The number of near lamps of a place beside them grows with their density.
         let receivers: Vec<Receiver> = receivers(200)
             .into_iter()
             .filter(|receiver| receiver.point.z < 2.0)
@@ -237,7 +237,7 @@ fn emitters_are_picked_by_the_light_that_they_give() {
                     .sum::<f32>()
                     / COUNT as f32;
                 let found = mean * node_of.extent.power;
-                // What one side of a node may be taken to give nothing of does not count.
+                // Light of children that count as giving none is lost.
                 let slack = 0.02 * all + 1e-3 * cut[cut.len() - 1].until;
                 assert!((found - all).abs() <= slack, "{found} {all}");
             }

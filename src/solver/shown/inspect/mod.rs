@@ -1,8 +1,8 @@
-//! What a solve knows of one node: the links that light it, and the clusters above it.
+//! Inspection of one node: the links that light it, and its ancestors.
 //!
-//! A leaf receives over its own links and those of everything above it. Each link is read at the leaf's centroid, as
-//! `reconstruct` reads it, so that the shares add to the light that is shown. A cluster is read as one receiver: the
-//! mean over its faces of what its links, and those above, bring to its centroid.
+//! A leaf receives over its own links and those of its ancestors. Each link is evaluated at the leaf's centroid, as
+//! `reconstruct` does, so that the parts add to the displayed light. A cluster is evaluated as one receiver: the mean
+//! over its faces of the irradiance at its centroid over its own links and those of its ancestors.
 
 #[cfg(test)]
 mod tests;
@@ -15,7 +15,7 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Reading},
     solver::{
         ClusterBox, InspectedLink, Inspection, PathNode, Place, Subject,
-        coverage::Closures,
+        coverage::CoverageMap,
         direct::Surfaces,
         iteration::LinkedLight,
         vertices::{LeafLight, link_irradiance, own_irradiance},
@@ -23,27 +23,27 @@ use crate::{
     transport::{Kernel, Link, luminance},
 };
 
-/// What is looked into.
+/// The state that is inspected.
 #[derive(Clone, Copy)]
 pub(crate) struct Inspector<'a> {
-    /// The nodes, and the light that falls on them straight from emitters.
+    /// The nodes, with their direct light.
     pub surfaces: Surfaces<'a>,
     /// Light over links.
     pub linked: &'a LinkedLight,
     /// How tables are read.
     pub reading: Option<Reading>,
-    /// What form factors are scaled to.
-    pub closures: &'a Closures,
-    /// What leaves found when they gathered last.
+    /// Coverage to which form factors are scaled.
+    pub coverage: &'a CoverageMap,
+    /// Linked light of the leaves when they gathered last.
     pub leaves: &'a [LeafLight],
-    /// Boxes of the clusters after the last whole step.
+    /// Figures of the clusters after the last whole step.
     pub boxes: &'a [ClusterBox],
-    /// That step.
+    /// Number of that step.
     pub step: u32,
 }
 
 impl<'a> Inspector<'a> {
-    /// What is known of a node, or `None` where there is no such node.
+    /// Inspect a node; `None` if there is no such node.
     pub(crate) fn inspect(&self, subject: &Subject) -> Option<Inspection> {
         let hierarchy = self.hierarchy();
         let node = match *subject {
@@ -58,7 +58,7 @@ impl<'a> Inspector<'a> {
                 let light: Vec3 = links.iter().map(|link| link.irradiance).sum();
                 (
                     self.surfaces.direct(leaf).color(),
-                    self.closure_scale(leaf, light.extend(row_sum)),
+                    self.coverage_scale(leaf, light.extend(row_sum)),
                 )
             }
             Kind::Cluster(_) => (Vec3::ZERO, Vec3::ONE),
@@ -90,7 +90,7 @@ impl<'a> Inspector<'a> {
         self.linked.kernel(self.hierarchy(), self.reading)
     }
 
-    /// The leaf below an element that holds a point of it.
+    /// The leaf of an element that contains a point.
     fn leaf_at(&self, node: NodeId, point: Vec3) -> Option<NodeId> {
         let base = self.hierarchy().clusters.len();
         let element = node.index().checked_sub(base)?;
@@ -98,7 +98,7 @@ impl<'a> Inspector<'a> {
         Some(NodeId((base + leaf) as u32))
     }
 
-    /// From the root to a node.
+    /// The path from the root to a node.
     fn path_to(&self, node: NodeId) -> Vec<NodeId> {
         let hierarchy = self.hierarchy();
         let as_nodes = |clusters: Vec<usize>| clusters.into_iter().map(|at| NodeId(at as u32));
@@ -107,7 +107,7 @@ impl<'a> Inspector<'a> {
                 let first_patch = hierarchy.clusters[index].start as usize;
                 let mut path: Vec<NodeId> =
                     as_nodes(hierarchy.clusters_over(first_patch).collect()).collect();
-                // All clusters over its first patch that are not below it.
+                // All ancestors of its first patch that are not descendants of the cluster.
                 path.retain(|above| *above <= node);
                 path
             }
@@ -132,7 +132,7 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// The links of all nodes of a path, as its end receives over them; not yet scaled to the closure.
+    /// The links of all nodes of a path with their irradiance at its last node, not yet scaled to the coverage.
     fn links_along(&self, path: &[NodeId], node: NodeId) -> Vec<InspectedLink> {
         let kernel = self.kernel();
         let mut found = Vec::new();
@@ -164,13 +164,13 @@ impl<'a> Inspector<'a> {
         found
     }
 
-    /// By what the light of a leaf, with the sum of its form factors, is scaled in all so that they add to the closure.
-    fn closure_scale(&self, leaf: usize, light: Vec4) -> Vec3 {
+    /// Factor by colour of the light of a leaf, with the sum of its form factors, so that these add to the coverage.
+    fn coverage_scale(&self, leaf: usize, light: Vec4) -> Vec3 {
         if self.leaves.is_empty() {
             return Vec3::ONE;
         }
         let elements = &self.hierarchy().mesh.elements;
-        let cell_of = |element| self.closures.cell(self.hierarchy(), element);
+        let cell_of = |element| self.coverage.cell(self.hierarchy(), element);
         let cell = cell_of(leaf);
         let sums = self
             .leaves
@@ -181,8 +181,8 @@ impl<'a> Inspector<'a> {
                 (areas + area, rows + area * other.centre.form_factor_sum())
             });
         let patch = elements[leaf].patch as usize;
-        let nearby = self.closures.nearby(&self.linked.power, patch);
-        let scaled = self.closures.of(cell).scaled(light, sums, nearby);
+        let nearby = self.coverage.nearby(&self.linked.power, patch);
+        let scaled = self.coverage.of(cell).scaled(light, sums, nearby);
         let ratio = (scaled / light).color();
         Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }
@@ -226,7 +226,7 @@ impl<'a> Inspector<'a> {
     /// Luminance of the power that leaves a node, sampled emission included.
     fn power_of(&self, node: NodeId) -> f32 {
         match self.hierarchy().kind(node) {
-            // Boxes are renewed with each whole step.
+            // Figures of clusters are renewed with each whole step.
             Kind::Cluster(index) => self.boxes[index].power,
             Kind::Element(index) => {
                 let emission = if self.surfaces.is_sampled(index) {
@@ -240,7 +240,7 @@ impl<'a> Inspector<'a> {
         }
     }
 
-    /// Bounds of the linked power along a direction; those of an element are one.
+    /// Lower and upper bound of the linked power along a direction; equal for an element.
     fn power_bounds(&self, node: NodeId, direction: Vec3) -> [f32; 2] {
         match self.hierarchy().kind(node) {
             Kind::Cluster(index) => {
@@ -252,18 +252,18 @@ impl<'a> Inspector<'a> {
     }
 }
 
-/// Mean irradiance over the faces of a cluster, at its centroid, by a link of itself or of a cluster above.
+/// Mean irradiance over the faces of a cluster, at its centroid, over a link of itself or of an ancestor.
 fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Link) -> Vec4 {
     let hierarchy: &Hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
     if link.source == receiver {
-        // Light within a cluster comes from everywhere alike.
+        // Light within a cluster is isotropic.
         return own_irradiance(kernel, receiver.index(), link);
     }
     let incident = kernel.vector_irradiance(link.source, cluster.centroid);
     let moments = &kernel.tables.clusters[index];
     let area = cluster.area.max(f32::MIN_POSITIVE);
-    // The shares that faces take by `Incident::on_face`, in the mean.
+    // The mean over the faces of `Incident::on_face`.
     let reading = kernel.reading.unwrap_or(Reading::Bounded);
     let towards = incident.towards_source;
     let facing = moments.project(towards, reading).area() / area;
@@ -272,7 +272,7 @@ fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Li
     incident.strength * (link.transmission() * share)
 }
 
-/// By which links are ordered: luminance of what they bring.
+/// Luminance of the irradiance over a link, by which links are ordered.
 fn strength(link: &InspectedLink) -> f32 {
     luminance(link.irradiance.extend(0.0))
 }

@@ -1,4 +1,4 @@
-//! What is told of a node agrees with the light that is shown.
+//! Inspections agree with the displayed light.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ fn solved(name: &str, settings: SolveSettings) -> Solver {
 
 fn inspect_leaf(solver: &Solver, leaf: usize) -> Inspection {
     let element = &solver.hierarchy.mesh.elements[leaf];
-    // Asked for by its patch: the leaf must be found by the point.
+    // The query names the patch: the leaf must be found by the point.
     let node = NodeId(solver.hierarchy.clusters.len() as u32 + element.patch);
     let point = element.centroid;
     let inspection = solver.inspect(&Subject::Element { node, point });
@@ -36,7 +36,7 @@ fn inspect_leaf(solver: &Solver, leaf: usize) -> Inspection {
 }
 
 #[test]
-fn links_of_a_leaf_add_to_the_light_that_is_shown() {
+fn links_of_a_leaf_add_to_the_displayed_light() {
     let solver = solved("cornell", SolveSettings::draft());
     assert!(solver.leaves.len() > 100);
     for light in solver.leaves.iter().step_by(7) {
@@ -103,7 +103,7 @@ fn a_path_leads_from_the_root_through_nested_boxes() {
 }
 
 #[test]
-fn rows_of_a_closed_scene_add_to_one() {
+fn form_factors_in_an_enclosed_scene_add_to_one() {
     let solver = solved("furnace", SolveSettings::normal());
     let leaves: Vec<usize> = solver.hierarchy.mesh.leaves().collect();
     let mut sum = 0.0;
@@ -127,19 +127,19 @@ fn a_cluster_receives_over_its_own_links_and_those_above() {
         let last = inspection.path.last().map(|last| last.place.node);
         assert_eq!(last, Some(node));
         assert!(inspection.linked.is_finite() && inspection.linked.min_element() >= 0.0);
-        // What comes over clusters is a part of what comes at all.
+        // A cluster receives a part of the light of its leaves.
         assert!(
             inspection.row_sum < 1.2,
             "cluster {index}: {}",
             inspection.row_sum
         );
     }
-    let beyond = NodeId(solver.hierarchy.clusters.len() as u32);
-    assert!(solver.inspect(&Subject::Cluster(beyond)).is_none());
+    let missing = NodeId(solver.hierarchy.clusters.len() as u32);
+    assert!(solver.inspect(&Subject::Cluster(missing)).is_none());
 }
 
 #[test]
-fn boxes_tell_who_sends_and_the_power_of_sampled_lamps() {
+fn figures_of_clusters_count_senders_and_the_power_of_sampled_lamps() {
     let solver = solved("cornell", SolveSettings::draft());
     assert!(solver.direct.is_some(), "the lamp is sampled");
     let boxes = &solver.snapshot.clusters;
@@ -158,7 +158,7 @@ fn boxes_tell_who_sends_and_the_power_of_sampled_lamps() {
         .sum();
     let reflected = luminance(solver.linked.power.clusters[0].total());
     assert!((boxes[0].power - emitted - reflected).abs() <= 1e-3 * boxes[0].power);
-    // The lamp looks down, and nothing emits upwards.
+    // The lamp faces down, and nothing emits upwards.
     let linked = solver.linked.power.clusters[0].six_faces().map(luminance);
     let added: Vec<f32> = boxes[0]
         .face_power

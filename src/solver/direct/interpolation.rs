@@ -1,7 +1,7 @@
-//! Over which elements the light of sampled emitters is as good as linear, where nothing casts a shadow.
+//! Interpolation error of the unoccluded light of sampled emitters.
 //!
-//! Elements are divided where their corners do not tell what lies between. Shadows could hide from all of them, and so
-//! large elements are divided whatever they see; without shadows it is enough to look closely at the light itself.
+//! All corners of an element may miss a shadow, and so large elements are divided whatever light they get. Without
+//! shadows it is enough to evaluate the unoccluded light at several places.
 
 use glam::Vec3;
 
@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Places on a triangle, barycentric: the middles of its sides and those of its quarters.
+/// Places on a triangle, barycentric: the midpoints of its sides and the centroids of its quarters.
 const PLACES: [Vec3; 7] = [
     Vec3::new(0.5, 0.5, 0.0),
     Vec3::new(0.0, 0.5, 0.5),
@@ -26,9 +26,14 @@ const PLACES: [Vec3; 7] = [
 ];
 
 impl Lights {
-    /// Whether the unoccluded light bends over an element: it is not linear between what its corners tell, or some
-    /// emitters are not sampled, so that it is not known.
-    pub(super) fn bend_over(&self, hierarchy: &Hierarchy, element: usize, limits: Limits) -> bool {
+    /// Whether linear interpolation of the unoccluded light between the corners of an element errs by more than the
+    /// tolerance, or the light is unknown because some emitters are not sampled.
+    pub(super) fn has_interpolation_error(
+        &self,
+        hierarchy: &Hierarchy,
+        element: usize,
+        limits: Limits,
+    ) -> bool {
         if !self.are_all(hierarchy) {
             return true;
         }
@@ -46,12 +51,12 @@ impl Lights {
             luminance(self.unoccluded(&receiver, None, &mut sums))
         };
         let corners = Vec3::from_array(Vec3::AXES.map(&mut light));
-        let bend = PLACES
+        let error = PLACES
             .map(|place| (light(place) - corners.dot(place)).abs())
             .into_iter()
             .fold(0.0, f32::max);
         let spread = corners.max_element() - corners.min_element();
         let mean = self.mean_power(hierarchy).max(f32::MIN_POSITIVE);
-        (bend + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
+        (error + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
     }
 }

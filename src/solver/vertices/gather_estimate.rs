@@ -1,8 +1,9 @@
-//! What rays find at vertices over what links tell there, and how far it is to be believed.
+//! Gather estimates at vertices, relative to the linked light, and their shrinkage towards it.
 //!
-//! Rays are noisy, and links are wrong in part, so the light that shows lies between both: it is moved towards what rays
-//! found by the share of the square of their difference that noise does not explain, taken over the neighbourhood (the
-//! rule of James and Stein). Where links are good, nothing changes.
+//! Estimates from rays are noisy, and linked light has errors, so the displayed light lies between both. The estimate
+//! is shrunk towards the linked light: the part of their difference that remains is the share of its square, over the
+//! neighbourhood, that noise does not explain (James and Stein, "Estimation with quadratic loss", 1961). Where links
+//! are right, nothing changes.
 
 use glam::Vec4;
 
@@ -11,35 +12,36 @@ use crate::{
     solver::places::agreement,
 };
 
-/// Standard errors of their difference by which neighbours may differ to be pooled by half. Smaller leaves grain, larger
-/// blurs.
+/// Difference at which neighbours are pooled with half weight, in standard errors of the difference. Smaller leaves
+/// grain; larger blurs.
 const HALF_DEVIATIONS: f32 = 2.0;
 
-/// Edges over which differences are compared with their noise. Fewer take noise for differences, more let one corner
-/// speak for its surroundings.
+/// Radius in edges of the neighbourhood over which differences are compared with their noise. Smaller takes noise for
+/// differences; larger extends corners to their surroundings.
 const NEIGHBOURHOOD: u32 = 3;
 
-/// What the square of noise is multiplied by before it is compared. Smaller shows noise, larger leaves errors of links.
+/// Factor of the variance of the noise in the comparison. Smaller leaves noise; larger leaves errors of links.
 const CAUTION: f32 = 2.0;
 
-/// Largest ratio of what is found to what is linked: where links tell almost nothing, it tells nothing.
+/// Largest ratio of the estimate to the linked light. Smaller leaves errors of links; larger makes bright spots where
+/// the linked light is almost 0.
 const MOST_RATIO: f32 = 4.0;
 
-/// What rays from a vertex found.
+/// An estimate of the indirect irradiance of a vertex from cosine-weighted rays.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Gathered {
+pub(super) struct GatherEstimate {
     /// Sum of the radiosities met.
     sum: Vec4,
     /// Sum of the squares of their luminances.
     squares: f32,
-    /// Rays shot.
+    /// Number of rays.
     pub rays: u32,
-    /// Rays that met the back of something.
+    /// Number of rays that met a back.
     pub backs: u32,
 }
 
-impl Gathered {
-    /// Count a ray by the radiosity that it met: `None` for a back.
+impl GatherEstimate {
+    /// Count a ray that met this radiosity; `None` for a back.
     pub(super) fn count(&mut self, met: Option<Vec4>) {
         self.rays += 1;
         self.backs += u32::from(met.is_none());
@@ -49,14 +51,14 @@ impl Gathered {
         self.squares += seen * seen;
     }
 
-    /// Irradiance.
+    /// The estimated irradiance, W/m².
     fn mean(&self) -> Vec4 {
         self.sum / self.rays.max(1) as f32
     }
 
-    /// By how much more luminance was found than is linked, and the square of its standard error: as if the rays were
-    /// independent and one more had been off by all that is linked, so that rays which all meet the dark prove nothing. Rays differ
-    /// by no less than links know, which say what the `variance` of one is at least.
+    /// Difference of the estimate to the linked irradiance (luminance), and the square of its standard error: as of
+    /// independent rays and one more that differs by all of the linked light, so that a few rays that all meet dark
+    /// surfaces are not certain. `variance` is the least variance of one ray, known from links.
     pub(super) fn gap(&self, linked: Vec4, variance: f32) -> (f32, f32) {
         let (count, linked) = (self.rays.max(1) as f32, luminance(linked));
         let mean = luminance(self.mean());
@@ -64,7 +66,7 @@ impl Gathered {
         (mean - linked, (spread + linked * linked) / (count * count))
     }
 
-    /// What was found over what is linked.
+    /// Ratio of the estimate to the linked irradiance; `variance` as in [`Self::gap`].
     pub(super) fn over(&self, linked: Vec4, variance: f32) -> Ratio {
         let (_, variance) = self.gap(linked, variance);
         let rays = self.rays.max(1) as f32;
@@ -72,20 +74,20 @@ impl Gathered {
         let unit = luminance(linked).max(f32::MIN_POSITIVE).powi(-2);
         Ratio {
             color: ratio.clamp(Vec4::ZERO, Vec4::splat(MOST_RATIO)),
-            // Rays that find more are beyond the largest ratio anyway.
+            // The ratio is bounded, and so is its variance.
             spread: (variance * rays * unit).min(MOST_RATIO * MOST_RATIO * rays),
             rays,
         }
     }
 }
 
-/// What rays find over what is linked.
+/// Ratio of an estimate to the linked irradiance, by colour.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ratio {
     color: Vec4,
     /// Variance of one ray.
     spread: f32,
-    /// Rays, or as many as it is worth.
+    /// Effective number of rays.
     rays: f32,
 }
 
@@ -100,7 +102,7 @@ impl Ratio {
     }
 }
 
-/// By what linked light at vertices is to be multiplied: 1 where nothing was found.
+/// Factors of the linked light by vertex, 0…[`MOST_RATIO`]; 1 without an estimate. Inner edges come twice in `edges`.
 pub(crate) fn factors(mut ratios: Vec<Option<Ratio>>, edges: &[[usize; 2]]) -> Vec<Vec4> {
     let edges: Vec<[usize; 2]> = edges
         .iter()
@@ -108,22 +110,26 @@ pub(crate) fn factors(mut ratios: Vec<Option<Ratio>>, edges: &[[usize; 2]]) -> V
         .filter(|edge| edge.iter().all(|&vertex| ratios[vertex].is_some()))
         .collect();
     pool(&mut ratios, &edges);
-    let trusts = trusts(&ratios, &edges);
+    let shrinkage_factors = shrinkage_factors(&ratios, &edges);
     let factor = |(ratio, trust): (Option<Ratio>, f32)| {
         ratio.map_or(Vec4::ONE, |ratio| Vec4::ONE.lerp(ratio.color, trust))
     };
-    ratios.into_iter().zip(trusts).map(factor).collect()
+    ratios
+        .into_iter()
+        .zip(shrinkage_factors)
+        .map(factor)
+        .collect()
 }
 
-/// Take neighbours together, as far as noise explains how they differ.
+/// Pool the ratios of neighbours as far as noise explains their differences.
 fn pool(ratios: &mut [Option<Ratio>], edges: &[[usize; 2]]) {
-    /// Sums over weights.
+    /// Weighted sums.
     #[derive(Clone, Copy, Default)]
     struct Sums {
         color: Vec4,
         spread: f32,
         weight: f32,
-        /// Of the squares of weights over rays.
+        /// Sum of the squares of weights over rays.
         squares: f32,
     }
     let mut sums = vec![Sums::default(); ratios.len()];
@@ -145,8 +151,8 @@ fn pool(ratios: &mut [Option<Ratio>], edges: &[[usize; 2]]) {
         };
         let gap = one.mean() - other.mean();
         let alike = agreement(gap, one.variance() + other.variance(), HALF_DEVIATIONS);
-        // Inner edges come twice, so that each counts by half. Weights go by the numbers of rays alone: rays that all met
-        // the dark differ least, so weights by variance would show everything too dark.
+        // Inner edges come twice, so each counts half. Weights depend on the numbers of rays alone: rays that all met
+        // dark surfaces have the least variance, so weights by variance would be biased towards the dark.
         add(a, &other, 0.5 * alike * other.rays, 2.0);
         add(b, &one, 0.5 * alike * one.rays, 2.0);
     }
@@ -161,9 +167,9 @@ fn pool(ratios: &mut [Option<Ratio>], edges: &[[usize; 2]]) {
     }
 }
 
-/// How far each ratio is to be trusted, 0…1.
-fn trusts(ratios: &[Option<Ratio>], edges: &[[usize; 2]]) -> Vec<f32> {
-    // Squares of differences, and of their noise.
+/// James–Stein factor of each ratio's difference from 1, 0…1: 0 where noise explains it.
+fn shrinkage_factors(ratios: &[Option<Ratio>], edges: &[[usize; 2]]) -> Vec<f32> {
+    // Squared differences, and their variances.
     let square = |ratio: &Option<Ratio>| {
         ratio.map_or((0.0, 0.0), |ratio| {
             let gap = ratio.mean() - 1.0;
@@ -199,13 +205,13 @@ mod tests {
     use crate::geometry::Random;
     use glam::Vec3;
 
-    /// What a vertex with linked light 1 finds where rays meet each of these luminances as often as the others.
+    /// Ratio at a vertex with linked light 1 whose rays meet these luminances in turn.
     fn ratio(met: &[f32], rays: u32) -> Ratio {
         ratio_over(Vec3::ONE.extend(0.0), met, rays)
     }
 
     fn ratio_over(linked: Vec4, met: &[f32], rays: u32) -> Ratio {
-        let mut found = Gathered::default();
+        let mut found = GatherEstimate::default();
         for ray in 0..rays {
             let seen = met[ray as usize % met.len()];
             found.count(Some(Vec3::splat(seen).extend(0.0)));
@@ -224,14 +230,14 @@ mod tests {
     }
 
     #[test]
-    fn what_many_rays_find_is_believed() {
+    fn estimates_from_many_rays_are_hardly_shrunk() {
         for factor in factors_in_row(vec![ratio(&[0.3, 0.4, 0.5], 255); 8]) {
             assert!((factor - 0.4).abs() < 0.01, "{factor}");
         }
     }
 
     #[test]
-    fn links_that_are_right_stay_as_they_are() {
+    fn linked_light_that_is_right_stays() {
         for rays in [16, 64, 256] {
             for factor in factors_in_row(vec![ratio(&[1.0], rays); 8]) {
                 assert_eq!(factor, 1.0);
@@ -240,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_not_shown() {
+    fn noise_is_shrunk() {
         let mut random = Random::new(3, 0);
         let noisy = |_| {
             let met: Vec<f32> = (0..16).map(|_| 2.0 * random.uniform()).collect();
@@ -258,9 +264,9 @@ mod tests {
         (values.map(|value| (value - 1.0).powi(2)).sum::<f32>() / count).sqrt()
     }
 
-    /// Rays that meet the dark by chance differ little from each other: they must not count for more.
+    /// Rays that all meet dark surfaces by chance have little variance: they must not get more weight.
     #[test]
-    fn what_few_rays_find_has_no_bias() {
+    fn pooled_estimates_from_few_rays_have_no_bias() {
         let mut random = Random::new(5, 0);
         let rare = |_| {
             let met = [(); 16].map(|()| if random.uniform() < 0.1 { 5.0 } else { 0.0 });
@@ -282,14 +288,14 @@ mod tests {
     }
 
     #[test]
-    fn few_rays_that_all_meet_the_dark_leave_a_doubt() {
+    fn few_rays_that_all_meet_dark_surfaces_are_not_certain() {
         let factors = [1, 16, 256].map(|rays| factors_in_row(vec![ratio(&[0.0], rays)])[0]);
         assert!(factors[0] == 1.0, "{factors:?}");
         assert!(factors.is_sorted_by(|a, b| a > b) && factors[2] < 0.02);
     }
 
     #[test]
-    fn no_factor_is_beyond_bounds() {
+    fn factors_are_bounded() {
         for met in [0.0, 1e-30, 1.0, 1e30] {
             for linked in [0.0, 1e-30, 1e30] {
                 let linked = Vec3::splat(linked).extend(0.0);

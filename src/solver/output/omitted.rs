@@ -1,23 +1,24 @@
-//! What a solve left out, for people.
+//! Omissions of a solve, described for people.
 
 use serde::Serialize;
 
-/// One thing that was left out, for people.
+/// One omitted part, described for people.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    /// What it is called; where it is the name of an [`Omission`](crate::solver::Omission), it can be kept.
+pub struct Omitted {
+    /// Its name; that of an [`Omission`](crate::solver::Omission) if [`Keep`](crate::solver::Keep) can require the
+    /// part.
     pub name: &'static str,
-    /// How many of it.
+    /// The number of omitted things.
     pub count: u64,
-    /// What was left out.
+    /// The omitted things, with their number.
     pub what: String,
-    /// Why it is not needed.
+    /// Why they are not needed.
     pub reason: String,
-    /// How far the light may differ from that with it.
+    /// How far the light may differ from that of a solve with them.
     pub bound: &'static str,
 }
 
-impl std::fmt::Display for LeftOut {
+impl std::fmt::Display for Omitted {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             name,

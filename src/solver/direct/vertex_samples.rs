@@ -1,5 +1,5 @@
-//! Where shadow rays are shot: first few from each vertex, more where neighbours disagree, and as many more as noise calls
-//! for.
+//! Shadow rays from vertices: first a few from each, more where neighbours disagree, and more where the noise is too
+//! large.
 
 use std::ops::Range;
 
@@ -19,17 +19,18 @@ use crate::{
     },
 };
 
-/// Shadow rays before the first picture, about: of large meshes fewer are shot from each vertex, so that the picture
-/// comes soon; the first step shoots the others.
+/// Approximate limit of the shadow rays before the first picture, for large meshes; the first step shoots the others.
+/// Fewer leave the first picture noisy; more delay it.
 const FIRST_RAYS: usize = 1 << 20;
 
-/// Share of the shadow rays that is shot first.
+/// Share of the shadow rays that is shot first, to find shadow borders. Smaller misses borders; larger costs rays in
+/// even light.
 const PROBING_SHARE: f32 = 0.25;
 
 impl DirectField {
-    /// Sample the corners of leaves for the first picture, by `samples` rays or fewer where there are many. Returns the rays
-    /// shot; `None` when cancelled.
-    pub(crate) fn cover_first(
+    /// Sample the corners of leaves for the first picture, by `samples` rays each, or fewer for large meshes. Returns
+    /// the rays shot; `None` when cancelled.
+    pub(crate) fn sample_vertices_first(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -38,15 +39,17 @@ impl DirectField {
         cancel: &Cancel,
     ) -> Option<u64> {
         let most = (FIRST_RAYS / hierarchy.mesh.vertices.len().max(1)).max(1);
-        self.cover(rays, hierarchy, samples.min(most as u32), seed, cancel)
+        self.sample_vertices(rays, hierarchy, samples.min(most as u32), seed, cancel)
     }
 
-    /// Sample the corners of leaves that have not had so many rays yet. Returns the rays shot.
+    /// Sample the corners of leaves that have had fewer than `samples` rays. Returns the rays shot; `None` when
+    /// cancelled.
     ///
-    /// A share of the rays comes first. Where those of all other vertices of the same elements agree there is no shadow
-    /// border, and they are enough, unless the vertex itself differs beyond chance. (To count its own rays, too, would be
-    /// biased: where a hundredth of the light arrives, only what few vertices saw would be thinned by more rays.)
-    pub(crate) fn cover(
+    /// A share of the rays comes first. If those of all other vertices of the same elements have the same outcome,
+    /// there is no shadow border, and they are enough, unless the vertex itself differs by more than chance. (A
+    /// decision by its own rays would be biased: where a hundredth of the light arrives, only vertices with a visible
+    /// ray would get more rays.)
+    pub(crate) fn sample_vertices(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -54,17 +57,17 @@ impl DirectField {
         seed: u64,
         cancel: &Cancel,
     ) -> Option<u64> {
-        // A vertex without light is new, and so are all elements about it.
+        // All elements about a new vertex are new.
         let first = if samples > self.samples {
             0
         } else {
-            self.covered
+            self.sampled_elements
         };
         let elements = first..hierarchy.mesh.elements.len();
         if elements.is_empty() {
             return Some(0);
         }
-        // The vertices that have not had so many rays; of new ones, what is expected.
+        // The vertices that have had fewer rays; new ones get their expected light.
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
         let is_due = |_, light: Option<DirectLight>| light.is_none_or(|had| had.tried < samples);
         let receivers = self.receivers(hierarchy, elements.clone(), is_due);
@@ -93,14 +96,14 @@ impl DirectField {
             self.forget(&receivers);
             return None;
         }
-        // All are sampled.
-        self.covered = elements.end;
+        // All vertices are sampled.
+        self.sampled_elements = elements.end;
         self.samples = self.samples.max(samples);
         Some(self.shot(&receivers) - before)
     }
 
-    /// Double the rays of vertices whose noise counts for more than a share of the tolerance. Returns the rays shot.
-    pub(super) fn settle(
+    /// Double the rays of vertices whose noise exceeds its tolerance. Returns the rays shot; `None` when cancelled.
+    pub(super) fn reduce_noise(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
@@ -111,7 +114,7 @@ impl DirectField {
         let weights = vertex_share_roots(hierarchy);
         let all = 0..hierarchy.mesh.elements.len();
         let neighbours = self.neighbours(hierarchy, all.clone());
-        // Where no contrast counts, nothing is doubtful.
+        // Doubt counts by contrast only.
         let disputed = limits
             .contrast
             .is_finite()
@@ -139,7 +142,7 @@ impl DirectField {
         Some(self.shot(&receivers) - before)
     }
 
-    /// Double the rays of points for as long as they are too noisy.
+    /// Double the rays of points while they are too noisy; `None` when cancelled.
     pub(super) fn double(
         &self,
         rays: &RayTree,
@@ -158,7 +161,7 @@ impl DirectField {
         cancel.proceed()
     }
 
-    /// What is known of some vertices.
+    /// The light of some vertices so far.
     fn known(&self, receivers: &[(u32, Receiver)]) -> Vec<DirectLight> {
         let known = |&(vertex, _): &(u32, Receiver)| self.vertices[vertex as usize];
         receivers
@@ -167,19 +170,19 @@ impl DirectField {
             .collect()
     }
 
-    /// What is now known of some vertices.
+    /// Store the light of some vertices.
     fn learn(&mut self, receivers: &[(u32, Receiver)], known: Vec<DirectLight>) {
         for (&(vertex, _), light) in receivers.iter().zip(known) {
             self.vertices[vertex as usize] = Some(light);
         }
     }
 
-    /// Have some vertices sampled anew.
+    /// Discard the light of some vertices, which are then sampled again.
     pub(super) fn forget(&mut self, receivers: &[(u32, Receiver)]) {
         for &(vertex, _) in receivers {
             self.vertices[vertex as usize] = None;
         }
-        self.covered = 0;
+        self.sampled_elements = 0;
     }
 
     /// Rays shot from some vertices.
@@ -190,6 +193,7 @@ impl DirectField {
         receivers.iter().map(shot).sum()
     }
 
+    /// Shoot shadow rays from some vertices until each has had `wanted`. Incomplete when cancelled.
     pub(super) fn shoot(
         &mut self,
         rays: &RayTree,
@@ -205,7 +209,7 @@ impl DirectField {
         self.learn(receivers, known);
     }
 
-    /// What the rays of the other corners of these elements found, by vertex.
+    /// By vertex, the tally of the other corners of its leaves among these elements.
     fn neighbours(&self, hierarchy: &Hierarchy, elements: Range<usize>) -> Vec<Tally> {
         let mut neighbours = vec![Tally::default(); self.vertices.len()];
         for leaf in hierarchy.mesh.leaves_among(elements) {
@@ -219,13 +223,13 @@ impl DirectField {
         neighbours
     }
 
-    /// What the rays of a vertex found.
+    /// The tally of a vertex.
     fn tally(&self, vertex: u32) -> Tally {
         let light = self.vertices[vertex as usize];
         light.map_or(Tally::default(), |light| light.tally())
     }
 
-    /// What the rays of the corners of an element found.
+    /// The tally of the corners of an element.
     pub(super) fn tally_of_corners(&self, hierarchy: &Hierarchy, element: usize) -> Tally {
         let mut sum = Tally::default();
         for vertex in hierarchy.mesh.elements[element].vertices {
@@ -234,7 +238,7 @@ impl DirectField {
         sum
     }
 
-    /// Which vertices lie among others whose rays had different outcomes, or another one than their own.
+    /// By vertex, whether the rays of its neighbours had different outcomes, or another one than its own.
     fn disputed(&self, neighbours: &[Tally]) -> Vec<bool> {
         let is_disputed = |(vertex, others): (usize, &Tally)| {
             others.is_mixed() || others.shot > 0 && !self.tally(vertex as u32).is_like(*others)
@@ -242,7 +246,7 @@ impl DirectField {
         neighbours.iter().enumerate().map(is_disputed).collect()
     }
 
-    /// As [`crate::solver::places::OffsetPlaces::vertex_places`] has it, by what is known of each vertex.
+    /// As [`crate::solver::places::OffsetPlaces::vertex_places`], for the vertices whose light so far is wanted.
     pub(super) fn receivers(
         &self,
         hierarchy: &Hierarchy,

@@ -1,0 +1,78 @@
+//! Notes of a step: measures that it took to stay stable, and limits that it met.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+/// A measure to stay stable or within a limit. Displayed and serialised as one sentence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Note {
+    /// The iteration did not converge.
+    NotConverged {
+        /// Sweeps of the step.
+        sweeps: u32,
+        /// Change of power by the last sweep, relative to the total power.
+        residual: f32,
+    },
+    /// The light grew from sweep to sweep, so the sums of form factors are bounded by 1.
+    GrowthBounded,
+    /// The light grew in spite of that bound, so the light of the last step stays.
+    GrowthUnbounded,
+    /// Only the scaling to the hemisphere coverage prevents growth.
+    CoarseLinks {
+        /// Power that unscaled links would return in each sweep, relative to the power sent.
+        gain: f64,
+    },
+    /// The memory limit prevented finer links or elements.
+    MemoryLimit,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotConverged { sweeps, residual } => write!(
+                out,
+                "the iteration has not converged after {sweeps} sweeps: the residual is {residual:.1e}"
+            ),
+            Self::GrowthBounded => out.write_str(
+                "the light grows from sweep to sweep: the sum of form factors of each element is bounded by 1",
+            ),
+            Self::GrowthUnbounded => out.write_str(
+                "the light still grows from sweep to sweep: the light of the last step stays",
+            ),
+            Self::CoarseLinks { gain } => write!(
+                out,
+                "the links are too coarse to conserve energy: unscaled, they would return {gain:.2} times the light \
+                 that is sent in each sweep; scaled to the hemisphere coverage, they do not"
+            ),
+            Self::MemoryLimit => {
+                out.write_str("the memory limit is reached; refinement stops here with what fits")
+            }
+        }
+    }
+}
+
+impl Serialize for Note {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_are_serialised_as_sentences() {
+        let note = Note::NotConverged {
+            sweeps: 100,
+            residual: 0.0125,
+        };
+        let text = serde_json::to_string(&[note, Note::MemoryLimit]).unwrap();
+        assert_eq!(
+            text,
+            "[\"the iteration has not converged after 100 sweeps: the residual is 1.3e-2\",\
+             \"the memory limit is reached; refinement stops here with what fits\"]"
+        );
+    }
+}
