@@ -11,11 +11,11 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    hierarchy::Hierarchy,
+    hierarchy::{Hierarchy, luminance},
     solver::{
         Cancel,
         limits::Limits,
-        places::{Receiver, vertex_share_roots},
+        places::{LEAST_PART, Receiver, emitted_as_irradiance, vertex_share_roots},
     },
 };
 
@@ -26,6 +26,13 @@ const FIRST_RAYS: usize = 1 << 20;
 /// Share of the shadow rays that is shot first, to find shadow borders. Smaller misses borders; larger costs rays in
 /// even light.
 const PROBING_SHARE: f32 = 0.25;
+
+impl DirectLight {
+    /// Whether it counts beside light that is emitted, given as the irradiance (luminance) that would be reflected so.
+    fn counts_beside(&self, emitted: f32) -> bool {
+        luminance(self.exact) > LEAST_PART * emitted || emitted <= 0.0
+    }
+}
 
 impl DirectField {
     /// Sample the corners of leaves for the first picture, by `samples` rays each, or fewer for large meshes. Returns
@@ -69,7 +76,10 @@ impl DirectField {
         }
         // The vertices that have had fewer rays; new ones get their expected light.
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
-        let is_due = |_, light: Option<DirectLight>| light.is_none_or(|had| had.tried < samples);
+        let emitted = emitted_as_irradiance(hierarchy);
+        let is_due = |vertex: usize, light: Option<DirectLight>| {
+            light.is_none_or(|had| had.tried < samples && had.counts_beside(emitted[vertex]))
+        };
         let receivers = self.receivers(hierarchy, elements.clone(), is_due);
         let before = self.shot(&receivers);
         for &(vertex, _) in &receivers {
@@ -89,7 +99,10 @@ impl DirectField {
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
             .copied()
-            .filter(|&(vertex, _)| disputed[vertex as usize])
+            .filter(|&(vertex, _)| {
+                let counts = |light: DirectLight| light.counts_beside(emitted[vertex as usize]);
+                disputed[vertex as usize] && self.vertices[vertex as usize].is_some_and(counts)
+            })
             .collect();
         self.shoot(rays, &rest, samples, seed, cancel);
         if cancel.is_cancelled() {
@@ -111,7 +124,10 @@ impl DirectField {
         mean: f32,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let weights = vertex_share_roots(hierarchy);
+        let (weights, emitted) = (
+            vertex_share_roots(hierarchy),
+            emitted_as_irradiance(hierarchy),
+        );
         let all = 0..hierarchy.mesh.elements.len();
         let neighbours = self.neighbours(hierarchy, all.clone());
         // Doubt counts by contrast only.
@@ -121,8 +137,9 @@ impl DirectField {
             .then(|| self.disputed(&neighbours));
         let may_be_noisy = |vertex: usize, light: &DirectLight| {
             let is_disputed = || disputed.as_ref().is_some_and(|disputed| disputed[vertex]);
-            limits.is_noisy(light, neighbours[vertex], weights[vertex], mean)
-                || is_disputed() && limits.is_doubtful(light, weights[vertex], mean)
+            light.counts_beside(emitted[vertex])
+                && (limits.is_noisy(light, neighbours[vertex], weights[vertex], mean)
+                    || is_disputed() && limits.is_doubtful(light, weights[vertex], mean))
         };
         let is_noisy = |vertex: usize, light: Option<DirectLight>| {
             light.is_some_and(|light| may_be_noisy(vertex, &light))

@@ -14,4 +14,4 @@ pub(crate) use contact::{
 };
 pub(crate) use offsets::{OffsetPlace, OffsetPlaces};
 pub(crate) use receivers::{INSET, Receiver, centre_of, inset};
-pub(crate) use shares::{share_root, vertex_share_roots};
+pub(crate) use shares::{LEAST_PART, emitted_as_irradiance, share_root, vertex_share_roots};

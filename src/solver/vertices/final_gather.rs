@@ -8,8 +8,6 @@
 //! into which links leak light, nothing remains in the end. The result is a factor by vertex, which also applies to
 //! other light on the same links.
 
-use std::f32::consts::PI;
-
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -25,7 +23,10 @@ use crate::{
         direct::Surfaces,
         iteration::Anderson,
         limits::Limits,
-        places::{OffsetPlaces, Receiver, carry_over, vertex_share_roots},
+        places::{
+            LEAST_PART, OffsetPlaces, Receiver, carry_over, emitted_as_irradiance,
+            vertex_share_roots,
+        },
     },
     transport::luminance,
 };
@@ -50,10 +51,6 @@ const MOST_GATHER_RAYS: u32 = 256;
 /// Difference from which the estimates of a vertex and its neighbours make a corner, in standard errors. Smaller shoots
 /// many rays by chance; larger misses corners.
 const DEVIATIONS: f32 = 1.5;
-
-/// Smallest indirect part of the light that leaves a vertex for which rays are shot: the light that a lamp reflects is
-/// not visible beside its emission. Smaller costs rays; larger leaves errors of links on bright surfaces.
-const LEAST_INDIRECT: f32 = 0.1;
 
 /// Most rounds of evaluation. Fewer leave light in enclosed white rooms; more change nothing visible.
 const MOST_ROUNDS: u32 = 64;
@@ -254,7 +251,7 @@ impl FinalGather<'_> {
             let all = luminance(linked + direct);
             let leaving = all + emitted[vertex as usize];
             let square = luminance(squares[vertex as usize]);
-            (luminance(linked) > LEAST_INDIRECT * leaving).then(|| VertexProbe {
+            (luminance(linked) > LEAST_PART * leaving).then(|| VertexProbe {
                 vertex: vertex as usize,
                 place,
                 linked,
@@ -346,20 +343,6 @@ impl FinalGather<'_> {
             })
             .collect()
     }
-}
-
-/// By vertex, the irradiance (luminance) for which the elements about it would reflect as much light as they emit.
-fn emitted_as_irradiance(hierarchy: &Hierarchy) -> Vec<f32> {
-    let mesh = &hierarchy.mesh;
-    let power = |leaf: usize, radiosity: Vec3| {
-        mesh.elements[leaf].area_vector.length() * luminance(radiosity.extend(0.0))
-    };
-    let emitted = mesh.sums_about_vertices(|leaf| power(leaf, hierarchy.emission_of(leaf) * PI));
-    let reflected = mesh.sums_about_vertices(|leaf| power(leaf, hierarchy.reflectance_of(leaf)));
-    let ratios = emitted.into_iter().zip(reflected);
-    ratios
-        .map(|(emitted, reflected)| emitted / reflected.max(f32::MIN_POSITIVE))
-        .collect()
 }
 
 /// Evaluate the estimates from the hits of all rays, for the irradiance `received` at vertices.
