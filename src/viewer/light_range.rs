@@ -56,7 +56,15 @@ fn value(snapshot: &Snapshot, mode: ViewMode, vertex: usize) -> f32 {
             luminance(snapshot.mesh.emission[vertex]) + reflected(snapshot, vertex)
         }
         ViewMode::Uncertainty => light.uncertainty.get(vertex).copied().unwrap_or(0.0),
-        _ => luminance(light.irradiance[vertex]),
+        ViewMode::Radiance
+        | ViewMode::LightOnly
+        | ViewMode::DirectOnly
+        | ViewMode::Reflectance
+        | ViewMode::Normals
+        | ViewMode::Elements
+        | ViewMode::FaceOrientation
+        | ViewMode::FalseIrradiance
+        | ViewMode::Error => luminance(light.irradiance[vertex]),
     }
 }
 

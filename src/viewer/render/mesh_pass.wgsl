@@ -113,7 +113,7 @@ fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
         // Uncertainty, and the measured error.
         case 9u, 10u: { return vec4<f32>(false_color(surface.light.x), 0.0); }
         // No light yet: the surfaces as a lamp beside the eye would show them.
-        case 11u: { return vec4<f32>(reflectance * (0.15 + 0.6 * facing), 0.0); }
+        case 255u: { return vec4<f32>(reflectance * (0.15 + 0.6 * facing), 0.0); }
         default: { return exposed(radiance); }
     }
 }

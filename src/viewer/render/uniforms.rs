@@ -10,8 +10,8 @@ const FLOAT_COUNT: usize = 16 + 5 * 4 + 9 * 4;
 const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
 /// Width of segments in points.
 const LINE_POINTS: f32 = 2.5;
-/// Number by which the shader knows surfaces without light.
-const PREVIEW_MODE: f32 = 11.0;
+/// Number by which the shader knows surfaces without light; no view mode has it.
+const PREVIEW_MODE: f32 = 255.0;
 /// Opacity of element edges over light, and over the grey solid.
 const EDGE_OPACITY: [f32; 2] = [0.45, 0.8];
 

@@ -1,4 +1,4 @@
-// What every pass knows of the picture. Twin of `ViewUniforms` in mod.rs; put in front of each pass's own text.
+// What every pass knows of the picture. Twin of `ViewUniforms` in uniforms.rs; put in front of each pass's own text.
 struct View {
     clip_from_frame: mat4x4<f32>,
     // xyz: position of the eye; w: 1 where the projection is parallel.
