@@ -31,18 +31,23 @@ const TRUNCATION: f32 = 8.0;
 /// beside many lamps in one ceiling evaluate each of them; larger, and surfaces just before an emitter stay dark.
 const RESOLUTION: f32 = 1e-5;
 
-/// Moments of the light of some emitters.
+/// The light of some emitters from afar.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Multipole {
+    pub(super) extent: Extent,
+    pub(super) expansion: Expansion,
+}
+
+/// Bounds of some emitters, and of their normals: all that a walk over a tree reads of most nodes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Extent {
     /// Centre of the power (luminance).
-    pub(super) centre: Vec3,
+    centre: Vec3,
     /// Radius of a sphere about the centre that contains all emitters.
     radius: f32,
     /// Luminance of the power.
-    pub(crate) power: f32,
-    /// Mean of `e eᵀ` over the power (luminance), with e the position relative to the centre.
-    second: Mat3,
-    /// Root of the mean of `|e|²`.
+    pub(super) power: f32,
+    /// Root of the mean of `|e|²` over the power (luminance), with e the position relative to the centre.
     spread: f32,
     /// The normals of all emitters lie within this angle of the axis, radians; π for any normals.
     axis: Vec3,
@@ -51,6 +56,13 @@ pub(super) struct Multipole {
     sin_cos: (f32, f32),
     /// Largest distance of emitters from the plane through the centre with the axis as normal.
     thickness: f32,
+}
+
+/// Moments of the light of some emitters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expansion {
+    /// Mean of `e eᵀ` over the power (luminance), with e the position relative to the centre.
+    second: Mat3,
     /// Moments of `B S`.
     directional: Moments<Vec4>,
     /// `Σ B S_a e_b`.
@@ -80,61 +92,74 @@ impl Multipole {
         let second = outwards.map(|e| outer(e, e)).into_iter().sum::<Mat3>() * (1.0 / 12.0);
         let axis = emitter.normal;
         let lengths = outwards.map(Vec3::length);
-        Self {
+        let extent = Extent {
             centre,
             radius: lengths.into_iter().fold(0.0, f32::max),
             power: luminance(emitter.radiosity) * emitter.area,
-            second,
             spread: trace(&second).sqrt(),
             axis,
             angle: 0.0,
             sin_cos: (0.0, 1.0),
             thickness: 0.0,
+        };
+        let expansion = Expansion {
+            second,
             directional: Moments::of(axis * emitter.area, emitter.radiosity),
             first: [[Vec4::ZERO; 3]; 3],
-        }
+        };
+        Self { extent, expansion }
     }
 
     /// The multipole of the emitters of both.
     pub(super) fn merged(&self, other: &Self) -> Self {
-        let power = self.power + other.power;
-        let share = match other.power / power {
+        let [one, two] = [&self.extent, &other.extent];
+        let power = one.power + two.power;
+        let share = match two.power / power {
             share if share.is_finite() => share,
             _ => 0.5,
         };
-        let centre = self.centre.lerp(other.centre, share);
-        let (axis, angle) = enclosing_cone((self.axis, self.angle), (other.axis, other.angle));
-        let mut merged = Self {
+        let centre = one.centre.lerp(two.centre, share);
+        let (axis, angle) = enclosing_cone((one.axis, one.angle), (two.axis, two.angle));
+        let mut extent = Extent {
             centre,
             radius: 0.0,
             power,
-            second: Mat3::ZERO,
             spread: 0.0,
             axis,
             angle,
             sin_cos: angle.sin_cos(),
             thickness: 0.0,
+        };
+        let mut expansion = Expansion {
+            second: Mat3::ZERO,
             directional: Moments::default(),
             first: [[Vec4::ZERO; 3]; 3],
         };
         for (part, share) in [(self, 1.0 - share), (other, share)] {
-            let shift = part.centre - centre;
-            merged.radius = merged.radius.max(part.radius + shift.length());
-            let tilt = part.radius * axis.cross(part.axis).length();
-            let thickness = part.thickness + shift.dot(axis).abs() + tilt;
-            merged.thickness = merged.thickness.max(thickness);
-            merged.second += (part.second + outer(shift, shift)) * share;
-            merged.directional.merge(&part.directional);
+            let Self {
+                extent: of,
+                expansion: part,
+            } = part;
+            let shift = of.centre - centre;
+            extent.radius = extent.radius.max(of.radius + shift.length());
+            let tilt = of.radius * axis.cross(of.axis).length();
+            let thickness = of.thickness + shift.dot(axis).abs() + tilt;
+            extent.thickness = extent.thickness.max(thickness);
+            expansion.second += (part.second + outer(shift, shift)) * share;
+            expansion.directional.merge(&part.directional);
             for a in 0..3 {
                 for b in 0..3 {
-                    merged.first[a][b] += part.first[a][b] + part.directional.linear[a] * shift[b];
+                    expansion.first[a][b] +=
+                        part.first[a][b] + part.directional.linear[a] * shift[b];
                 }
             }
         }
-        merged.spread = trace(&merged.second).sqrt();
-        merged
+        extent.spread = trace(&expansion.second).sqrt();
+        Self { extent, expansion }
     }
+}
 
+impl Extent {
     /// Its geometry relative to a receiver; `None` if it certainly gives no light there.
     pub(super) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
         let separation = self.centre - receiver.point;
@@ -172,8 +197,8 @@ impl Multipole {
         })
     }
 
-    /// Approximate error of the irradiance (luminance); infinite where the expansion is not used.
-    pub(super) fn error(&self, sight: &Sight) -> f32 {
+    /// Approximate error of the irradiance (luminance) by an expansion; infinite where that is not used.
+    pub(super) fn error(&self, expansion: &Expansion, sight: &Sight) -> f32 {
         let distance = sight.squared.sqrt();
         if distance <= NEAREST * self.radius {
             return f32::INFINITY;
@@ -184,7 +209,7 @@ impl Multipole {
         if sight.is_whole {
             return most * truncation;
         }
-        let (least_shown, most_shown) = self.directional.bounds(-sight.separation / distance);
+        let (least_shown, most_shown) = expansion.directional.bounds(-sight.separation / distance);
         let unknown =
             luminance(most_shown - least_shown) * sight.most_cosines[1] / (PI * sight.squared);
         // Without terms of first and second order, and clamped at the horizon.
@@ -198,8 +223,15 @@ impl Multipole {
         self.power * of_emitters * of_receiver / (PI * sight.squared)
     }
 
+    /// Whether a point is further away than the diameter.
+    pub(super) fn is_far(&self, sight: &Sight) -> bool {
+        sight.squared > (2.0 * self.radius).powi(2)
+    }
+}
+
+impl Expansion {
     /// Unoccluded irradiance at a receiver with this unit normal, W/m².
-    pub(crate) fn irradiance(&self, sight: &Sight, normal: Vec3) -> Vec4 {
+    pub(super) fn irradiance(&self, sight: &Sight, normal: Vec3) -> Vec4 {
         let (y, height) = (sight.separation, sight.height);
         let scale = 1.0 / (PI * sight.squared * sight.squared);
         if !sight.is_whole {
@@ -224,11 +256,6 @@ impl Multipole {
                 + self.first[a][a] * height;
         }
         (-sum * scale).max(Vec4::ZERO)
-    }
-
-    /// Whether a point is further away than the diameter.
-    pub(super) fn is_far(&self, sight: &Sight) -> bool {
-        sight.squared > (2.0 * self.radius).powi(2)
     }
 }
 

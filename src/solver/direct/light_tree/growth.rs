@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{LEAF_EMITTERS, NONE, Node};
-use crate::solver::direct::{emitter::Emitter, multipole::Multipole, panel::Panel};
+use crate::solver::direct::{emitter::Emitter, multipole::Extent, panel::Panel};
 
 /// Weight of the variance of normals relative to that of positions. Larger, and lamps far from each other stay
 /// together; smaller, and both sides of a sheet do.
@@ -106,14 +106,13 @@ impl<'a> Growth<'a> {
 
     /// Add a node before its children. Returns its index.
     fn begin(&mut self) -> usize {
-        let light = Multipole::of(&self.emitters[0]);
         self.nodes.push(Node {
             start: self.order.len() as u32,
             end: 0,
             next: 0,
             panel: NONE,
             is_even: false,
-            light,
+            extent: Extent::default(),
         });
         self.nodes.len() - 1
     }

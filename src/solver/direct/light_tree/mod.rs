@@ -13,7 +13,11 @@ use glam::Vec4;
 
 use growth::Growth;
 
-use super::{emitter::Emitter, multipole::Multipole, panel::Panel};
+use super::{
+    emitter::Emitter,
+    multipole::{Expansion, Extent, Multipole},
+    panel::Panel,
+};
 use crate::{geometry::point_irradiance, solver::places::Receiver, transport::luminance};
 
 /// Tolerated error of a node of a cut, as a share of all light at the point. Cuts have some hundred nodes, whose errors
@@ -45,7 +49,7 @@ struct Node {
     panel: u32,
     /// Whether all its emitters belong to one panel, and so have one radiosity.
     is_even: bool,
-    light: Multipole,
+    extent: Extent,
 }
 
 /// Emitters, and the tree over them.
@@ -56,6 +60,8 @@ pub(crate) struct LightTree {
     panels: Vec<Panel>,
     /// Depth first: a parent, the subtree of its first child, that of its second child.
     nodes: Vec<Node>,
+    /// By node, apart from the nodes: a walk reads few of them.
+    expansions: Vec<Expansion>,
     /// Summed area of all emitters before each; one entry more than there are emitters.
     area_before: Vec<f64>,
 }
@@ -94,6 +100,7 @@ impl LightTree {
             area_before: area_before.collect(),
             emitters: order.iter().map(|&index| emitters[index]).collect(),
             panels: Vec::with_capacity(panels.len()),
+            expansions: Vec::new(),
             nodes,
         };
         tree.area_before.push(area);
@@ -111,17 +118,21 @@ impl LightTree {
 
     /// Compute the multipoles of the nodes, children before parents.
     fn carry_up(&mut self) {
+        let mut lights: Vec<Option<Multipole>> = vec![None; self.nodes.len()];
         for index in (0..self.nodes.len()).rev() {
             let node = &self.nodes[index];
-            self.nodes[index].light = if self.is_leaf(index) {
+            let parts: Vec<Multipole> = if self.is_leaf(index) {
                 let emitters = &self.emitters[node.start as usize..node.end as usize];
-                let mut lights = emitters.iter().map(Multipole::of);
-                let first = lights.next().expect("a leaf has an emitter");
-                lights.fold(first, |sum, light| sum.merged(&light))
+                emitters.iter().map(Multipole::of).collect()
             } else {
-                let [first, second] = self.children(index);
-                self.nodes[first].light.merged(&self.nodes[second].light)
+                let children = self.children(index).into_iter();
+                children.filter_map(|child| lights[child]).collect()
             };
+            lights[index] = parts.into_iter().reduce(|sum, part| sum.merged(&part));
+        }
+        for (node, light) in self.nodes.iter_mut().zip(lights.into_iter().flatten()) {
+            node.extent = light.extent;
+            self.expansions.push(light.expansion);
         }
     }
 
@@ -158,11 +169,11 @@ impl LightTree {
             let index = at;
             at = node.next as usize;
             if let Some(tolerance) = tolerance {
-                let Some(sight) = node.light.sight(receiver) else {
+                let Some(sight) = node.extent.sight(receiver) else {
                     continue;
                 };
-                if node.light.error(&sight) <= tolerance {
-                    let irradiance = node.light.irradiance(&sight, receiver.normal);
+                if node.extent.error(&self.expansions[index], &sight) <= tolerance {
+                    let irradiance = self.expansions[index].irradiance(&sight, receiver.normal);
                     add(Target::Node(index as u32), irradiance);
                     continue;
                 }
@@ -202,11 +213,11 @@ impl LightTree {
         while let Some(node) = self.nodes.get(at) {
             let index = at;
             at = node.next as usize;
-            let Some(sight) = node.light.sight(receiver) else {
+            let Some(sight) = node.extent.sight(receiver) else {
                 continue;
             };
-            if node.light.is_far(&sight) {
-                sum += luminance(node.light.irradiance(&sight, receiver.normal));
+            if node.extent.is_far(&sight) {
+                sum += luminance(self.expansions[index].irradiance(&sight, receiver.normal));
             } else if self.is_leaf(index) {
                 let emitters = node.start as usize..node.end as usize;
                 let exact = emitters.filter_map(|emitter| self.exact(emitter, receiver));
@@ -225,25 +236,25 @@ impl LightTree {
             Target::Emitter(emitter) => return (emitter as usize, 1.0),
             Target::Node(node) => node as usize,
         };
-        let whole = self.nodes[index].light.power;
+        let whole = self.nodes[index].extent.power;
         let (mut place, mut chance) = (place, 1.0);
         loop {
             let node = &self.nodes[index];
             if node.is_even {
                 let emitter = self.at_area(node, place);
-                return (emitter, node.light.power / (whole * chance));
+                return (emitter, node.extent.power / (whole * chance));
             }
             if self.is_leaf(index) {
                 break;
             }
             let [first, second] = self.children(index);
             let [a, b] = [first, second].map(|child| {
-                let light = &self.nodes[child].light;
-                let sight = light.sight(receiver);
-                sight.map_or(0.0, |sight| light.most_irradiance(&sight))
+                let extent = &self.nodes[child].extent;
+                let sight = extent.sight(receiver);
+                sight.map_or(0.0, |sight| extent.most_irradiance(&sight))
             });
             let share = share_of(a, b, || {
-                self.nodes[first].light.power / node.light.power.max(f32::MIN_POSITIVE)
+                self.nodes[first].extent.power / node.extent.power.max(f32::MIN_POSITIVE)
             });
             let is_first = place < share;
             (index, chance, place) = if is_first {

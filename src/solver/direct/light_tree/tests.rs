@@ -236,7 +236,7 @@ fn emitters_are_picked_by_the_light_that_they_give() {
                     })
                     .sum::<f32>()
                     / COUNT as f32;
-                let found = mean * node_of.light.power;
+                let found = mean * node_of.extent.power;
                 // Light of children that count as giving none is lost.
                 let slack = 0.02 * all + 1e-3 * cut[cut.len() - 1].until;
                 assert!((found - all).abs() <= slack, "{found} {all}");
