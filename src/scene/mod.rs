@@ -40,6 +40,8 @@ mod shells;
 mod sidedness;
 mod size_classes;
 mod source;
+#[cfg(test)]
+pub(crate) mod test_shapes;
 mod texture;
 mod texture_statement;
 mod triangulate;

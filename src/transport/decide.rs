@@ -235,3 +235,37 @@ fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f3
     let normals = Vectors4::splat(normal);
     element_form_factors(hierarchy, source, &points, &normals).element_sum() * 0.25
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{SceneOptions, Sides, builtin};
+
+    #[test]
+    fn form_factors_of_plates_are_those_of_closed_forms() {
+        let perpendicular = (builtin::perpendicular_plates(), 0.200044);
+        for (builder, expected) in [(builtin::plates(1.0), 0.199825), perpendicular] {
+            let scene = builder
+                .finish(&SceneOptions::with_sides(Sides::One))
+                .unwrap();
+            let mut hierarchy = Hierarchy::new(&scene, 30.0);
+            for _ in 0..3 {
+                let leaves: Vec<u32> = hierarchy.mesh.leaves().map(|leaf| leaf as u32).collect();
+                hierarchy.mesh.divide(&leaves);
+            }
+            let emits = |leaf: &usize| hierarchy.patch_of(*leaf).emission.x > 0.0;
+            let (sources, receivers): (Vec<usize>, Vec<usize>) =
+                hierarchy.mesh.leaves().partition(emits);
+            let sum: f32 = receivers
+                .iter()
+                .flat_map(|&receiver| sources.iter().map(move |&source| (source, receiver)))
+                .map(|(source, receiver)| area_form_factor(&hierarchy, source, receiver))
+                .sum();
+            let mean = sum / receivers.len() as f32;
+            assert!(
+                (mean / expected - 1.0).abs() < 0.01,
+                "{mean} for {expected}"
+            );
+        }
+    }
+}

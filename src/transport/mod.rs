@@ -9,6 +9,7 @@ mod patch_sums;
 mod refine;
 mod refiner;
 mod sights;
+mod validate;
 mod visibility;
 
 pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};

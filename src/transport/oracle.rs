@@ -43,7 +43,7 @@ pub enum Judgement {
 
 /// Points nearer to a plane than this, relative to the pair's size, lie in it. Smaller, and rounding tilts flat meshes
 /// so that they face themselves; larger, and real angles are lost.
-const IN_PLANE: f32 = 1e-5;
+pub(super) const IN_PLANE: f32 = 1e-5;
 
 /// Judges pairs of nodes.
 #[derive(Clone, Copy)]

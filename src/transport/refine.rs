@@ -194,3 +194,119 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+    use crate::{
+        geometry::{Random, RayTree},
+        hierarchy::{Reading, Tables},
+        scene::{Scene, SceneOptions, Sides, builtin::empty_cornell},
+        transport::{
+            Estimate, Judge, Judgement, Kernel, LinkBudget, LinkStore, PairSampler, PatchSums,
+        },
+    };
+
+    fn cornell() -> Scene {
+        let options = SceneOptions::with_sides(Sides::One);
+        empty_cornell().finish(&options).unwrap()
+    }
+
+    /// What `of` says of the refiner of a scene of radiosity 1, for a threshold and a link limit, and of its links.
+    fn refined<T>(
+        scene: &Scene,
+        threshold: f32,
+        most: u64,
+        of: impl FnOnce(&Judge<'_>, Refinement) -> T,
+    ) -> T {
+        let hierarchy = Hierarchy::new(scene, 30.0);
+        let rays = RayTree::new(scene);
+        let tables = Tables::new(&hierarchy, |_| Vec4::ONE);
+        let areas = PatchSums::of_area(&hierarchy, &tables);
+        let powers = PatchSums::of_power(&hierarchy, &tables);
+        let none = LinkStore::default();
+        let refiner = Refiner {
+            judge: Judge {
+                kernel: Kernel {
+                    hierarchy: &hierarchy,
+                    tables: &tables,
+                    reading: Some(Reading::Bounded),
+                },
+                estimate: Estimate::Interval,
+                ambient: 0.0,
+                sampler: PairSampler {
+                    hierarchy: &hierarchy,
+                    tables: &tables,
+                    areas: &areas,
+                    powers: &powers,
+                    rays: &rays,
+                },
+            },
+            links_of: |node| none.of(node),
+            judged: None,
+            threshold,
+            min_area: f32::INFINITY,
+            seed: 1,
+            cancelled: &|| false,
+            budget: LinkBudget::new(most),
+            is_by_patch: false,
+            follows_light: false,
+            spreads: &[],
+        };
+        of(&refiner.judge, refiner.refine(true))
+    }
+
+    #[test]
+    fn smaller_thresholds_make_more_links_and_link_each_pair_once() {
+        let scene = cornell();
+        let counts = [10.0, 0.3, 0.03, 0.003].map(|threshold| {
+            refined(&scene, threshold, u64::MAX, |judge, found| {
+                assert!(found.fits);
+                let hierarchy = judge.kernel.hierarchy;
+                let store = LinkStore::from_runs(hierarchy.node_count(), &found.runs, &found.links);
+                assert_eq!(store.validate(hierarchy), Ok(()), "{threshold}");
+                found.links.len()
+            })
+        });
+        assert_eq!(counts[0], 1, "the root exchanges light with itself");
+        assert!(counts.is_sorted() && counts[3] > 100, "{counts:?}");
+    }
+
+    #[test]
+    fn pairs_that_can_be_divided_are_linked_only_if_their_errors_are_below_the_threshold() {
+        const THRESHOLD: f32 = 0.05;
+        refined(&cornell(), THRESHOLD, u64::MAX, |judge, found| {
+            let hierarchy = judge.kernel.hierarchy;
+            let mut links = found.links.iter();
+            let mut checked = 0;
+            for &(receiver, count) in &found.runs {
+                for link in links.by_ref().take(count as usize) {
+                    let can_divide = [receiver, link.source]
+                        .iter()
+                        .any(|&node| !hierarchy.children(node).is_empty());
+                    if !can_divide || link.source == receiver {
+                        continue;
+                    }
+                    let judgement = judge.judge(link.source, receiver, &mut Random::new(1, 0));
+                    let Judgement::Transfer { error, .. } = judgement else {
+                        panic!("a link without transfer");
+                    };
+                    let weight = hierarchy.node_share_of_area(receiver).sqrt();
+                    assert!(error * weight <= THRESHOLD, "{error}");
+                    checked += 1;
+                }
+            }
+            assert!(checked > 0);
+        });
+    }
+
+    #[test]
+    fn a_budget_stops_refinement() {
+        let scene = cornell();
+        let most = refined(&scene, 0.03, u64::MAX, |_, found| found.links.len() as u64);
+        assert!(refined(&scene, 0.03, most, |_, found| found.fits));
+        assert!(!refined(&scene, 0.03, most - 1, |_, found| found.fits));
+    }
+}

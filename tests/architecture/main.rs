@@ -39,6 +39,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "patch_sums",
             "visibility",
             "oracle",
+            "validate",
             "refiner",
             "clear",
             "decide",

@@ -41,7 +41,7 @@ const SLIGHT: f32 = 0.8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HemisphereCoverage {
     /// The part, 0…1.
-    share: f32,
+    pub(super) share: f32,
     /// Standard error of the part; 0 if it is exact.
     deviation: f32,
 }

@@ -60,3 +60,30 @@ impl Lights {
         (error + SPREAD_SHARE * spread) * share_root(hierarchy, element) / mean > limits.tolerance
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        scene::{builtin::plates, test_shapes::one_sided},
+        solver::{Direct, SolveSettings},
+    };
+
+    #[test]
+    fn near_lamps_have_an_interpolation_error_and_far_ones_have_none() {
+        for (distance, expected) in [(0.2, true), (1.0, true), (100.0, false)] {
+            let scene = one_sided(plates(distance));
+            let hierarchy = Hierarchy::new(&scene, 30.0);
+            let limits = Limits::new(&SolveSettings::normal(), &hierarchy, 1.0, u64::MAX);
+            let lights = Lights::new(&scene, &hierarchy, Direct::Sampled);
+            let is_receiver = |patch: &usize| hierarchy.patches[*patch].emission == Vec3::ZERO;
+            for patch in (0..hierarchy.patches.len()).filter(is_receiver) {
+                let found = lights.has_interpolation_error(&hierarchy, patch, limits);
+                assert_eq!(found, expected, "{distance}");
+            }
+            // Linked light is unknown.
+            let lights = Lights::new(&scene, &hierarchy, Direct::Linked);
+            assert!(lights.has_interpolation_error(&hierarchy, 0, limits));
+        }
+    }
+}

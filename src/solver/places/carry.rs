@@ -86,3 +86,67 @@ pub(crate) fn project(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{builtin::furnace, test_shapes::one_sided};
+
+    fn hierarchy() -> Hierarchy {
+        let mut hierarchy = Hierarchy::new(&one_sided(furnace(0.5, 1.0, 1)), 30.0);
+        let leaves: Vec<u32> = hierarchy.mesh.leaves().map(|leaf| leaf as u32).collect();
+        hierarchy.mesh.divide(&leaves);
+        hierarchy
+    }
+
+    #[test]
+    fn unknown_vertices_of_contacts_take_the_mean_of_known_ones() {
+        let mut hierarchy = hierarchy();
+        let leaf = hierarchy.mesh.leaves().next().unwrap();
+        hierarchy.mesh.elements[leaf].inside_solid = 0b0001;
+        let [hidden, b, c] = hierarchy.mesh.elements[leaf].vertices;
+        // The value of the hidden vertex is unknown to all elements about it.
+        let mut values: Vec<Vec4> = (0..hierarchy.mesh.vertices.len())
+            .map(|vertex| Vec4::splat(vertex as f32 + 1.0))
+            .collect();
+        let before = values.clone();
+        let is_known = |element: &Element, side: usize| element.vertices[side] != hidden;
+        carry_over(&hierarchy.mesh, is_known, &mut values);
+        let mean = (before[b as usize] + before[c as usize]) * 0.5;
+        for (vertex, (value, before)) in values.iter().zip(&before).enumerate() {
+            let expected = if vertex == hidden as usize {
+                mean
+            } else {
+                *before
+            };
+            assert!((*value - expected).abs().max_element() < 1e-5, "{vertex}");
+        }
+    }
+
+    #[test]
+    fn projection_brings_linear_interpolation_to_the_means_of_elements() {
+        let hierarchy = hierarchy();
+        let elements = &hierarchy.mesh.elements;
+        let total = |values: &[Vec4]| -> f32 {
+            let of_leaf = |leaf: usize| {
+                let corners = elements[leaf]
+                    .vertices
+                    .map(|vertex| values[vertex as usize].x);
+                corners.iter().sum::<f32>() / 3.0 * elements[leaf].area_vector.length()
+            };
+            hierarchy.mesh.leaves().map(of_leaf).sum()
+        };
+        // Centroids that are brighter than all corners: the rule of degree 2 gives a quarter to the corners.
+        let mut values = vec![Vec4::splat(1.0); hierarchy.mesh.vertices.len()];
+        let area = total(&values);
+        let centres = hierarchy.mesh.leaves().map(|leaf| (leaf, Vec4::splat(2.0)));
+        project(&hierarchy, &mut values, centres);
+        assert!((total(&values) / area - 1.75).abs() < 1e-4);
+        assert!(values.iter().all(|value| (1.0..=2.0).contains(&value.x)));
+        // Centroids that agree change nothing.
+        let mut even = vec![Vec4::splat(3.0); values.len()];
+        let centres = hierarchy.mesh.leaves().map(|leaf| (leaf, Vec4::splat(3.0)));
+        project(&hierarchy, &mut even, centres);
+        assert!(even.iter().all(|value| (value.x - 3.0).abs() < 1e-5));
+    }
+}

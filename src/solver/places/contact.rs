@@ -281,3 +281,96 @@ pub(crate) fn is_behind_wall(
     }
     (backs >= LEAST_BACKS * (1 + lit), shot as u64)
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{
+        scene::{
+            SceneOptions,
+            test_shapes::{builder, cuboid, rectangle},
+        },
+        solver::SolveSettings,
+    };
+
+    /// A box that stands on a floor, sunk into it if `depth` is above 0.
+    fn standing(depth: f64) -> Scene {
+        let (mut builder, wall, lamp) = builder();
+        let floor = [DVec3::Z * 4.0, DVec3::X * 4.0];
+        rectangle(&mut builder, DVec3::new(-2.0, 0.0, -2.0), floor, wall);
+        let ends = [DVec3::new(-0.7, -depth, -0.4), DVec3::new(0.3, 1.0, 0.8)];
+        cuboid(&mut builder, ends, false, |_| true, wall);
+        let edges = [DVec3::X, DVec3::Z];
+        rectangle(&mut builder, DVec3::new(-0.5, 3.0, -0.5), edges, lamp);
+        builder.finish(&SceneOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn what_lies_under_a_box_is_inside_and_nothing_else_on_the_floor_is() {
+        for depth in [0.0, 0.05] {
+            let scene = standing(depth);
+            let mut hierarchy = Hierarchy::new(&scene, 30.0);
+            let rays = RayTree::new(&scene);
+            let settings = SolveSettings::draft();
+            let limits = Limits::new(&settings, &hierarchy, 1.0, u64::MAX);
+            let cancel = Cancel::default();
+            let (_, fits) =
+                divide_contacts(&scene, &mut hierarchy, &rays, limits, &cancel).unwrap();
+            assert!(fits);
+            let mut inside = 0;
+            for leaf in hierarchy.mesh.active_leaves() {
+                let element = &hierarchy.mesh.elements[leaf];
+                let is_floor = hierarchy.patch_of(leaf).normal.y > 0.9
+                    && scene.frame.to_world(element.centroid).y < 0.5;
+                if !is_floor {
+                    continue;
+                }
+                for (bit, place) in places(&hierarchy, leaf).into_iter().enumerate() {
+                    let at = scene.frame.to_world(place);
+                    // How far within the walls of the box.
+                    let depth = (at.x + 0.7).min(0.3 - at.x).min(at.z + 0.4).min(0.8 - at.z);
+                    let is_inside = element.inside_solid & (1 << bit) != 0;
+                    assert!(!is_inside || depth > -1e-3, "{at}");
+                    // Small corners of elements are not probed.
+                    assert!(is_inside || depth < 0.15, "{at}");
+                    inside += u32::from(is_inside);
+                }
+                let least = least_contact(&hierarchy, limits);
+                assert!(!element.is_contact() || element.area_vector.length() <= least);
+            }
+            assert!(inside > 3, "{inside}");
+        }
+    }
+
+    #[test]
+    fn a_face_under_the_floor_of_a_room_is_behind_a_wall_and_one_in_the_room_is_not() {
+        let (mut builder, wall, _) = builder();
+        cuboid(
+            &mut builder,
+            [DVec3::ZERO, DVec3::ONE],
+            true,
+            |_| true,
+            wall,
+        );
+        let edges = [DVec3::Z * 0.1, DVec3::X * 0.1];
+        for height in [-0.05, 0.3] {
+            rectangle(&mut builder, DVec3::new(0.4, height, 0.4), edges, wall);
+        }
+        let scene = crate::scene::test_shapes::one_sided(builder);
+        let (hierarchy, rays) = (Hierarchy::new(&scene, 30.0), RayTree::new(&scene));
+        let mut found = Vec::new();
+        for patch in 0..hierarchy.patches.len() {
+            let element = &hierarchy.mesh.elements[patch];
+            let height = scene.frame.to_world(element.centroid).y;
+            if hierarchy.patches[patch].normal.y > 0.9 && height != 0.0 {
+                let (is_behind, shot) = is_behind_wall(&rays, &hierarchy, patch, element.centroid);
+                assert_eq!(is_behind, height < 0.0, "{height}");
+                assert!(shot > 1);
+                found.push(is_behind);
+            }
+        }
+        assert!(found.contains(&true) && found.contains(&false));
+    }
+}

@@ -56,3 +56,37 @@ impl OffsetPlaces {
             + self.by_vertex.len() * size_of::<(u32, OffsetPlace)>()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{builtin::furnace, test_shapes::one_sided};
+
+    #[test]
+    fn light_of_an_offset_vertex_is_evaluated_at_its_place_and_of_others_near_them() {
+        let hierarchy = Hierarchy::new(&one_sided(furnace(0.5, 1.0, 1)), 30.0);
+        let (mesh, element) = (&hierarchy.mesh, &hierarchy.mesh.elements[0]);
+        let corners = mesh.corners(0);
+        let (vertex, share) = (element.vertices[1], 0.35);
+        let place = corners[1].lerp(element.centroid, share);
+        let mut offsets = OffsetPlaces::default();
+        let usual = offsets.places(element, corners);
+        offsets.by_vertex.insert(
+            vertex,
+            OffsetPlace {
+                place,
+                inset: share,
+            },
+        );
+        let found = offsets.places(element, corners);
+        assert_eq!((found[0], found[2]), (usual[0], usual[2]));
+        assert_eq!(found[1], place);
+        assert!(usual[1].distance(corners[1]) < 0.1 * place.distance(corners[1]));
+        // As a receiver.
+        let all = vec![true; mesh.vertices.len()];
+        let elements = 0..mesh.elements.len();
+        for (of, receiver) in offsets.vertex_places(&hierarchy, elements, &all) {
+            assert_eq!(receiver.point == place, of == vertex);
+        }
+    }
+}

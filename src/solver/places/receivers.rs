@@ -123,3 +123,74 @@ pub(crate) fn centre_of(hierarchy: &Hierarchy, element: usize) -> Receiver {
         triangle: patch.triangle,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::barycentric_in_plane,
+        scene::{
+            Scene,
+            builtin::{empty_cornell, furnace},
+            test_shapes::one_sided,
+        },
+    };
+
+    fn divided(scene: &Scene) -> Hierarchy {
+        let mut hierarchy = Hierarchy::new(scene, 30.0);
+        let leaves: Vec<u32> = hierarchy.mesh.leaves().map(|leaf| leaf as u32).collect();
+        hierarchy.mesh.divide(&leaves);
+        hierarchy
+    }
+
+    #[test]
+    fn places_of_vertices_lie_inside_an_element_about_them() {
+        for scene in [one_sided(furnace(0.5, 1.0, 2)), one_sided(empty_cornell())] {
+            let hierarchy = divided(&scene);
+            let mesh = &hierarchy.mesh;
+            let wanted: Vec<bool> = (0..mesh.vertices.len())
+                .map(|vertex| vertex % 3 > 0)
+                .collect();
+            let places = vertex_places(&hierarchy, 0..mesh.elements.len(), &wanted);
+            let expected = wanted.iter().filter(|is_wanted| **is_wanted).count();
+            assert_eq!(places.len(), expected, "each vertex once");
+            for (vertex, receiver) in places {
+                assert!(wanted[vertex as usize]);
+                assert!((receiver.normal.length() - 1.0).abs() < 1e-5);
+                let mut leaves = mesh.leaves().filter(|&leaf| {
+                    mesh.elements[leaf].vertices.contains(&vertex)
+                        && hierarchy.patch_of(leaf).triangle == receiver.triangle
+                });
+                let is_inside = |leaf: usize| {
+                    let at = barycentric_in_plane(receiver.point, mesh.corners(leaf));
+                    at.min_element() > 0.5 * INSET / 3.0
+                };
+                assert!(leaves.any(is_inside), "vertex {vertex}");
+            }
+        }
+    }
+
+    #[test]
+    fn narrow_elements_are_evaluated_further_inside() {
+        // Of a triangle of height h over its longest edge, the centroid is h / 3 away from that.
+        let hierarchy = divided(&one_sided(furnace(0.5, 1.0, 1)));
+        let element = hierarchy.mesh.elements[0];
+        let inset_of = |height: f32| {
+            let corners = [Vec3::ZERO, Vec3::X, Vec3::new(0.5, height, 0.0)];
+            let area_vector = Vec3::Z * (0.5 * height);
+            inset(
+                &Element {
+                    area_vector,
+                    ..element
+                },
+                corners,
+            )
+        };
+        assert_eq!(inset_of(0.5), INSET);
+        assert_eq!(inset_of(1e-9), MOST_INSET);
+        // At least the clearance between.
+        let height = 3.0 * CLEARANCE / (0.5 * (INSET + MOST_INSET));
+        let distance = inset_of(height) * height / 3.0;
+        assert!((distance / CLEARANCE - 1.0).abs() < 1e-3, "{distance}");
+    }
+}
