@@ -6,7 +6,7 @@ mod common;
 
 use std::{f32::consts::PI, f64::consts::TAU};
 
-use boxes::{cuboid, mean_irradiance, solved};
+use boxes::{cuboid, mean_irradiance, rectangle, solved};
 use common::assert_close;
 use glam::{DVec3, Vec3};
 use vecrad::{
@@ -96,8 +96,15 @@ fn links_let_no_light_into_the_corner_at_the_foot_of_an_object() {
     let glowing = Material::plain("glowing", Vec3::ZERO, Vec3::ONE);
     let glowing = builder.push_material(glowing);
     let black = builder.push_material(Material::plain("black", Vec3::ZERO, Vec3::ZERO));
-    let room = [DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 2.0, 1.0)];
-    cuboid(&mut builder, room[0], room[1], true, glowing);
+    // A floor that glows would show nothing of the light that it receives.
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 2.0);
+    let corner = DVec3::new(-1.0, 0.0, -1.0);
+    rectangle(&mut builder, corner, [z, x], black);
+    rectangle(&mut builder, corner + y, [x, z], glowing);
+    rectangle(&mut builder, corner, [y, z], glowing);
+    rectangle(&mut builder, corner + x, [z, y], glowing);
+    rectangle(&mut builder, corner, [x, y], glowing);
+    rectangle(&mut builder, corner + z, [y, x], glowing);
     let (low, high) = (DVec3::new(-0.5, -0.05, -0.2), DVec3::new(0.5, 0.8, 0.2));
     cuboid(&mut builder, low, high, false, black);
     let settings = SolveSettings {
