@@ -15,10 +15,6 @@ use crate::{
     solver::{Cancel, limits::Limits},
 };
 
-/// Contact elements are divided while the square root of their share of the area is more than this many times the
-/// tolerance of the mesh. Smaller costs elements along every contact; larger leaves visible dark patches beside it.
-const CONTACT_TOLERANCE: f32 = 1.0;
-
 /// Elements are probed if they, or their whole patches, are this many times larger than the smallest contact elements
 /// that are divided, or if their parents are inside solids in part. Smaller costs rays on every triangle of dense
 /// meshes, whose contacts are fine anyway; larger misses contacts.
@@ -168,10 +164,11 @@ pub(crate) fn probe_within(
     probe_leaves(scene, hierarchy, rays, &leaves, cancel)
 }
 
-/// Area up to which contact elements are not divided, square frame units. The same in all steps, by the limits of the
-/// last.
+/// Area up to which contact elements are not divided, square frame units: the square root of their share of the area is
+/// the tolerance of the mesh. Smaller costs elements along every contact; larger leaves visible dark patches beside it.
+/// The same in all steps, by the limits of the last.
 fn least_contact(hierarchy: &Hierarchy, limits: Limits) -> f32 {
-    let root = CONTACT_TOLERANCE * limits.tolerance;
+    let root = limits.tolerance;
     (root * root * hierarchy.importance.area as f32).max(limits.min_area)
 }
 
