@@ -18,8 +18,9 @@ use crate::{
 /// single patches skip a level of the tree.
 const LEAF_PATCHES: usize = 4;
 
-/// Depth from which cuts are at the median. It bounds the depth of the tree by this plus 32.
-const MEDIAN_DEPTH: u32 = 48;
+/// Depth from which cuts are at the median, so that no tree is deeper than this plus 32. Smaller, and cuts are worse;
+/// larger, and degenerate trees are deep.
+pub const MEDIAN_DEPTH: u32 = 48;
 
 /// Items that one task divides. Fewer, and subtrees are copied more often; more, and there is nothing to share out.
 const TASK_ITEMS: usize = 4096;

@@ -27,9 +27,6 @@ const MAX_NODES: u32 = 128;
 /// Rounds of the flood. Light that needs more chained pairs is taken to reach everything: usual scenes need three.
 const MOST_ROUNDS: u32 = 32;
 
-/// Of so many triangles one is looked at first, for one that stands between others: most scenes have many.
-const FIRST_LOOK: usize = 64;
-
 /// A plane, and the side before it.
 #[derive(Clone, Copy)]
 struct Plane {
@@ -194,7 +191,7 @@ impl PatchTree {
     /// Whether no triangle of the scene can stand between two patches of the tree: none has parts of them on both
     /// sides.
     pub fn is_clear(&self, scene: &Scene) -> bool {
-        let blocks = |&triangle: &u32| {
+        let blocks = |triangle: u32| {
             let corners = scene.corners(crate::scene::TriangleId(triangle));
             let area_vector = scene.surfaces[triangle as usize].area_vector;
             let plane = Plane {
@@ -204,8 +201,7 @@ impl PatchTree {
             self.rises(scene, plane) && self.rises(scene, plane.behind())
         };
         let count = scene.triangles.len() as u32;
-        let first: Vec<u32> = (0..count).step_by(FIRST_LOOK).collect();
-        !first.par_iter().any(blocks) && !(0..count).into_par_iter().any(|at| blocks(&at))
+        !(0..count).into_par_iter().any(blocks)
     }
 
     /// Whether any active patch has a part before a plane.

@@ -18,7 +18,7 @@ mod subtrees;
 mod tables;
 mod validate;
 
-pub use build::PatchTree;
+pub use build::{MEDIAN_DEPTH, PatchTree};
 pub use channels::{Channels, luminance};
 pub use directional::{Moments, Quantity, Reading};
 pub use importance::{Importance, longest_edge_squared};

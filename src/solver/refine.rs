@@ -13,6 +13,7 @@ use super::{
     iteration::LinkedLight,
     limits::Limits,
     plan::Plan,
+    settings::FINEST_THRESHOLD,
     textures::Painted,
     vertices::LeafLight,
 };
@@ -28,10 +29,6 @@ use crate::{
 /// `MOST_RAISES` times: then only the root's exchange with itself remains. Smaller, and many passes are in vain;
 /// larger, and links are coarser than memory requires.
 const RAISE_FACTOR: f32 = 4.0;
-
-/// Least threshold after a raise: a threshold of 0 would stay 0. Smaller, and more passes are in vain; larger, and
-/// links are coarser than memory requires.
-const LEAST_RAISED: f32 = 1e-4;
 
 /// See [`RAISE_FACTOR`].
 const MOST_RAISES: u32 = 16;
@@ -103,7 +100,7 @@ impl Refining<'_> {
                     break;
                 }
                 raises += 1;
-                refined.epsilon = (refined.epsilon * RAISE_FACTOR).max(LEAST_RAISED);
+                refined.epsilon = (refined.epsilon * RAISE_FACTOR).max(FINEST_THRESHOLD);
                 continue;
             }
             passes += 1;

@@ -100,7 +100,7 @@ impl Solver {
     }
 
     fn gather_relit(&mut self, cancel: &Cancel) -> Option<()> {
-        self.gather_for_leaves(false, cancel)?;
+        self.gather_for_leaves(cancel)?;
         self.relighting.forget_solved();
         Some(())
     }

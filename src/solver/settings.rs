@@ -163,9 +163,10 @@ impl SolveSettings {
 /// nothing changes in some steps. The presets start at 0.06 to 0.12.
 const COARSEST_THRESHOLD: f32 = 1.0;
 
-/// Smallest threshold by which steps are counted: halving `COARSEST_THRESHOLD` never reaches 0. Smaller, and a
-/// threshold of 0 takes more steps; larger, and small thresholds are reached by one large decrease.
-const FINEST_THRESHOLD: f32 = 1e-4;
+/// Smallest threshold by which steps are counted, and to which one is raised where links do not fit into memory: halving
+/// `COARSEST_THRESHOLD` never reaches 0, and no factor raises 0. Smaller, and a threshold of 0 takes more steps; larger,
+/// and small thresholds are reached by one large decrease.
+pub(super) const FINEST_THRESHOLD: f32 = 1e-4;
 
 impl SolveSettings {
     /// Number of steps of a solve: `max_steps`, or as many as lead from `COARSEST_THRESHOLD` to `epsilon` if these are

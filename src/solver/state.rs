@@ -197,7 +197,7 @@ impl Solver {
         let tolerance = self.settings.tolerance * threshold_scale;
         self.iterate(tolerance, &mut report, cancel)?;
         // Light at the corners of each leaf, from its links.
-        self.gather_for_leaves(is_coarse, cancel)?;
+        self.gather_for_leaves(cancel)?;
         cancel.proceed()?;
         // In the last step, factors of the linked light from rays at the vertices.
         self.vertex_factors.clear();
@@ -365,25 +365,20 @@ impl Solver {
     }
 
     /// Gather once more for each leaf, at its own corners.
-    pub(super) fn gather_for_leaves(&mut self, is_coarse: bool, cancel: &Cancel) -> Option<()> {
-        self.leaves = self.gathered(&self.linked.power, is_coarse, cancel)?;
+    pub(super) fn gather_for_leaves(&mut self, cancel: &Cancel) -> Option<()> {
+        self.leaves = self.gathered(&self.linked.power, cancel)?;
         Some(())
     }
 
     /// Light of the leaves, gathered over the links from these source tables.
-    fn gathered(
-        &self,
-        tables: &Tables,
-        is_coarse: bool,
-        cancel: &Cancel,
-    ) -> Option<Vec<LeafLight>> {
+    fn gathered(&self, tables: &Tables, cancel: &Cancel) -> Option<Vec<LeafLight>> {
         let kernel = Kernel {
             hierarchy: &self.hierarchy,
             tables,
             reading: self.settings.method.reading(),
         };
         let (surfaces, links) = (self.surfaces(), &self.linked.links);
-        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, is_coarse, cancel)
+        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, cancel)
     }
 
     /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.
@@ -394,9 +389,7 @@ impl Solver {
     ) -> Option<Vec<Vec4>> {
         let tolerance = threshold_scale * self.settings.tolerance;
         let squares = match self.settings.direct {
-            Direct::Linked => {
-                self.gathered(&self.linked.squares(&self.hierarchy), false, cancel)?
-            }
+            Direct::Linked => self.gathered(&self.linked.squares(&self.hierarchy), cancel)?,
             Direct::Sampled => Vec::new(),
         };
         let gather = FinalGather {

@@ -37,7 +37,7 @@ const SECOND_RAYS: usize = 100_000;
 /// Most rays of the second pass per group. Fewer miss leaks in small scenes; more cost time there.
 const MOST_SECOND_RAYS: usize = 1024;
 
-/// Rays of all cells of groups that are not enclosed, within the limits per cell below. More delay the first picture;
+/// Rays of all cells of groups that are not enclosed, where these are enough for each cell. More delay the first picture;
 /// fewer leave noise in scenes with openings.
 const CELL_RAYS: usize = 100_000;
 
@@ -51,9 +51,6 @@ const MOST_PROBED_CELLS: usize = 60_000;
 /// Approximate number of groups of neighbours that share their rays. Fewer blur the coverage; more delay the first
 /// picture.
 const MOST_SHARES: usize = 15_000;
-
-/// Most rays per cell. Fewer leave noise in small scenes; more cost time there.
-const MOST_CELL_RAYS: usize = 8192;
 
 /// Neighbouring cells count as enclosed if at least this many rays from them met only lit sides. Fewer, and leaks are
 /// missed; more, and few cells of small scenes with openings count as enclosed.
@@ -268,7 +265,7 @@ impl Prober<'_> {
         let count = |part: &[usize]| {
             let share = part.iter().map(area).sum::<f32>() / whole;
             let count = self.budget(CELL_RAYS) as f32 * 0.5 * (even + share);
-            (count as usize).clamp(LEAST_CELL_RAYS, MOST_CELL_RAYS)
+            (count as usize).max(LEAST_CELL_RAYS)
         };
         // The counts of a part.
         let probe_part = |part: &[usize]| match part {

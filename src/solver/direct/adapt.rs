@@ -23,10 +23,6 @@ const LARGEST_SHARE: f32 = 1.0 / 1000.0;
 /// cast a shadow there. Smaller misses long shadows; larger divides empty ground.
 const EMPTY_RADII: f32 = 16.0;
 
-/// Unoccluded light, in multiples of the tolerance, from which the centroid of an element is sampled though all its
-/// corners lie in shadow. Smaller costs rays in shadows; larger loses light on narrow faces.
-const HIDDEN_TOLERANCE: f32 = 4.0;
-
 /// Smallest area of elements that are divided by the interpolation error of unoccluded light, as a share of the
 /// smallest area of others. Smaller divides too far where a lamp touches a surface; larger misses the light about a
 /// lamp far smaller than the scene.
@@ -226,7 +222,7 @@ impl DirectField {
                         &mut at_centre,
                     ) > limits.tolerance
                     || self.may_error_be_visible(hierarchy, leaf, limits, mean)
-                    || self.hidden(hierarchy, leaf, mean) > HIDDEN_TOLERANCE * limits.tolerance;
+                    || self.hidden(hierarchy, leaf, mean) > limits.tolerance;
                 (leaf, is_wanted, at_centre)
             })
             .collect();

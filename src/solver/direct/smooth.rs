@@ -13,9 +13,6 @@ use crate::{
     solver::places::agreement,
 };
 
-/// Rounds of smoothing. Fewer leave visible grain; more widen narrow penumbrae and draw their borders as saw teeth.
-const ROUNDS: u32 = 1;
-
 /// Difference at which neighbours exchange half, in standard errors. Smaller leaves grain; larger blurs borders.
 const HALF_DEVIATIONS: f32 = 3.0;
 
@@ -37,7 +34,7 @@ struct Fraction {
 
 /// Smoothed visible fractions of the vertices, by colour; 0 for vertices without samples.
 pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) -> Vec<Vec4> {
-    let mut fractions: Vec<Fraction> = samples
+    let fractions: Vec<Fraction> = samples
         .iter()
         .map(|sample| {
             sample.map_or(Fraction::default(), |light| {
@@ -61,17 +58,12 @@ pub(super) fn fractions(hierarchy: &Hierarchy, samples: &[Option<DirectLight>]) 
         })
         .filter(|edge| edge.iter().any(|&vertex| fractions[vertex].is_mixed))
         .collect();
-    for _ in 0..ROUNDS {
-        fractions = round(&fractions, &edges);
-    }
-    fractions
-        .into_iter()
-        .map(|fraction| fraction.color)
-        .collect()
+    exchanged(&fractions, &edges)
 }
 
-/// One round of exchange. The variance remains that of the rays.
-fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
+/// The fractions after one exchange, by colour. None leaves visible grain; several widen narrow penumbrae and draw their
+/// borders as saw teeth.
+fn exchanged(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Vec4> {
     let weight = |a: Fraction, b: Fraction| {
         let variance = 2.0 * a.variance.min(b.variance);
         agreement(a.mean - b.mean, variance, HALF_DEVIATIONS)
@@ -90,15 +82,7 @@ fn round(fractions: &[Fraction], edges: &[[usize; 2]]) -> Vec<Fraction> {
         next[a] -= given;
         next[b] += given;
     }
-    fractions
-        .iter()
-        .zip(next)
-        .map(|(fraction, color)| Fraction {
-            color,
-            mean: color.color().element_sum() / 3.0,
-            ..*fraction
-        })
-        .collect()
+    next
 }
 
 #[cfg(test)]
@@ -118,16 +102,16 @@ mod tests {
     #[test]
     fn smoothing_conserves_the_sum() {
         let fractions = [fraction(0.0, 8.0), fraction(0.125, 8.0), fraction(0.0, 8.0)];
-        let smoothed = round(&fractions, &[[0, 1], [1, 2]]);
-        let sum: f32 = smoothed.iter().map(|fraction| fraction.mean).sum();
+        let smoothed = exchanged(&fractions, &[[0, 1], [1, 2]]);
+        let sum: f32 = smoothed.iter().map(|color| color.x).sum();
         assert!((sum - 0.125).abs() < 1e-6);
-        assert!(smoothed[0].mean > 0.01 && smoothed[1].mean < 0.1);
+        assert!(smoothed[0].x > 0.01 && smoothed[1].x < 0.1);
     }
 
     #[test]
     fn hardly_any_light_leaks_to_vertices_that_many_rays_found_dark() {
         let fractions = [fraction(0.0, 32.0), fraction(0.5, 32.0)];
-        let smoothed = round(&fractions, &[[0, 1]]);
-        assert!(smoothed[0].mean < 0.01, "{}", smoothed[0].mean);
+        let smoothed = exchanged(&fractions, &[[0, 1]]);
+        assert!(smoothed[0].x < 0.01, "{}", smoothed[0].x);
     }
 }

@@ -15,17 +15,12 @@ use crate::{
     solver::{Cancel, limits::Limits},
 };
 
-/// Contact elements are divided while the square root of their share of the area is more than this many times the
-/// tolerance of the mesh. Smaller costs elements along every contact; larger leaves visible dark patches beside it.
-const CONTACT_TOLERANCE: f32 = 1.0;
-
 /// Elements are probed if they, or their whole patches, are this many times larger than the smallest contact elements
 /// that are divided, or if their parents are inside solids in part. Smaller costs rays on every triangle of dense
 /// meshes, whose contacts are fine anyway; larger misses contacts.
 const PROBED_SIZE: f32 = 64.0;
 
-/// Tangents of the angles between the probe rays and the normal, along two axes. The others, which are flatter, are
-/// shot only if one of the first meets a back.
+/// Tangents of the angles between the probe rays and the normal, along two axes: the later are flatter.
 const PROBES: [[f32; 2]; 8] = [
     [0.0, 0.0],
     [0.9, 0.1],
@@ -39,9 +34,6 @@ const PROBES: [[f32; 2]; 8] = [
 
 /// Tangents of the rays that count the solids about a point: along no edge of usual scenes.
 const SOLID_PROBES: [[f32; 2]; 3] = [[0.173, 0.291], [-0.419, 0.137], [0.083, -0.531]];
-
-/// Number of the first rays of [`PROBES`]. Fewer miss contacts; more cost rays everywhere.
-const FIRST_PROBES: usize = 4;
 
 /// Fewest backs that the probe rays must meet, and as many again for each that meets a lit side. Smaller takes places
 /// before walls for places behind them; larger misses those that are behind.
@@ -168,10 +160,11 @@ pub(crate) fn probe_within(
     probe_leaves(scene, hierarchy, rays, &leaves, cancel)
 }
 
-/// Area up to which contact elements are not divided, square frame units. The same in all steps, by the limits of the
-/// last.
+/// Area up to which contact elements are not divided, square frame units: the square root of their share of the area is
+/// the tolerance of the mesh. Smaller costs elements along every contact; larger leaves visible dark patches beside it.
+/// The same in all steps, by the limits of the last.
 fn least_contact(hierarchy: &Hierarchy, limits: Limits) -> f32 {
-    let root = CONTACT_TOLERANCE * limits.tolerance;
+    let root = limits.tolerance;
     (root * root * hierarchy.importance.area as f32).max(limits.min_area)
 }
 
@@ -264,9 +257,6 @@ pub(crate) fn is_behind_wall(
     let patch = hierarchy.patch_of(element);
     let (mut backs, mut lit, mut shot) = (0, 0, 0);
     for tangents in PROBES {
-        if shot == FIRST_PROBES && backs == 0 {
-            break;
-        }
         let direction = tilted(patch.normal, tangents);
         shot += 1;
         match rays.closest(point, direction, Some(patch.triangle)) {

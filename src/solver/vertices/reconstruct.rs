@@ -27,9 +27,6 @@ const TASK_PATCHES: u32 = 256;
 /// group. Smaller, and seams between groups are visible; larger, and it is evaluated for each leaf.
 const SIGHT_DISTANCE: f32 = 8.0;
 
-/// The same in coarse steps, whose links have larger errors.
-const COARSE_SIGHT_DISTANCE: f32 = 4.0;
-
 /// Weight of a contact element beside others at a vertex: links see it as a whole. Smaller, and rounding decides;
 /// larger, and vertices beside contacts are too dark.
 const CONTACT_TRUST: f32 = 1e-3;
@@ -53,16 +50,11 @@ pub(crate) fn gather_leaves(
     surfaces: Surfaces<'_>,
     links: &LinkStore,
     coverage: &CoverageMap,
-    is_coarse: bool,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
     let hierarchy = kernel.hierarchy;
     let none = OffsetPlaces::default();
     let offsets = surfaces.direct.map_or(&none, |field| &field.offsets);
-    let sight_distance = match is_coarse {
-        true => COARSE_SIGHT_DISTANCE,
-        false => SIGHT_DISTANCE,
-    };
     let found: Vec<Vec<LeafLight>> = hierarchy
         .groups(hierarchy.task_patches(TASK_PATCHES))
         .into_par_iter()
@@ -72,7 +64,6 @@ pub(crate) fn gather_leaves(
                 links,
                 coverage,
                 offsets,
-                sight_distance,
                 path: Vec::new(),
                 spare: Vec::new(),
                 found: Vec::new(),
@@ -161,8 +152,6 @@ struct Walk<'a> {
     links: &'a LinkStore,
     coverage: &'a CoverageMap,
     offsets: &'a OffsetPlaces,
-    /// See [`SIGHT_DISTANCE`].
-    sight_distance: f32,
     /// Chains of the ancestors of the current node.
     path: Vec<Chain<'a>>,
     /// Unused chains, for their memory.
@@ -207,7 +196,7 @@ impl<'a> Walk<'a> {
 
     /// Add a node to the path, with the links of its ancestors that are not evaluated yet.
     fn push(&mut self, centre: Vec3, radius: f32, mut chain: Chain<'a>) {
-        let far = self.sight_distance * radius;
+        let far = SIGHT_DISTANCE * radius;
         if let Some(above) = self.path.last() {
             for link in &above.rest {
                 chain.add(self.kernel, link, centre, far);
@@ -219,7 +208,7 @@ impl<'a> Walk<'a> {
     /// Add a cluster to the path.
     fn push_cluster(&mut self, index: usize) {
         let cluster = &self.kernel.hierarchy.clusters[index];
-        let far = self.sight_distance * cluster.radius;
+        let far = SIGHT_DISTANCE * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
         for link in self.links.of(NodeId(index as u32)) {
             chain.error += link.error;

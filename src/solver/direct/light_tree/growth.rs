@@ -3,15 +3,14 @@
 use glam::{DVec3, Vec3};
 
 use super::{LEAF_EMITTERS, NONE, Node};
-use crate::solver::direct::{emitter::Emitter, multipole::Extent, panel::Panel};
+use crate::{
+    hierarchy::MEDIAN_DEPTH,
+    solver::direct::{emitter::Emitter, multipole::Extent, panel::Panel},
+};
 
 /// Weight of the variance of normals relative to that of positions. Larger, and lamps far from each other stay
 /// together; smaller, and both sides of a sheet do.
 const NORMAL_WEIGHT: f64 = 0.9;
-
-/// Depth from which nodes are split at the median, so that no tree is deeper than this plus 32. Smaller, and splits are
-/// worse; larger, and degenerate trees are deep.
-const MEDIAN_DEPTH: u32 = 48;
 
 /// An emitter or a panel that is put into the tree.
 #[derive(Clone, Copy)]
