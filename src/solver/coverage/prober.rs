@@ -234,7 +234,7 @@ impl Prober<'_> {
                 .zip(groups)
                 .filter(|(is_enclosed, _)| **is_enclosed)
                 .for_each(|(is_enclosed, group)| {
-                    *is_enclosed = all_hit(group, first_rays(group), count)
+                    *is_enclosed = all_hit(group, first_rays(group), count);
                 });
             shot += groups.len() * count;
         }
