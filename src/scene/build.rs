@@ -74,6 +74,7 @@ impl SceneBuilder {
             doubled_faces: self.doubled_faces,
             max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
+            environment: Arc::default(),
             radiance_unit,
         };
         if !scene.has_emitter() {

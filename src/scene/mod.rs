@@ -18,6 +18,7 @@ mod crossings;
 mod edges;
 mod emission;
 mod encoding;
+mod environment;
 mod fit;
 mod frame;
 mod library;
@@ -55,6 +56,7 @@ pub use appearance::Appearance;
 pub use builder::{BuildError, Face, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
+pub use environment::{Environment, Sky, SkyPicture, Sun};
 pub use frame::Frame;
 pub use means::TextureMeans;
 pub use obj::{read_obj, read_obj_with_progress};
@@ -201,6 +203,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
+    /// Light from outside; dark as a scene is read.
+    pub environment: Arc<Environment>,
     /// Warnings: what was skipped, corrected or clamped.
     pub warnings: Vec<Warning>,
     /// Textures that were omitted on the way in.
