@@ -166,8 +166,9 @@ impl View<'_> {
             false => Vec4::ZERO,
         };
         let leaves = hierarchy.mesh.leaves();
+        let of_met = |leaf| hierarchy.opacity_of(leaf).max(f32::MIN_POSITIVE);
         leaves
-            .map(|leaf| self.linked.radiosity(surfaces, leaf) + sampled(leaf))
+            .map(|leaf| (self.linked.radiosity(surfaces, leaf) + sampled(leaf)) / of_met(leaf))
             .fold(Vec4::ZERO, Vec4::max)
     }
 
@@ -273,7 +274,8 @@ fn leaf_count(mesh: &DisplayMesh) -> usize {
     mesh.element_of.chunk_by(|a, b| a == b).count()
 }
 
-/// Set the colours of the vertices of a display mesh to the area-weighted means of the elements about them.
+/// Set the colours of the vertices of a display mesh to the means of the elements about them, weighted by the area that
+/// rays meet: what they pass has no colour.
 pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: &mut DisplayMesh) {
     let count = display.positions.len();
     let base = hierarchy.clusters.len() as u32;
@@ -285,11 +287,12 @@ pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: 
             hierarchy.emission_of(element),
         ];
         let corners = vertices.map(|vertex| display.positions[vertex as usize]);
-        let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
+        let area = area_vector(corners).length().max(f32::MIN_POSITIVE);
+        let weight = area * hierarchy.opacity_of(element);
         for &vertex in vertices {
             let (reflectance, emission, weights) = &mut sums[display.own_vertex(vertex)];
-            *reflectance += shown[0] * weight;
-            *emission += shown[1] * weight;
+            *reflectance += shown[0] * area;
+            *emission += shown[1] * area;
             *weights += weight;
         }
     }
