@@ -50,7 +50,10 @@ impl Cutout {
         let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
         let pixel =
             |at: f32, count: u32| ((at.rem_euclid(1.0) * count as f32) as u32).min(count - 1);
-        self.has(pixel(uv.x, self.width), pixel(1.0 - uv.y, self.height))
+        self.has(
+            pixel(uv.x, self.width),
+            self.height - 1 - pixel(uv.y, self.height),
+        )
     }
 
     /// Bytes in use.
@@ -110,7 +113,7 @@ impl Material {
     }
 
     /// The part of what rays meet that reflects and emits as the colours say, 0…1; the filter absorbs the rest.
-    pub(super) fn share_of_met(&self) -> f32 {
+    pub fn share_of_met(&self) -> f32 {
         let met = self.met_share();
         if met > 0.0 { self.opacity / met } else { 0.0 }
     }

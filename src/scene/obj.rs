@@ -426,6 +426,7 @@ impl Import<'_> {
         };
         let diffuse = color_beside(diffuse_map, defined.material.diffuse);
         let emissive = color_beside(emissive_map, defined.material.emissive);
+        let is_all_solid = self.options.is_opaque;
         let mut texture = |map: &Option<TextureStatement>, color: Option<Vec3>, role| {
             if shown.has_texcoords || (shown.has_faces && color.is_none()) {
                 return self.texture(map.as_ref()?, defined, role);
@@ -437,12 +438,20 @@ impl Import<'_> {
             None
         };
         let reflecting = texture(diffuse_map, diffuse, Role::Reflects);
-        let emitting = texture(emissive_map, emissive, Role::Emits);
-        // Exporters name the coloured picture itself, whose alpha counts anyway.
         let is_same = |map: &TextureStatement| {
             let same = diffuse_map.as_ref().map(|colors| colors.means_file_of(map));
             same.unwrap_or(false)
         };
+        let cuts_out = reflecting
+            .as_ref()
+            .is_some_and(|placed| placed.texture.cutout.is_some() && !is_all_solid);
+        // What is cut out is dark without being black.
+        let emits = match emissive_map.as_ref().is_some_and(is_same) && cuts_out {
+            true => Role::Reflects,
+            false => Role::Emits,
+        };
+        let emitting = texture(emissive_map, emissive, emits);
+        // Exporters name the coloured picture itself, whose alpha counts anyway.
         let dissolve_map = defined.material.dissolve_map.clone();
         let dissolve_map = dissolve_map.filter(|map| shown.has_texcoords && !is_same(map));
         let cutting = texture(&dissolve_map, None, Role::CutsOut);
