@@ -135,12 +135,28 @@ impl RayTree {
         if self.is_clear() || length <= 2.0 * RAY_OFFSET {
             return Vec3::ONE;
         }
-        let ray = Ray::new(
-            from.into(),
-            (separation / length).into(),
-            RAY_OFFSET,
-            length - RAY_OFFSET,
-        );
+        let until = length - RAY_OFFSET;
+        let ray = Ray::new(from.into(), (separation / length).into(), RAY_OFFSET, until);
+        self.passing(ray, ends)
+    }
+
+    /// What passes along a ray of unit direction out of the scene, by channel, 0…1: the product over all triangles that it
+    /// meets but the one that it starts on.
+    pub fn transmittance_outward(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+    ) -> Vec3 {
+        if self.is_clear() {
+            return Vec3::ONE;
+        }
+        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        self.passing(ray, [from, None])
+    }
+
+    /// What passes through all triangles on a ray but two.
+    fn passing(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> Vec3 {
         let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
         let mut passing = Vec3::ONE;
         let is_open = self.tree.ray_traverse_miss(ray, |ray, primitive| {
