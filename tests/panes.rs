@@ -1,7 +1,5 @@
 //! Light through panes and cut-outs: what passes, what is met, and that all ways to compute it agree.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 mod common;
 
 use std::{collections::BTreeMap, f32::consts::PI, sync::Arc};
@@ -158,7 +156,7 @@ fn coloured_panes_multiply() {
         (of_references[1], 0.03),
     ] {
         for (found, expected) in found.to_array().into_iter().zip(expected.to_array()) {
-            assert_close(found, expected, f64::from(tolerance), "by channel");
+            assert_close(found, expected, tolerance, "by channel");
         }
     }
     // Links have one visibility for all channels.
