@@ -4,10 +4,10 @@ use std::{fmt::Display, str::FromStr, time::Duration};
 
 use clap::{Args, ValueEnum};
 
-use super::values::name_of;
+use super::{LoadError, light_flags::LightFlags, values::name_of};
 use crate::{
     export::{ColorOptions, MeshOptions, ToneMap},
-    scene::{SceneOptions, Sides, UpAxis},
+    scene::{Lighting, SceneOptions, Sides, UpAxis},
     solver::{Direct, Keep, Method, Omission, Oracle, SolveSettings},
     worker::RunOptions,
 };
@@ -24,7 +24,7 @@ pub enum Preset {
     Final,
 }
 
-/// Flags of [`SceneOptions`].
+/// Flags of [`SceneOptions`] and of [`Lighting`].
 #[derive(Clone, Debug, Args)]
 pub struct SceneFlags {
     /// Which sides of faces reflect and emit
@@ -54,9 +54,20 @@ pub struct SceneFlags {
         help_heading = "Scene"
     )]
     pub up: UpAxis,
+    /// Light
+    #[command(flatten)]
+    pub light: LightFlags,
 }
 
 impl SceneFlags {
+    /// The light that the flags ask for.
+    ///
+    /// # Errors
+    /// As [`LightFlags::lighting`].
+    pub fn lighting(&self) -> Result<Lighting, LoadError> {
+        self.light.lighting(self.up)
+    }
+
     /// The options that the flags ask for.
     pub fn options(&self) -> SceneOptions {
         let default = SceneOptions::default();
@@ -345,7 +356,8 @@ pub enum MtlColorFlag {
     Srgb,
 }
 
-fn number(text: &str) -> Result<f32, String> {
+/// A finite number.
+pub(super) fn number(text: &str) -> Result<f32, String> {
     text.parse()
         .ok()
         .filter(|number: &f32| number.is_finite())

@@ -77,15 +77,7 @@ impl SceneBuilder {
             environment: Arc::default(),
             radiance_unit,
         };
-        if !scene.has_emitter() {
-            scene.warnings.push(Warning {
-                kind: WarningKind::NoEmitter,
-                message: "nothing emits light, so the result is black; give a material Ke above 0"
-                    .to_owned(),
-                count: 1,
-                place: None,
-            });
-        }
+        scene.warn_of_darkness();
         cut_crossings(&mut scene);
         Ok(scene)
     }

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     hierarchy::NodeId,
-    scene::{Scene, SceneOptions},
+    scene::{Lighting, Scene, SceneOptions},
     solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
@@ -55,6 +55,8 @@ pub struct State {
     pub options: RunOptions,
     /// How scenes are read.
     pub scene_options: SceneOptions,
+    /// The light that they have beside their own.
+    pub lighting: Lighting,
     /// Its lights and materials, as they were changed.
     pub materials: Materials,
     /// How the light is shown.

@@ -1,7 +1,7 @@
 //! Sentences of other rooms as the window says them: they name controls where the command line names flags.
 
 /// Flags by the name of their control in the window.
-const CONTROLS: [(&str, &str); 12] = [
+const CONTROLS: [(&str, &str); 13] = [
     ("--sides", "Sides"),
     ("--epsilon", "Link threshold ε"),
     ("--min-area", "Smallest element"),
@@ -14,10 +14,11 @@ const CONTROLS: [(&str, &str); 12] = [
     ("--samples", "Samples p"),
     ("--method", "Clusters"),
     ("--reference", "Trace reference"),
+    ("--sky", "Sky"),
 ];
 
 /// Values of flags by their label in the window.
-const VALUES: [(&str, &str); 7] = [
+const VALUES: [(&str, &str); 8] = [
     ("auto", "Automatic"),
     ("one", "One-sided"),
     ("two", "Two-sided"),
@@ -25,6 +26,7 @@ const VALUES: [(&str, &str); 7] = [
     ("linked", "Links"),
     ("interval", "Interval bounds"),
     ("samples", "p samples"),
+    ("none", "None"),
 ];
 
 /// A sentence without flags: `--sides two` becomes “Sides: Two-sided”. A flag without a control keeps its words.
