@@ -85,6 +85,8 @@ fn the_report_says_what_gives_light() {
 fn light_that_makes_no_sense_gets_one_sentence() {
     let folder = folder();
     fs::write(folder.path().join("broken.exr"), "no picture").unwrap();
+    // Pictures are known by their content.
+    fs::copy(folder.path().join("sky.hdr"), folder.path().join("sky.ply")).unwrap();
     for (more, code, sentence) in [
         (&["--emit", "flor=1"][..], 3, "did you mean 'floor'?"),
         (
@@ -99,12 +101,16 @@ fn light_that_makes_no_sense_gets_one_sentence() {
         ),
         (&["--sky", "a.mtl"], 3, "cannot read the picture of the sky"),
         (&["--sky", "-1"], 2, "must be at least 0"),
-        (&["--sky", "sky.hdr", "--export", "sky.hdr"], 2, "--export"),
+        (
+            &["--sky", "sky.ply", "--export", "sky.ply"],
+            2,
+            "--export would replace",
+        ),
     ] {
         let output = solve(folder.path(), more);
         let said = text(&output.stderr);
         assert_eq!(output.status.code(), Some(code), "{more:?}: {said}");
         assert!(said.contains(sentence), "{more:?}: {said}");
     }
-    assert!(folder.path().join("sky.hdr").exists());
+    assert!(folder.path().join("sky.ply").exists());
 }

@@ -4,7 +4,10 @@ use std::{fmt::Display, str::FromStr, time::Duration};
 
 use clap::{Args, ValueEnum};
 
-use super::{LoadError, light_flags::LightFlags, values::name_of};
+use super::{
+    light_flags::LightFlags,
+    values::{at_least_zero, name_of, number},
+};
 use crate::{
     export::{ColorOptions, MeshOptions, ToneMap},
     scene::{Lighting, SceneOptions, Sides, UpAxis},
@@ -64,7 +67,7 @@ impl SceneFlags {
     ///
     /// # Errors
     /// As [`LightFlags::lighting`].
-    pub fn lighting(&self) -> Result<Lighting, LoadError> {
+    pub fn lighting(&self) -> anyhow::Result<Lighting> {
         self.light.lighting(self.up)
     }
 
@@ -354,22 +357,6 @@ pub enum MtlColorFlag {
     Linear,
     /// Decoded from sRGB
     Srgb,
-}
-
-/// A finite number.
-pub(super) fn number(text: &str) -> Result<f32, String> {
-    text.parse()
-        .ok()
-        .filter(|number: &f32| number.is_finite())
-        .ok_or_else(|| "not a number".to_owned())
-}
-
-/// A finite number that is not negative.
-pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
-    number(text).and_then(|value| match value >= 0.0 {
-        true => Ok(value),
-        false => Err("must be at least 0".to_owned()),
-    })
 }
 
 fn fraction(text: &str) -> Result<f32, String> {

@@ -2,14 +2,15 @@
 
 use std::{path::PathBuf, str::FromStr, sync::Arc};
 
+use anyhow::{Result, bail};
 use clap::Args;
 use glam::Vec3;
 
 use super::{
-    LoadError,
-    flags::{at_least_zero, number},
+    LoadError, UsageError,
+    values::{at_least_zero, number},
 };
-use crate::scene::{Lamp, Lighting, SkySource, Sun, SunSource, UpAxis, read_sky};
+use crate::scene::{HosekSky, Lamp, Lighting, SkySource, Sun, SunSource, UpAxis, read_sky};
 
 /// Flags of [`Lighting`].
 #[derive(Clone, Debug, Args)]
@@ -17,11 +18,12 @@ pub struct LightFlags {
     /// Light from all around: none, its radiance, or an equirectangular picture
     #[arg(
         long,
-        value_name = "none|R,G,B|FILE",
+        value_name = "none|R,G,B|FILE|hosek=T",
         allow_hyphen_values = true,
         help = "Light from all around [default: that of the scene; radiance 1 where nothing else emits]: none; radiance in \
-                W·sr⁻¹·m⁻², linear R,G,B or one number; or a picture of radiance, .hdr or .exr, equirectangular, its top row \
-                up, its middle south (+Z, or -Y where +Z is up)",
+                W·sr⁻¹·m⁻², linear R,G,B or one number; a picture of radiance, .hdr or .exr, equirectangular, its top row up, \
+                its middle south (+Z, or -Y where +Z is up); or hosek=TURBIDITY, a clear (2 to 4) or hazy (to 10) day by \
+                Hosek and Wilkie about the place of --sun, black below the horizon, in cd/m² over 683",
         help_heading = "Light"
     )]
     pub sky: Option<SkyFlag>,
@@ -66,7 +68,7 @@ pub struct LightFlags {
         allow_hyphen_values = true,
         help = format!(
             "Irradiance by the sun of a surface square to it, W/m², one number or linear R,G,B [default: {}, about three \
-             times what a sky of radiance 1 gives to open ground]",
+             times what a sky of radiance 1 gives to open ground; with --sky hosek that of its air]",
             SunSource::IRRADIANCE
         ),
         help_heading = "Light"
@@ -101,42 +103,71 @@ impl LightFlags {
     /// The light that the flags ask for, pictures read.
     ///
     /// # Errors
-    /// When the picture of the sky cannot be read.
-    pub fn lighting(&self, up: UpAxis) -> Result<Lighting, LoadError> {
+    /// When the picture of the sky cannot be read, or the flags do not go together.
+    pub fn lighting(&self, up: UpAxis) -> Result<Lighting> {
         let mut lighting = Lighting {
             up,
-            sun: self.sun.map(|sun| self.sun(sun)),
             lamps: self.emit.iter().map(|lamp| lamp.0.clone()).collect(),
             ..Lighting::default()
         };
+        let mut irradiance = Vec3::splat(SunSource::IRRADIANCE);
         let scale = self.sky_scale.unwrap_or(1.0);
+        let mut picture = None;
         lighting.sky = match &self.sky {
-            None => None,
             Some(SkyFlag::Dark) => Some(SkySource::Dark),
             Some(SkyFlag::Uniform(radiance)) => Some(SkySource::Uniform(*radiance * scale)),
             Some(SkyFlag::File(path)) => {
-                let read = read_sky(path)?;
+                let read = read_sky(path).map_err(LoadError::from)?;
                 lighting.files.push(path.clone());
                 lighting.warnings.extend(read.warnings);
-                Some(SkySource::Picture {
-                    picture: Arc::new(read.picture),
-                    scale,
-                    rotation: self.sky_rotation.unwrap_or(0.0),
-                })
+                picture = Some(read.picture);
+                None
             }
+            Some(SkyFlag::Hosek(turbidity)) => {
+                let sky = self.hosek(*turbidity)?;
+                irradiance = sky.sun_irradiance;
+                picture = Some(sky.picture);
+                None
+            }
+            None => None,
         };
+        if let Some(picture) = picture {
+            lighting.sky = Some(SkySource::Picture {
+                picture: Arc::new(picture),
+                scale,
+                rotation: self.sky_rotation.unwrap_or(0.0),
+            });
+        }
+        lighting.sun = self.sun.map(|sun| self.sun(sun, irradiance));
         Ok(lighting)
     }
 
-    fn sun(&self, place: SunFlag) -> SunSource {
+    /// The sky about the place of the sun.
+    fn hosek(&self, turbidity: f32) -> Result<HosekSky> {
+        if self.sky_rotation.is_some() {
+            let message = "--sky-rotation turns pictures; the place of the sun turns --sky hosek";
+            bail!(UsageError(message.to_owned()));
+        }
+        let sky = match self.sun {
+            Some(SunFlag::Place { azimuth, elevation }) => {
+                HosekSky::new(turbidity, azimuth, elevation)
+            }
+            _ => None,
+        };
+        sky.ok_or_else(|| {
+            let message =
+                "--sky hosek needs --sun AZIMUTH,ELEVATION with the sun above the horizon";
+            UsageError(message.to_owned()).into()
+        })
+    }
+
+    fn sun(&self, place: SunFlag, irradiance: Vec3) -> SunSource {
         match place {
             SunFlag::Dark => SunSource::Dark,
             SunFlag::Place { azimuth, elevation } => SunSource::Disc {
                 azimuth,
                 elevation,
-                irradiance: self
-                    .sun_irradiance
-                    .unwrap_or(Vec3::splat(SunSource::IRRADIANCE)),
+                irradiance: self.sun_irradiance.unwrap_or(irradiance),
                 diameter: self.sun_diameter.unwrap_or(Sun::DEGREES),
             },
         }
@@ -152,6 +183,8 @@ pub enum SkyFlag {
     Uniform(Vec3),
     /// A picture.
     File(PathBuf),
+    /// A clear day of this turbidity.
+    Hosek(f32),
 }
 
 impl FromStr for SkyFlag {
@@ -160,6 +193,12 @@ impl FromStr for SkyFlag {
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "none" {
             return Ok(Self::Dark);
+        }
+        if let Some(turbidity) = text.strip_prefix("hosek=") {
+            return match number(turbidity)? {
+                turbidity if (1.0..=10.0).contains(&turbidity) => Ok(Self::Hosek(turbidity)),
+                _ => Err("the turbidity must be within 1 and 10".to_owned()),
+            };
         }
         // Whatever looks like numbers is meant as such.
         if text
@@ -171,7 +210,9 @@ impl FromStr for SkyFlag {
         let path = PathBuf::from(text);
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         if !path.exists() && extension != "hdr" && extension != "exr" {
-            return Err("expected none, R,G,B, or a picture .hdr or .exr".to_owned());
+            return Err(
+                "expected none, R,G,B, a picture .hdr or .exr, or hosek=TURBIDITY".to_owned(),
+            );
         }
         Ok(Self::File(path))
     }
@@ -301,6 +342,28 @@ mod tests {
     }
 
     #[test]
+    fn a_clear_day_has_a_sun_of_its_own_strength() {
+        let sun = ["--sky", "hosek=3", "--sun", "120,40"];
+        let found = lighting(&sun).unwrap();
+        let Some(SunSource::Disc { irradiance, .. }) = found.sun else {
+            panic!("no sun");
+        };
+        assert_eq!(
+            irradiance,
+            HosekSky::new(3.0, 120.0, 40.0).unwrap().sun_irradiance
+        );
+        assert!(matches!(found.sky, Some(SkySource::Picture { .. })));
+        let weak = lighting(&[&sun[..], &["--sun-irradiance", "2"]].concat()).unwrap();
+        assert!(matches!(
+            weak.sun,
+            Some(SunSource::Disc {
+                irradiance: Vec3 { x: 2.0, .. },
+                ..
+            })
+        ));
+    }
+
+    #[test]
     fn suns_have_a_place_a_strength_and_a_size() {
         let sun = |arguments: &[&str]| lighting(arguments).unwrap().sun;
         assert_eq!(sun(&["--sun", "none"]), Some(SunSource::Dark));
@@ -345,8 +408,16 @@ mod tests {
             (&["--sky", "inf"], "not a number"),
             (&["--sky", "nan,1,1"], "not a number"),
             (&["--sky", "1,1"], "expected one number or R,G,B"),
-            (&["--sky", "blue"], "expected none, R,G,B, or a picture"),
+            (&["--sky", "blue"], "expected none, R,G,B, a picture"),
             (&["--sky", "missing.hdr"], "no such picture of the sky"),
+            (&["--sky", "hosek=11", "--sun", "0,9"], "within 1 and 10"),
+            (&["--sky", "hosek=3"], "needs --sun AZIMUTH,ELEVATION"),
+            (&["--sky", "hosek=3", "--sun", "none"], "needs --sun"),
+            (&["--sky", "hosek=3", "--sun", "0,-1"], "above the horizon"),
+            (
+                &["--sky", "hosek=3", "--sun", "0,9", "--sky-rotation", "5"],
+                "the place of the sun turns",
+            ),
             (&["--sky-scale", "2"], "--sky"),
             (&["--sky", "1", "--sky-scale", "-2"], "must be at least 0"),
             (&["--sky", "1", "--sky-scale", "inf"], "not a number"),

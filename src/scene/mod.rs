@@ -21,6 +21,7 @@ mod encoding;
 mod environment;
 mod fit;
 mod frame;
+mod hosek;
 mod library;
 mod lighting;
 mod limited;
@@ -61,6 +62,7 @@ pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_lin
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use environment::{Environment, Sky, SkyPicture, Sun};
 pub use frame::Frame;
+pub use hosek::HosekSky;
 pub use lighting::{Lamp, Lighting, SkySource, SunSource};
 pub use means::TextureMeans;
 pub use obj::{read_obj, read_obj_with_progress};
