@@ -210,7 +210,8 @@ fn a_street_between_black_walls_sees_a_strip_of_the_sky() {
         }
     }
     let street = street.finish(Sides::One).in_environment(uniform(1.0));
-    assert_light_where(street, 0.015, |position, normal| {
+    // Three times the noise where least of the sky is seen.
+    assert_light_where(street, 0.03, |position, normal| {
         // In the middle only.
         if position.z.abs() > 2.0 {
             return None;
