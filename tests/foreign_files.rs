@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 
 use glam::Vec3;
 use tempfile::TempDir;
-use vecrad::scene::{ReadError, Scene, SceneOptions, WarningKind, read_obj};
+use vecrad::scene::{ReadError, Scene, SceneOptions, TriangleId, WarningKind, read_obj};
 
 /// A square with texture coordinates.
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
@@ -235,7 +235,7 @@ fn black_beside_a_picture_means_the_picture_alone() {
 }
 
 #[test]
-fn transparency_is_told_once_and_for_which_materials() {
+fn transparency_and_gloss_are_told_once_and_for_which_materials() {
     let materials = [
         ("Glass", "d 0.3"),
         ("Wall", "illum 4\nd 1"),
@@ -254,8 +254,73 @@ fn transparency_is_told_once_and_for_which_materials() {
         }
     }
     let scene = read(&folder(&[("scene.obj", &obj), ("a.mtl", &mtl)], &[]));
-    let expected = "a.mtl:1: transparency is not computed; treated as opaque: 'Glass' (d), 'Wall', 'Floor' (illum 4), 'Pane' (Tr)";
-    assert_eq!(said(&scene), [expected]);
+    let expected = [
+        "a.mtl:1: light passes through 'Glass' (d 0.3), 'Pane' (Tr 0.9)",
+        "a.mtl:4: gloss and relief are not computed, so these surfaces are matt and flat: 'Wall', 'Floor' (illum 4)",
+    ];
+    assert_eq!(said(&scene), expected);
+    for (name, opacity) in [("Glass", 0.3), ("Wall", 1.0), ("Pane", 0.1)] {
+        let is_meant = |id: &TriangleId| scene.material(*id).name == name;
+        let triangle = scene.triangle_ids().find(is_meant).unwrap();
+        let surface = scene.surfaces[triangle.index()];
+        assert!((surface.opacity - opacity).abs() < 1e-6, "{name}");
+        assert!(
+            (surface.reflectance.x - 0.5 * opacity).abs() < 1e-6,
+            "{name}"
+        );
+    }
+}
+
+/// The opacity of each material of an MTL file, all of which faces show, and what is said of them.
+fn opacities(mtl: &str, options: &SceneOptions) -> (Vec<f32>, Vec<String>) {
+    let mut obj = format!("mtllib a.mtl\n{SQUARE}");
+    for (line, number) in mtl
+        .lines()
+        .filter(|line| line.starts_with("newmtl"))
+        .zip(5..)
+    {
+        let name = line.trim_start_matches("newmtl ");
+        obj += &format!("v 0 0 {number}\nv 1 0 {number}\nv 0 1 {number}\n");
+        obj += &format!("usemtl {name}\nf -3/1 -2/2 -1/3\n");
+    }
+    let folder = folder(&[("scene.obj", &obj), ("a.mtl", mtl)], &["floor.png"]);
+    let scene = read_obj(&folder.path().join("scene.obj"), options).unwrap();
+    let opacities = scene.surfaces.iter().map(|surface| surface.opacity);
+    (opacities.collect(), said(&scene))
+}
+
+#[test]
+fn what_exporters_write_by_habit_is_no_glass() {
+    let options = SceneOptions::default();
+    // Invisible by the file, but most are.
+    let (found, said) = opacities(
+        "newmtl a\nd 0\nnewmtl b\nTr 1\nnewmtl c\nd 0.25\n",
+        &options,
+    );
+    assert_eq!(found, [1.0, 1.0, 0.25]);
+    let expected = [
+        "a.mtl:5: light passes through 'c' (d 0.25)",
+        "a.mtl:1: treated as solid: 'a' (d 0, as most materials), 'b' (Tr 1, as most materials)",
+    ];
+    assert_eq!(said, expected);
+    // One of several, and one with a picture.
+    let mtl = "newmtl a\nd 0\nnewmtl b\nd 0\nmap_Kd floor.png\nnewmtl c\nnewmtl d\n";
+    let (found, said) = opacities(mtl, &options);
+    assert_eq!(found, [0.0, 1.0, 1.0, 1.0]);
+    assert_eq!(
+        said[1],
+        "a.mtl:3: treated as solid: 'b' (d 0 beside a picture)"
+    );
+    let opaque = SceneOptions {
+        is_opaque: true,
+        ..options
+    };
+    let (found, said) = opacities("newmtl a\nd 0.5\n", &opaque);
+    assert_eq!(found, [1.0]);
+    assert_eq!(
+        said,
+        ["a.mtl:1: treated as solid: 'a' (d 0.5, by --opaque)"]
+    );
 }
 
 #[test]
@@ -280,12 +345,17 @@ fn alpha_of_a_picture_counts_as_transparency_and_hidden_colours_do_not() {
     });
     leaf.save(folder.path().join("leaf.png")).unwrap();
     let scene = read(&folder);
-    let expected =
-        "a.mtl:1: transparency is not computed; treated as opaque: 'Leaf' (alpha of map_Kd)";
+    let expected = "a.mtl:1: light passes through 'Leaf' (cut out by alpha of map_Kd)";
     assert_eq!(said(&scene), [expected]);
     for surface in &scene.surfaces {
-        assert_near(surface.reflectance, brown(), "reflectance");
+        assert_near(
+            surface.reflectance / surface.opacity,
+            brown(),
+            "reflectance",
+        );
     }
+    let opacity: f32 = scene.surfaces.iter().map(|s| s.opacity * 0.5).sum();
+    assert!((opacity - 1.0 / 8.0).abs() < 0.01, "{opacity}");
     // One column of eight emits; triangles are half of the square each.
     let emission: Vec3 = scene.surfaces.iter().map(|s| s.emission * 0.5).sum();
     assert!(emission.abs_diff_eq(brown() / 8.0, 0.01), "{emission}");

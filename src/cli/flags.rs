@@ -48,6 +48,13 @@ pub struct SceneFlags {
     /// Encoding of Kd and Ke in the MTL file
     #[arg(long, value_enum, default_value = "linear", help_heading = "Scene")]
     pub mtl_color: MtlColorFlag,
+    /// Treat panes and cut-outs as solid
+    ///
+    /// Otherwise map_d, or the alpha of map_Kd, cuts out where it is below 0.5, and d below 1 (or Tr above 0) lets the
+    /// part 1 - d pass straight on, times Tf. d 0 (or Tr 1) counts only for materials without a picture, and where at
+    /// most half of the materials have it: many programs write it into opaque ones. illum alone makes nothing transparent.
+    #[arg(long, help_heading = "Scene")]
+    pub opaque: bool,
     /// Up axis of the scene
     #[arg(
         long,
@@ -78,6 +85,7 @@ impl SceneFlags {
             sides: self.sides,
             max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
             mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
+            is_opaque: self.opaque,
         }
     }
 }

@@ -154,14 +154,16 @@ fn matrix_point(scene: &Scene, patch: &MatrixPatch, barycentric: Vec3) -> Refere
     let [a, b, c] = scene.corners(patch.triangle);
     let surface = scene.surfaces[patch.triangle.index()];
     let front = surface.area_vector.normalize_or_zero();
+    // Points stand for what rays meet.
+    let met = 1.0 / surface.opacity.max(f32::MIN_POSITIVE);
     ReferencePoint {
         triangle: patch.triangle,
         is_back: patch.is_back,
         barycentric,
         position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
         normal: if patch.is_back { -front } else { front },
-        reflectance: surface.reflectance,
-        emission: surface.emission,
+        reflectance: surface.reflectance * met,
+        emission: surface.emission * met,
         irradiance: patch.irradiance,
         irradiance_error: 0.0,
         standard_error: 0.0,

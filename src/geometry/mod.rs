@@ -2,6 +2,7 @@
 //! Everything here is in frame units and knows nothing of light.
 
 mod lanes;
+mod panes;
 mod polygon;
 mod rays;
 mod sampling;

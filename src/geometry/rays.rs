@@ -1,4 +1,4 @@
-//! The ray tree: is a segment blocked, and what does a ray meet first.
+//! The ray tree: what passes along a segment, and what does a ray meet first.
 //!
 //! An obvhs CWBVH over the scene's triangles. It serves rays only: clusters of light come from a tree of their own.
 
@@ -14,6 +14,7 @@ use obvhs::{
     triangle::Triangle as RayTriangle,
 };
 
+use super::panes::{self, Panes};
 use crate::scene::{Frame, Scene, TriangleId};
 
 /// Rays start and end this far from their ends, in frame units: a millionth of the scene's extent.
@@ -54,6 +55,8 @@ pub struct RayTree {
     /// Which triangle of the scene each of them is, or is a piece of.
     ids: Vec<u32>,
     crossings: f32,
+    /// Nothing where all triangles are opaque.
+    panes: Option<Box<Panes>>,
 }
 
 impl RayTree {
@@ -64,6 +67,7 @@ impl RayTree {
             triangles: Vec::new(),
             ids: Vec::new(),
             crossings: 0.0,
+            panes: None,
         }
     }
 
@@ -95,6 +99,7 @@ impl RayTree {
                 .collect(),
             ids: order().map(|index| ids[index]).collect(),
             crossings: crossings(&triangles),
+            panes: Panes::of(scene),
             tree,
         }
     }
@@ -105,29 +110,60 @@ impl RayTree {
         self.crossings
     }
 
-    /// Whether anything but the two triangles of its ends lies on the segment.
+    /// Whether light passes through a triangle.
+    pub fn is_see_through(&self, triangle: TriangleId) -> bool {
+        self.panes
+            .as_ref()
+            .is_some_and(|panes| panes.has(triangle.0))
+    }
+
+    /// Whether light passes through some triangle.
+    pub fn has_panes(&self) -> bool {
+        self.panes.is_some()
+    }
+
+    /// Whether some triangle colours what passes through it.
+    pub fn has_coloured_panes(&self) -> bool {
+        self.panes.as_ref().is_some_and(|panes| panes.is_coloured())
+    }
+
+    /// What passes along a segment, by channel, 0…1: the product over all triangles on it but the two of its ends.
     /// Naming the ends lets a segment start on its own surface however small that is.
-    pub fn occluded(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> bool {
+    pub fn transmittance(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> Vec3 {
         let separation = to - from;
         let length = separation.length();
         if self.is_clear() || length <= 2.0 * RAY_OFFSET {
-            return false;
+            return Vec3::ONE;
         }
         let until = length - RAY_OFFSET;
         let ray = Ray::new(from.into(), (separation / length).into(), RAY_OFFSET, until);
-        self.is_blocked(ray, ends)
+        self.passing(ray, ends)
     }
 
-    /// Whether a ray of unit direction meets nothing but the triangle that it starts on.
-    pub fn leaves(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> bool {
+    /// What passes along a ray of unit direction out of the scene; see [`Self::transmittance`].
+    pub fn transmittance_outward(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+    ) -> Vec3 {
+        if self.is_clear() {
+            return Vec3::ONE;
+        }
         let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
-        self.is_clear() || !self.is_blocked(ray, [from, None])
+        self.passing(ray, [from, None])
     }
 
-    /// Whether a ray meets anything but two triangles.
-    fn is_blocked(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> bool {
+    /// Whether anything passes along a ray of unit direction out of the scene.
+    pub fn leaves(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> bool {
+        self.transmittance_outward(origin, direction, from) != Vec3::ZERO
+    }
+
+    /// What passes along a ray by all triangles but two.
+    fn passing(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> Vec3 {
         let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
-        !self.tree.ray_traverse_miss(ray, |ray, primitive| {
+        let mut passing = Vec3::ONE;
+        let is_open = self.tree.ray_traverse_miss(ray, |ray, primitive| {
             let distance = self.triangles[primitive].intersect(ray);
             // Most triangles are missed, and which one it was is then of no interest.
             if distance == f32::INFINITY {
@@ -135,16 +171,53 @@ impl RayTree {
             }
             let id = self.ids[primitive];
             if id == first || id == second {
-                f32::INFINITY
-            } else {
-                distance
+                return f32::INFINITY;
             }
-        })
+            let Some(panes) = &self.panes else {
+                return distance;
+            };
+            passing *= panes.passing(id, point_at(ray, distance));
+            if passing == Vec3::ZERO {
+                distance
+            } else {
+                f32::INFINITY
+            }
+        });
+        if is_open { passing } else { Vec3::ZERO }
+    }
+
+    /// Whether nothing passes along a segment; see [`Self::transmittance`].
+    pub fn occluded(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> bool {
+        self.transmittance(from, to, ends) == Vec3::ZERO
     }
 
     /// The nearest triangle along a ray of unit direction, except the one that it starts on. Of two in one place, back
-    /// to back, it is the one whose front is met.
+    /// to back, it is the one whose front is met. What is cut out is not met, and panes only by chance, as often as they
+    /// do not let light pass in the mean of its channels; see [`Self::tint`].
     pub fn closest(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Option<Hit> {
+        self.closest_of(origin, direction, from, |panes, id, point| {
+            panes.meets(id, point, [origin, direction])
+        })
+    }
+
+    /// As [`Self::closest`], but panes are always met: what is looked at.
+    pub fn closest_shown(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+    ) -> Option<Hit> {
+        self.closest_of(origin, direction, from, Panes::is_there)
+    }
+
+    /// The nearest triangle of those that are opaque and those for which `meets` is true.
+    fn closest_of(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+        meets: impl Fn(&Panes, u32, Vec3) -> bool,
+    ) -> Option<Hit> {
         if self.is_clear() {
             return None;
         }
@@ -154,7 +227,13 @@ impl RayTree {
         let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
             let triangle = &self.triangles[primitive];
             let distance = triangle.intersect(ray);
-            if distance == f32::INFINITY || self.ids[primitive] == start {
+            let id = self.ids[primitive];
+            if distance == f32::INFINITY || id == start {
+                return f32::INFINITY;
+            }
+            if let Some(panes) = &self.panes
+                && !meets(panes, id, point_at(ray, distance))
+            {
                 return f32::INFINITY;
             }
             let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
@@ -168,6 +247,41 @@ impl RayTree {
             triangle: TriangleId(self.ids[hit.primitive_id as usize]),
             distance: self.triangles[hit.primitive_id as usize].intersect(&ray),
         })
+    }
+
+    /// By what the light that comes along a ray to [`Self::closest`] is to be multiplied, by channel, for the colours of the
+    /// panes that it passes before the `hit`, or on its way out of the scene: on average over panes of one material, what
+    /// passes over the chance of passing. 1 where no pane is coloured.
+    pub fn tint(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+        hit: Option<Hit>,
+    ) -> Vec3 {
+        let Some(panes) = self.panes.as_ref().filter(|panes| panes.is_coloured()) else {
+            return Vec3::ONE;
+        };
+        let end = hit.map_or(f32::MAX, |hit| hit.distance);
+        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, end);
+        let met = hit.map_or(u32::MAX, |hit| hit.triangle.0);
+        let start = from.map_or(u32::MAX, |id| id.0);
+        let mut tint = Vec3::ONE;
+        // Nothing counts as met, so that the ray goes through everything.
+        self.tree
+            .ray_traverse(ray, &mut RayHit::none(), |ray, primitive| {
+                let id = self.ids[primitive];
+                let distance = self.triangles[primitive].intersect(ray);
+                if distance < f32::INFINITY && id != start && id != met {
+                    let passing = panes.passing(id, point_at(ray, distance));
+                    let chance = panes::mean(passing);
+                    if chance > 0.0 {
+                        tint *= passing / chance;
+                    }
+                }
+                f32::INFINITY
+            });
+        tint
     }
 
     /// How many solids a ray of unit direction leaves on its way, less how many it enters: of those that hold its origin
@@ -201,7 +315,12 @@ impl RayTree {
             + size_of_val(self.triangles.as_slice())
             + size_of_val(self.tree.primitive_indices.as_slice())
             + size_of_val(self.ids.as_slice())
+            + self.panes.as_ref().map_or(0, |panes| panes.memory_bytes())
     }
+}
+
+fn point_at(ray: &Ray, distance: f32) -> Vec3 {
+    (ray.origin + ray.direction * distance).into()
 }
 
 /// A triangle, or, where it is huge, its pieces: halves across the longest edge, again and again.

@@ -269,6 +269,7 @@ fn patch(scene: &Scene, item: &Item) -> Patch {
         area: area_vector.length(),
         reflectance: surface.reflectance,
         emission: surface.emission,
+        opacity: surface.opacity,
     }
 }
 

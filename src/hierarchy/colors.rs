@@ -74,6 +74,14 @@ impl Hierarchy {
         }
     }
 
+    /// Mean part of the rays to an element that meet it, 0…1. Reflectance and emission are means over all of it.
+    pub fn opacity_of(&self, element: usize) -> f32 {
+        match self.colors.of(element) {
+            Some(varied) => varied.means.opacity,
+            None => self.patch_of(element).opacity,
+        }
+    }
+
     /// Largest channel of the reflectance of any element.
     pub fn largest_reflectance(&self) -> f32 {
         let patches = self.patches.par_iter().map(|patch| patch.reflectance);
@@ -180,6 +188,7 @@ impl Hierarchy {
         let deviation = mean_of(quarters.into_iter().map(|quarter| TextureMeans {
             reflectance: (quarter.reflectance - means.reflectance).abs(),
             emission: (quarter.emission - means.emission).abs(),
+            opacity: (quarter.opacity - means.opacity).abs(),
         }));
         Varied {
             means,
@@ -204,6 +213,7 @@ impl Hierarchy {
                 deviation: TextureMeans {
                     reflectance: Vec3::ZERO,
                     emission: Vec3::ZERO,
+                    opacity: 0.0,
                 },
                 shown: shown(scene, appearances, triangle, means),
             };
@@ -240,14 +250,17 @@ fn shown(
 
 /// Mean of at least one.
 fn mean_of(parts: impl Iterator<Item = TextureMeans>) -> TextureMeans {
-    let (mut reflectance, mut emission, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+    let (mut reflectance, mut emission) = (Vec3::ZERO, Vec3::ZERO);
+    let (mut opacity, mut count) = (0.0, 0.0);
     for part in parts {
         reflectance += part.reflectance;
         emission += part.emission;
+        opacity += part.opacity;
         count += 1.0;
     }
     TextureMeans {
         reflectance: reflectance / count,
         emission: emission / count,
+        opacity: opacity / count,
     }
 }

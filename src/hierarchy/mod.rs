@@ -94,6 +94,8 @@ pub struct Patch {
     pub reflectance: Vec3,
     /// Mean emitted radiance; for an element see [`Hierarchy::emission_of`].
     pub emission: Vec3,
+    /// Mean part of the rays to it that meet it; for an element see [`Hierarchy::opacity_of`].
+    pub opacity: f32,
 }
 
 /// A node of the binary tree.

@@ -81,7 +81,14 @@ impl Tables {
             .enumerate()
             .filter(|(_, (_, element))| element.is_leaf())
             .for_each(|(index, (radiosity, _))| *radiosity = leaf(index));
+        // What light passes through has that radiosity only where it is met.
         self.brightest_in_elements.clone_from(&self.elements);
+        let leaves = self.brightest_in_elements.par_iter_mut().enumerate();
+        leaves
+            .filter(|(index, _)| elements[*index].is_leaf())
+            .for_each(|(index, brightest)| {
+                *brightest /= hierarchy.opacity_of(index).max(f32::MIN_POSITIVE);
+            });
         let mut weighed: Vec<Vec4> = elements
             .par_iter()
             .zip(&self.elements)

@@ -90,7 +90,9 @@ impl Estimator<'_> {
             sum += throughput * self.emitter_share(at, bounce);
             sum += throughput * self.outside.share(self.rays, at, bounce.outside);
             let direction = cosine_direction(at.normal, bounce.direction);
-            let hit = self.rays.closest(at.position, direction, Some(at.triangle));
+            let start = Some(at.triangle);
+            let hit = self.rays.closest(at.position, direction, start);
+            throughput *= self.rays.tint(at.position, direction, start, hit);
             let Some(hit) = hit else {
                 sum += throughput * self.outside.by_ray(at.normal, direction);
                 break;
@@ -132,12 +134,14 @@ impl Estimator<'_> {
         }
         let density = self.emitters.density(sample.triangle) * separation.length_squared();
         let ends = [Some(at.triangle), Some(sample.triangle)];
-        if self.rays.occluded(at.position, sample.position, ends) {
+        let mut passing = self.rays.transmittance(at.position, sample.position, ends);
+        passing *= self.scene.opacity_at(sample.triangle, sample.barycentric);
+        if passing == Vec3::ZERO {
             return Vec3::ZERO;
         }
         // Both densities times the cosine at the source, so that nothing is divided by a vanishing cosine.
         let weight = cosine * source_cosine / (density + source_cosine * cosine * FRAC_1_PI);
-        self.scene.emission_at(sample.triangle, sample.barycentric) * weight
+        self.scene.emission_at(sample.triangle, sample.barycentric) * weight * passing
     }
 
     /// The surface at a hit, if that side reflects or emits.

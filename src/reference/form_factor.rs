@@ -121,9 +121,7 @@ fn visibility(
         let weight = cosines / separation.length_squared().powi(2).max(f32::MIN_POSITIVE);
         if weight > 0.0 && weight.is_finite() {
             all += weight;
-            if !tree.occluded(from, to, ends) {
-                seen += weight;
-            }
+            seen += weight * tree.transmittance(from, to, ends).element_sum() / 3.0;
         }
     }
     if all > 0.0 { seen / all } else { 1.0 }

@@ -169,7 +169,7 @@ impl StochasticJacobi {
     pub fn element_irradiance(&self) -> Vec<Vec3> {
         let scale = self.scale();
         let irradiance = |(element, power): (usize, &DVec3)| {
-            (*power * (scale / self.element_area(element).max(f64::MIN_POSITIVE))).as_vec3()
+            (*power * (scale / self.met_area(element).max(f64::MIN_POSITIVE))).as_vec3()
         };
         self.arrived.iter().enumerate().map(irradiance).collect()
     }
@@ -178,7 +178,7 @@ impl StochasticJacobi {
     fn vertex_irradiance(&self) -> Vec<Vec3> {
         let mut sums = vec![(DVec3::ZERO, 0.0); self.mesh.vertex_count()];
         for (element, power) in self.arrived.iter().enumerate() {
-            let area = self.element_area(element);
+            let area = self.met_area(element);
             for vertex in self.mesh.vertices(element) {
                 let sum = &mut sums[vertex as usize];
                 *sum = (sum.0 + *power, sum.1 + area);
@@ -201,6 +201,16 @@ impl StochasticJacobi {
 
     fn element_area(&self, element: usize) -> f64 {
         f64::from(self.mesh.area(&self.scene, element))
+    }
+
+    /// The part of the area of an element that rays meet.
+    fn met_area(&self, element: usize) -> f64 {
+        self.element_area(element) * self.opacity(element)
+    }
+
+    fn opacity(&self, element: usize) -> f64 {
+        let (triangle, _) = self.mesh.side_of_element(element);
+        f64::from(self.scene.surfaces[triangle.index()].opacity)
     }
 
     /// Number of elements.
@@ -264,7 +274,7 @@ impl StochasticJacobi {
                 let found = self.outside.irradiance(&self.rays, at, toward, squares);
                 sum += found.as_dvec3();
             }
-            Some(sum * (self.element_area(element) / f64::from(samples)))
+            Some(sum * (self.met_area(element) / f64::from(samples)))
         };
         (0..self.mesh.len())
             .into_par_iter()
@@ -281,9 +291,11 @@ impl StochasticJacobi {
         self.mesh.len() as u64 * u64::from(samples) * per_sample
     }
 
+    /// Reflectance of what rays meet of an element.
     fn reflectance(&self, element: usize) -> DVec3 {
         let (triangle, _) = self.mesh.side_of_element(element);
-        self.scene.surfaces[triangle.index()].reflectance.as_dvec3()
+        let mean = self.scene.surfaces[triangle.index()].reflectance.as_dvec3();
+        mean / self.opacity(element).max(f64::MIN_POSITIVE)
     }
 
     /// Trace rays and add up what arrives at each element; in the order of the rays, so that threads do not matter.
@@ -293,18 +305,19 @@ impl StochasticJacobi {
             if cancel() {
                 return None;
             }
-            let hits: Vec<Option<usize>> = batch.par_iter().map(|shot| self.trace(*shot)).collect();
+            let hits: Vec<Option<(usize, Vec3)>> =
+                batch.par_iter().map(|shot| self.trace(*shot)).collect();
             for (shot, hit) in batch.iter().zip(hits) {
-                if let Some(element) = hit {
-                    arrived[element] += shot.power.as_dvec3();
+                if let Some((element, tint)) = hit {
+                    arrived[element] += (shot.power * tint).as_dvec3();
                 }
             }
         }
         Some(arrived)
     }
 
-    /// The element that a ray reaches, if any.
-    fn trace(&self, shot: Shot) -> Option<usize> {
+    /// The element that a ray reaches, if any, and its tint.
+    fn trace(&self, shot: Shot) -> Option<(usize, Vec3)> {
         let element = shot.element as usize;
         let (on, toward) = quasi_random(self.seed, shot);
         let origin = self.mesh.point(&self.scene, element, triangle_point(on));
@@ -321,7 +334,8 @@ impl StochasticJacobi {
             self.scene.corners(hit.triangle),
         );
         let (found, _) = self.mesh.find(hit.triangle, is_back, place)?;
-        Some(found)
+        let tint = self.rays.tint(origin, direction, Some(from), Some(hit));
+        Some((found, tint))
     }
 }
 

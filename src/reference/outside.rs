@@ -115,9 +115,7 @@ impl Outside {
         let mut sum = self.share(rays, at, squares);
         if !self.environment.sky.is_dark() {
             let direction = cosine_direction(at.normal, toward);
-            if is_open(rays, at, direction) {
-                sum += self.by_ray(at.normal, direction);
-            }
+            sum += self.by_ray(at.normal, direction) * passing(rays, at, direction);
         }
         sum
     }
@@ -128,11 +126,12 @@ impl Outside {
         };
         let direction = table.direction(square);
         let cosine = at.normal.dot(direction);
-        if cosine <= 0.0 || !is_open(rays, at, direction) {
+        if cosine <= 0.0 {
             return Vec3::ZERO;
         }
         let density = table.density(direction) + cosine * FRAC_1_PI;
-        self.environment.sky.radiance(direction) * (cosine / density)
+        let radiance = self.environment.sky.radiance(direction);
+        radiance * (cosine / density) * passing(rays, at, direction)
     }
 
     /// By a point of the disc, uniform as a surface sees it that faces its centre. Rays that meet the disc by chance count
@@ -147,16 +146,17 @@ impl Outside {
         let (tangent, bitangent) = sun.direction.any_orthonormal_pair();
         let direction = (tangent * up + bitangent * across) * sine + sun.direction * height;
         let cosine = at.normal.dot(direction);
-        if cosine <= 0.0 || !is_open(rays, at, direction) {
+        if cosine <= 0.0 {
             return Vec3::ZERO;
         }
-        sun.irradiance * (cosine / height.max(f32::MIN_POSITIVE))
+        let weight = cosine / height.max(f32::MIN_POSITIVE);
+        sun.irradiance * weight * passing(rays, at, direction)
     }
 }
 
-/// Whether a ray leaves the scene.
-fn is_open(rays: &RayTree, at: Place, direction: Vec3) -> bool {
-    rays.leaves(at.position, direction, Some(at.triangle))
+/// What passes along a ray out of the scene, by channel.
+fn passing(rays: &RayTree, at: Place, direction: Vec3) -> Vec3 {
+    rays.transmittance_outward(at.position, direction, Some(at.triangle))
 }
 
 /// Chooses directions to a picture of the sky with a density proportional to the luminance of its cells.
@@ -292,7 +292,7 @@ mod tests {
     }
 
     fn mean_irradiance(outside: &Outside, normal: Vec3) -> f32 {
-        let (rays, count) = (RayTree::clear(), 40_000);
+        let (rays, count) = (RayTree::clear(), 200_000);
         let at = Place {
             position: Vec3::ZERO,
             normal,

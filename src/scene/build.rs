@@ -7,12 +7,12 @@ use rayon::prelude::*;
 
 use super::builder::Skipped;
 use super::crossings::cut_crossings;
-use super::means::TextureAverages;
+use super::means::{Pictures, TextureAverages};
 use super::ranges::{finite_non_negative, limited_reflectance};
 use super::texture::MAX_SAMPLES;
 use super::{
-    Appearance, BuildError, Face, Frame, Material, Object, Scene, SceneBuilder, SceneOptions,
-    Surface, Texture, TextureId, TriangleId, Warning, WarningKind,
+    Appearance, BuildError, Cutout, Face, Frame, Material, Object, Scene, SceneBuilder,
+    SceneOptions, Surface, Texture, TextureId, TriangleId, Warning, WarningKind,
 };
 
 impl SceneBuilder {
@@ -33,7 +33,7 @@ impl SceneBuilder {
         if self.faces.is_empty() {
             return Err(no_faces(&unusable));
         }
-        self.sanitise_textures();
+        self.sanitise_textures(options);
         let losing = self.limit_reflecting_textures(options.reflectance_limit());
         self.sanitise_materials(options, losing);
         let radiance_unit = self.scale_emission();
@@ -54,7 +54,7 @@ impl SceneBuilder {
             &mut positions,
             &mut corner_of,
         );
-        let averages = TextureAverages::new(&self.textures, &self.materials);
+        let averages = TextureAverages::new(self.pictures(), &self.materials);
         let surfaces = self.surfaces(&frame, &averages, options);
         let mut scene = Scene {
             name: self.source.name,
@@ -68,6 +68,7 @@ impl SceneBuilder {
             normals: corner_values(&self.faces, |face| face.normals),
             materials: self.materials,
             textures: self.textures,
+            cutouts: self.cutouts,
             objects: object_ranges(&self.objects, self.faces.len()),
             warnings: self.warnings,
             omitted_textures: self.omitted_textures,
@@ -94,8 +95,15 @@ fn no_faces(skipped: &[Skipped]) -> BuildError {
 }
 
 impl SceneBuilder {
-    /// Make every texture safe to look up.
-    fn sanitise_textures(&mut self) {
+    fn pictures(&self) -> Pictures<'_> {
+        Pictures {
+            textures: &self.textures,
+            cutouts: &self.cutouts,
+        }
+    }
+
+    /// Make every texture and cut-out safe to look up, and bring what passes through materials into its range.
+    fn sanitise_textures(&mut self, options: &SceneOptions) {
         for texture in &mut self.textures {
             for pixel in &mut texture.pixels {
                 *pixel = pixel.map(finite_non_negative);
@@ -110,6 +118,14 @@ impl SceneBuilder {
             };
             material.emission_texture = material.emission_texture.filter(usable);
             material.reflectance_texture = material.reflectance_texture.filter(usable);
+            material.cutout = material.cutout.filter(|id| {
+                let cutout = self.cutouts.get(id.index());
+                cutout.is_some_and(Cutout::is_consistent)
+            });
+            material.limit_transmission();
+            if options.is_opaque {
+                (material.opacity, material.cutout) = (1.0, None);
+            }
         }
     }
 
@@ -175,12 +191,13 @@ impl SceneBuilder {
             .map(|face| {
                 let corners = face.corners.map(|corner| self.positions[corner as usize]);
                 let material = &self.materials[face.material.index()];
-                let means = averages.over(&self.textures, material, face.texcoords, MAX_SAMPLES);
+                let means = averages.over(self.pictures(), material, face.texcoords, MAX_SAMPLES);
                 let shown = means.times(&Appearance::of(material), max);
                 Surface {
                     area_vector: frame.area_vector(corners),
                     reflectance: shown.reflectance,
                     emission: shown.emission,
+                    opacity: means.opacity,
                 }
             })
             .collect()

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{Material, MaterialId, Texture, Warning, WarningKind, texture::OmittedTextures};
+use super::{
+    Cutout, Material, MaterialId, Texture, Warning, WarningKind, texture::OmittedTextures,
+};
 
 /// A triangle on its way in.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +60,8 @@ pub struct SceneBuilder {
     pub materials: Vec<Material>,
     /// Textures that the materials name.
     pub textures: Vec<Texture>,
+    /// Pictures of what is cut out that the materials name.
+    pub cutouts: Vec<Cutout>,
     /// Object names with the index of their first face, ascending.
     pub objects: Vec<(String, usize)>,
     /// Warnings of the reader.

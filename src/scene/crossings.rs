@@ -632,6 +632,7 @@ fn replace(scene: &mut Scene, parts: &[Parts]) {
         let shown = means.times(&appearance, scene.max_reflectance);
         let surface = &mut scene.surfaces[part.index()];
         (surface.reflectance, surface.emission) = (shown.reflectance, shown.emission);
+        surface.opacity = means.opacity;
     }
     for object in &mut scene.objects {
         object.start = TriangleId(first[object.start.index()]);

@@ -1,19 +1,24 @@
-//! Means of textures over triangles and their parts.
+//! Means of textures over triangles and their parts, with what is cut out of them and what passes through.
+
+use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
 
 use super::{
-    Appearance, Material, Scene, Texture, TextureId, TriangleId,
+    Appearance, Cutout, CutoutId, Material, Scene, Texture, TextureId, TriangleId,
     texture::{MAX_SAMPLES, TextureAverage},
 };
 
-/// By what the textures of a material multiply its colours in the mean over some area; 1 where there is no texture.
+/// By what the textures of a material, its cut-outs and its opacity multiply its colours in the mean over some area; 1
+/// where it is opaque and has no texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureMeans {
-    /// Mean of `map_Kd`, linear RGB, at most 1.
+    /// Mean of `map_Kd`, 0 where it is cut out, times the opacity; linear RGB, at most 1.
     pub reflectance: Vec3,
-    /// Mean of `map_Ke`, linear RGB.
+    /// Mean of `map_Ke`, likewise.
     pub emission: Vec3,
+    /// Mean part of the rays that meet the surface, 0…1.
+    pub opacity: f32,
 }
 
 impl TextureMeans {
@@ -21,6 +26,7 @@ impl TextureMeans {
     pub const ONE: Self = Self {
         reflectance: Vec3::ONE,
         emission: Vec3::ONE,
+        opacity: 1.0,
     };
 
     /// The mean appearance of a material there. Its reflectance is at most `most` per channel.
@@ -33,48 +39,164 @@ impl TextureMeans {
     }
 }
 
-/// The textures that materials use, ready for means over triangles.
+/// The textures and cut-outs that materials use, ready for means over triangles.
 #[derive(Debug, Default)]
 pub(super) struct TextureAverages {
-    /// By texture; `None` where no material uses it.
+    /// By texture; `None` where no material shows all of it.
     list: Vec<Option<TextureAverage>>,
+    /// Of what is left of textures, and of plain white, where materials are cut out.
+    cut_out: HashMap<(Option<TextureId>, CutoutId), TextureAverage>,
+}
+
+/// The pictures of a scene.
+#[derive(Clone, Copy)]
+pub(super) struct Pictures<'a> {
+    /// See [`Scene::textures`].
+    pub(super) textures: &'a [Texture],
+    /// See [`Scene::cutouts`].
+    pub(super) cutouts: &'a [Cutout],
 }
 
 impl TextureAverages {
     /// Halve the textures that the materials use.
-    pub(super) fn new(textures: &[Texture], materials: &[Material]) -> Self {
-        let mut list: Vec<Option<TextureAverage>> = textures.iter().map(|_| None).collect();
+    pub(super) fn new(pictures: Pictures<'_>, materials: &[Material]) -> Self {
+        let mut averages = Self {
+            list: pictures.textures.iter().map(|_| None).collect(),
+            cut_out: HashMap::new(),
+        };
         for material in materials {
             let used = [material.reflectance_texture, material.emission_texture];
+            if let Some(cutout) = material.cutout {
+                for texture in used.into_iter().chain([None]) {
+                    averages
+                        .cut_out
+                        .entry((texture, cutout))
+                        .or_insert_with(|| pictures.cut_out(texture, cutout).halved());
+                }
+                continue;
+            }
             for texture in used.into_iter().flatten().map(TextureId::index) {
-                list[texture].get_or_insert_with(|| TextureAverage::new(&textures[texture]));
+                averages.list[texture]
+                    .get_or_insert_with(|| TextureAverage::new(&pictures.textures[texture]));
             }
         }
-        Self { list }
+        averages
     }
 
     /// Means of the textures of a material over a triangle of texture coordinates, if it has any.
     pub(super) fn over(
         &self,
-        textures: &[Texture],
+        pictures: Pictures<'_>,
         material: &Material,
         uv: Option<[Vec2; 3]>,
         most_samples: f32,
     ) -> TextureMeans {
-        let mean = |texture: Option<TextureId>| -> Vec3 {
-            let index = texture.map(TextureId::index);
-            let average = index.and_then(|index| Some((index, self.list[index].as_ref()?)));
-            match (average, uv) {
-                (Some((index, average)), Some(uv)) => {
-                    average.over(&textures[index], uv, most_samples)
-                }
-                _ => Vec3::ONE,
+        let mut means = match (material.cutout, uv) {
+            (Some(cutout), Some(uv)) => {
+                self.over_cut_out(pictures, material, cutout, uv, most_samples)
             }
+            _ => TextureMeans {
+                reflectance: self.mean(pictures, material.reflectance_texture, uv, most_samples),
+                emission: self.mean(pictures, material.emission_texture, uv, most_samples),
+                opacity: 1.0,
+            },
+        };
+        if material.opacity < 1.0 {
+            means.reflectance *= material.opacity;
+            means.emission *= material.opacity;
+            means.opacity *= material.met_share();
+        }
+        means
+    }
+
+    /// Mean of a texture over a triangle of texture coordinates; 1 without either.
+    fn mean(
+        &self,
+        pictures: Pictures<'_>,
+        texture: Option<TextureId>,
+        uv: Option<[Vec2; 3]>,
+        most_samples: f32,
+    ) -> Vec3 {
+        let index = texture.map(TextureId::index);
+        let average = index.and_then(|index| Some((index, self.list[index].as_ref()?)));
+        match (average, uv) {
+            (Some((index, average)), Some(uv)) => {
+                let texture = &pictures.textures[index];
+                let size = [texture.width, texture.height];
+                average.over(size, |at| texture.sample(at), uv, most_samples)
+            }
+            _ => Vec3::ONE,
+        }
+    }
+
+    /// Means of what a cut-out leaves of the textures of a material.
+    fn over_cut_out(
+        &self,
+        pictures: Pictures<'_>,
+        material: &Material,
+        cutout: CutoutId,
+        uv: [Vec2; 3],
+        most_samples: f32,
+    ) -> TextureMeans {
+        let mean = |texture: Option<TextureId>| match self.cut_out.get(&(texture, cutout)) {
+            Some(average) => {
+                let left = pictures.cut_out(texture, cutout);
+                average.over(left.size(), |at| left.at(at), uv, most_samples)
+            }
+            None => Vec3::ONE,
         };
         TextureMeans {
             reflectance: mean(material.reflectance_texture),
             emission: mean(material.emission_texture),
+            opacity: mean(None).x,
         }
+    }
+}
+
+impl<'a> Pictures<'a> {
+    /// What a cut-out leaves of a texture, or of plain white.
+    fn cut_out(self, texture: Option<TextureId>, cutout: CutoutId) -> CutOut<'a> {
+        CutOut {
+            texture: texture.map(|texture| &self.textures[texture.index()]),
+            cutout: &self.cutouts[cutout.index()],
+        }
+    }
+}
+
+/// What a cut-out leaves of a texture, or of plain white.
+struct CutOut<'a> {
+    texture: Option<&'a Texture>,
+    cutout: &'a Cutout,
+}
+
+impl CutOut<'_> {
+    /// Width and height of pixels that are no larger than those of either.
+    fn size(&self) -> [u32; 2] {
+        let [width, height] = self
+            .texture
+            .map_or([1, 1], |texture| [texture.width, texture.height]);
+        [width.max(self.cutout.width), height.max(self.cutout.height)]
+    }
+
+    /// Its colour at a texture coordinate; 0 where it is cut out.
+    fn at(&self, uv: Vec2) -> Vec3 {
+        match (self.cutout.has_at(uv), self.texture) {
+            (false, _) => Vec3::ZERO,
+            (true, None) => Vec3::ONE,
+            (true, Some(texture)) => texture.sample(uv),
+        }
+    }
+
+    /// Its halved copies.
+    fn halved(&self) -> TextureAverage {
+        let size = self.size();
+        let [width, height] = size.map(|side| side as f32);
+        TextureAverage::of(size, |column, row| {
+            self.at(Vec2::new(
+                (column as f32 + 0.5) / width,
+                1.0 - (row as f32 + 0.5) / height,
+            ))
+        })
     }
 }
 
@@ -82,9 +204,8 @@ impl Scene {
     /// Whether a texture may vary over a triangle: its corners show different places of one.
     pub fn is_textured(&self, triangle: TriangleId) -> bool {
         let material = self.material(triangle);
-        let texture = material.reflectance_texture.or(material.emission_texture);
         let uv = self.texcoords.get(triangle.index());
-        texture.is_some() && uv.is_some_and(|[a, b, c]| a != b || b != c)
+        material.has_pictures() && uv.is_some_and(|[a, b, c]| a != b || b != c)
     }
 
     /// Means of the textures over a whole triangle.
@@ -92,7 +213,7 @@ impl Scene {
         let uv = self.texcoords.get(triangle.index()).copied();
         let material = self.material(triangle);
         self.averages
-            .over(&self.textures, material, uv, MAX_SAMPLES)
+            .over(self.pictures(), material, uv, MAX_SAMPLES)
     }
 
     /// Means of the textures over each quarter of a part of a triangle. The corners of the part are barycentric
@@ -107,8 +228,15 @@ impl Scene {
         let material = self.material(triangle);
         [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]].map(|quarter| {
             self.averages
-                .over(&self.textures, material, Some(quarter), MAX_SAMPLES / 4.0)
+                .over(self.pictures(), material, Some(quarter), MAX_SAMPLES / 4.0)
         })
+    }
+
+    fn pictures(&self) -> Pictures<'_> {
+        Pictures {
+            textures: &self.textures,
+            cutouts: &self.cutouts,
+        }
     }
 }
 
@@ -184,6 +312,7 @@ mod tests {
                 TextureMeans {
                     reflectance: Vec3::ZERO,
                     emission: Vec3::ZERO,
+                    opacity: 1.0,
                 }
             );
         }

@@ -15,6 +15,7 @@ mod clip;
 mod color;
 mod coplanar;
 mod crossings;
+mod cutout;
 mod edges;
 mod emission;
 mod encoding;
@@ -59,6 +60,7 @@ mod write;
 pub use appearance::Appearance;
 pub use builder::{BuildError, Face, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
+pub use cutout::{Cutout, SeeThrough};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use environment::{Environment, Sky, SkyPicture, Sun};
 pub use frame::Frame;
@@ -118,7 +120,18 @@ impl TextureId {
     }
 }
 
-/// How a surface reflects and emits. Linear RGB.
+impl CutoutId {
+    /// The position in [`Scene::cutouts`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// Index of a [`Cutout`] in [`Scene::cutouts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CutoutId(pub u32);
+
+/// How a surface reflects, emits and lets light pass. Linear RGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the MTL file, empty for the default material.
@@ -131,10 +144,16 @@ pub struct Material {
     pub reflectance_texture: Option<TextureId>,
     /// `map_Ke`.
     pub emission_texture: Option<TextureId>,
+    /// The part that reflects and emits (`d`), 0…1; the rest passes straight on.
+    pub opacity: f32,
+    /// What is left of the light that passes (`Tf`), by channel, 0…1.
+    pub filter: Vec3,
+    /// Where the surface is cut out: `map_d`, or the alpha of `map_Kd`.
+    pub cutout: Option<CutoutId>,
 }
 
 impl Material {
-    /// A plain material without textures.
+    /// A plain, opaque material without textures.
     pub fn plain(name: &str, reflectance: Vec3, emission: Vec3) -> Self {
         Self {
             name: name.to_owned(),
@@ -142,6 +161,9 @@ impl Material {
             emission,
             reflectance_texture: None,
             emission_texture: None,
+            opacity: 1.0,
+            filter: Vec3::ONE,
+            cutout: None,
         }
     }
 }
@@ -165,10 +187,13 @@ pub struct Triangle {
 pub struct Surface {
     /// Area times unit normal of the front, in square frame units; computed from the file's own digits.
     pub area_vector: Vec3,
-    /// Mean reflectance, below the clamp.
+    /// Mean reflectance over the whole triangle, 0 where it is cut out; below the clamp.
     pub reflectance: Vec3,
-    /// Mean emitted radiance of each side that emits, in units of [`Scene::radiance_unit`].
+    /// Mean emitted radiance of each side that emits over the whole triangle, 0 where it is cut out; in units of
+    /// [`Scene::radiance_unit`].
     pub emission: Vec3,
+    /// Mean part of the rays to it that meet it, 0…1; 1 where nothing passes.
+    pub opacity: f32,
 }
 
 /// A named run of triangles (`o` or `g` in OBJ).
@@ -209,6 +234,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Decoded textures.
     pub textures: Vec<Texture>,
+    /// Pictures of what is cut out.
+    pub cutouts: Vec<Cutout>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
     /// Light from outside; dark as a scene is read.
@@ -253,33 +280,34 @@ impl Scene {
         (0..self.triangles.len() as u32).map(TriangleId)
     }
 
-    /// Reflectance at a point of a triangle, texture looked up there. `barycentric` sums to 1.
+    /// Reflectance at a point of a triangle of what rays meet there, texture looked up. `barycentric` sums to 1.
     pub fn reflectance_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
         let material = self.material(triangle);
-        match (
-            material.reflectance_texture,
-            self.texcoords.get(triangle.index()),
-        ) {
-            (Some(texture), Some(uv)) => {
-                let at = uv[0] * barycentric.x + uv[1] * barycentric.y + uv[2] * barycentric.z;
-                material.reflectance * self.textures[texture.index()].sample(at)
-            }
-            _ => material.reflectance,
-        }
+        let color = material.reflectance * material.share_of_met();
+        self.textured(triangle, material.reflectance_texture, color, barycentric)
     }
 
-    /// Emitted radiance at a point of a triangle, texture looked up there. `barycentric` sums to 1.
+    /// Emitted radiance at a point of a triangle of what rays meet there, texture looked up. `barycentric` sums to 1.
     pub fn emission_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
         let material = self.material(triangle);
-        match (
-            material.emission_texture,
-            self.texcoords.get(triangle.index()),
-        ) {
+        let color = material.emission * material.share_of_met();
+        self.textured(triangle, material.emission_texture, color, barycentric)
+    }
+
+    /// A colour of a material with its texture at a point of a triangle.
+    fn textured(
+        &self,
+        triangle: TriangleId,
+        texture: Option<TextureId>,
+        color: Vec3,
+        at: Vec3,
+    ) -> Vec3 {
+        match (texture, self.texcoords.get(triangle.index())) {
             (Some(texture), Some(uv)) => {
-                let at = uv[0] * barycentric.x + uv[1] * barycentric.y + uv[2] * barycentric.z;
-                material.emission * self.textures[texture.index()].sample(at)
+                let at = uv[0] * at.x + uv[1] * at.y + uv[2] * at.z;
+                color * self.textures[texture.index()].sample(at)
             }
-            _ => material.emission,
+            _ => color,
         }
     }
 }

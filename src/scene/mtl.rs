@@ -1,6 +1,6 @@
 //! Materials of an MTL file, statement by statement: what cannot be used is skipped and named with its line.
 //!
-//! Used are `Kd`, `Ke`, `map_Kd` and `map_Ke`; `d`, `Tr`, `illum` and `map_d` only to say that nothing is transparent.
+//! Used are `Kd`, `Ke`, `map_Kd`, `map_Ke`, `d`, `Tr`, `Tf` and `map_d`; what makes surfaces gloss or uneven is named.
 //! `Ka` is never light.
 
 use std::io::BufRead;
@@ -30,24 +30,40 @@ pub(super) struct MtlMaterial {
     pub(super) dissolve: Option<f64>,
     /// `Tr`: 0 is opaque.
     pub(super) transparency: Option<f64>,
-    /// Whether there is a `map_d`.
-    pub(super) has_dissolve_map: bool,
-    /// `illum`.
-    pub(super) illumination: Option<u8>,
+    /// `Tf`: what is left of the light that passes.
+    pub(super) filter: Option<Vec3>,
+    /// `map_d`.
+    pub(super) dissolve_map: Option<TextureStatement>,
+    /// Statements that ask for gloss or relief, each once, in the order of the file.
+    pub(super) uncomputed: Vec<String>,
 }
 
+/// Opacity above which nothing passes: less than a step of 8 bits is missing.
+const OPAQUE: f64 = 1.0 - 1.0 / 255.0;
+
 impl MtlMaterial {
-    /// The statement that makes the material transparent for other programs, if one does.
-    pub(super) fn transparent_by(&self) -> Option<String> {
-        // Some exporters write both with the same meaning, so `d` decides where it is given.
-        let dissolve = self.dissolve.map(|dissolve| ("d", dissolve));
-        let transparency = self.transparency.map(|share| ("Tr", 1.0 - share));
-        let share = dissolve.or(transparency).filter(|(_, share)| *share < 1.0);
-        match (share, self.illumination) {
-            (Some((statement, _)), _) => Some(statement.to_owned()),
-            _ if self.has_dissolve_map => Some("map_d".to_owned()),
-            (None, Some(model @ (4 | 6 | 7 | 9))) => Some(format!("illum {model}")),
-            _ => None,
+    /// The opacity below 1 that the material states, and how.
+    pub(super) fn opacity(&self) -> Option<(&'static str, f64)> {
+        let (statement, opacity) = match (self.dissolve, self.transparency) {
+            // Each denies the other.
+            (Some(dissolve), Some(transparency)) if dissolve <= 0.0 && transparency <= 0.0 => {
+                return None;
+            }
+            // Some exporters write both with the same meaning, so `d` decides where it is given.
+            (Some(dissolve), _) => ("d", dissolve),
+            (None, transparency) => ("Tr", 1.0 - transparency?),
+        };
+        (opacity < OPAQUE).then_some((statement, opacity.max(0.0)))
+    }
+
+    /// Whether it states that nothing of it is there.
+    pub(super) fn is_invisible(&self) -> bool {
+        self.opacity().is_some_and(|(_, opacity)| opacity <= 0.0)
+    }
+
+    fn note_uncomputed(&mut self, statement: String) {
+        if !self.uncomputed.contains(&statement) {
+            self.uncomputed.push(statement);
         }
     }
 }
@@ -105,16 +121,40 @@ fn statement(material: &mut MtlMaterial, keyword: &[u8], rest: &[u8]) -> Result<
         b"ke" => material.emissive = Some(colour(rest)?),
         b"d" => material.dissolve = Some(last_number(rest)?),
         b"tr" => material.transparency = Some(last_number(rest)?),
-        b"illum" => material.illumination = Some(illumination(rest).ok_or(Number::Malformed)?),
+        b"tf" => material.filter = Some(colour(rest)?),
+        b"illum" => {
+            let model = illumination(rest).ok_or(Number::Malformed)?;
+            if model >= LEAST_MIRRORING {
+                material.note_uncomputed(format!("illum {model}"));
+            }
+        }
         b"map_kd" => material.diffuse_map = Some(texture()?),
         b"map_ke" | b"map_emissive" => material.emissive_map = Some(texture()?),
-        b"map_d" => {
-            texture()?;
-            material.has_dissolve_map = true;
+        b"map_d" => material.dissolve_map = Some(texture()?),
+        name if let Some(shown) = uncomputed(name) => {
+            let is_off = words(rest).all(|word| number(word) == Ok(0.0));
+            if !is_off {
+                material.note_uncomputed(shown.to_owned());
+            }
         }
         _ => {}
     }
     Ok(())
+}
+
+/// The first illumination model with mirrors or glass.
+const LEAST_MIRRORING: u8 = 3;
+
+/// Statements that ask for gloss or relief. Roughness and exponents mean nothing without them.
+const UNCOMPUTED: [&str; 18] = [
+    "Ks", "Pm", "Ps", "Pc", "Pr", "Pcr", "aniso", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Ps",
+    "map_Pc", "refl", "norm", "bump", "map_Bump", "disp",
+];
+
+/// One of these by its name in lower case.
+fn uncomputed(name: &[u8]) -> Option<&'static str> {
+    let is_meant = |known: &&str| known.as_bytes().eq_ignore_ascii_case(name);
+    UNCOMPUTED.into_iter().find(is_meant)
 }
 
 /// One or three numbers as three; `spectral` and `xyz` are not numbers.
@@ -210,20 +250,36 @@ mod tests {
     }
 
     #[test]
-    fn the_statement_that_makes_transparent_is_told() {
+    fn opacity_is_told_by_d_and_else_by_tr() {
         for (text, expected) in [
-            ("d 0.5", Some("d")),
-            ("Tr 0.5", Some("Tr")),
-            ("illum 7", Some("illum 7")),
-            ("d -halo 0.2", Some("d")),
-            ("map_d a.png", Some("map_d")),
-            ("d 0\nillum 4", Some("d")),
+            ("d 0.5", Some(("d", 0.5))),
+            ("Tr 0.25", Some(("Tr", 0.75))),
+            ("illum 7", None),
+            ("d -halo 0.25", Some(("d", 0.25))),
+            ("d 0\nillum 4", Some(("d", 0.0))),
+            ("d 0\nTr 0", None),
+            ("d 0.25\nTr 0.25", Some(("d", 0.25))),
             ("d 1\nTr 1\nKa 1 1 1\nillum 2", None),
+            ("d 0.999", None),
+            ("Tr 7", Some(("Tr", 0.0))),
         ] {
             let (materials, warnings) = read(format!("newmtl a\n{text}\n").as_bytes());
-            assert_eq!(materials[0].transparent_by().as_deref(), expected, "{text}");
+            assert_eq!(materials[0].opacity(), expected, "{text}");
             assert!(warnings.is_empty(), "{text}");
         }
+        let (materials, _) = read(b"newmtl a\nTf 0.5 1 0\nmap_d -s 2 2 1 leaf.png\n");
+        assert_eq!(materials[0].filter, Some(Vec3::new(0.5, 1.0, 0.0)));
+        assert!(materials[0].dissolve_map.is_some());
+    }
+
+    #[test]
+    fn gloss_and_relief_are_named_unless_they_are_off() {
+        let (materials, warnings) = read(
+            b"newmtl a\nKs 0 0 0\nPm 0\nPr 0.4\nillum 2\nNs 250\nnewmtl b\nillum 5\nks 1 1 1\nKs 1\nmap_bump -bm 1 a.png\n",
+        );
+        assert_eq!(materials[0].uncomputed, ["Pr"]);
+        assert_eq!(materials[1].uncomputed, ["illum 5", "Ks", "map_Bump"]);
+        assert!(warnings.is_empty());
     }
 
     #[test]

@@ -27,7 +27,7 @@ use super::texture_statement::{TextureReference, TextureStatement};
 use super::triangulate::{Doubt, MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
 use super::whole::folder_of;
-use super::{Material, MaterialId, Scene, Texture, TextureId};
+use super::{CutoutId, Material, MaterialId, Scene, Texture, TextureId};
 
 /// Read an OBJ file.
 ///
@@ -148,17 +148,50 @@ struct Import<'a> {
     default_slot: Option<Slot>,
 }
 
-impl Transparent {
-    fn add(&mut self, statement: String, defined: &Defined) {
+/// Materials of which the same is to be said.
+#[derive(Default)]
+struct Groups {
+    /// By why: their names.
+    names: Vec<(String, Vec<String>)>,
+    /// File and line of the first.
+    place: (String, usize),
+}
+
+impl Groups {
+    fn add(&mut self, why: String, defined: &Defined) {
         if self.names.is_empty() {
             self.place = (defined.file.clone(), defined.material.line);
         }
         let name = defined.material.name.clone();
-        match self.names.iter_mut().find(|(known, _)| *known == statement) {
+        match self.names.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(name),
-            None => self.names.push((statement, vec![name])),
+            None => self.names.push((why, vec![name])),
         }
     }
+
+    /// The names, each group with its reason.
+    fn listed(&self) -> String {
+        let mut most = MOST_LISTED;
+        let groups = self.names.iter().map(|(why, names)| {
+            let listed = listed(names.iter().map(|name| &**name), most);
+            most = most.saturating_sub(names.len());
+            format!("{listed} ({why})")
+        });
+        groups.collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// What is to be said of materials, each once.
+#[derive(Default)]
+struct Remarks {
+    /// Whether more than half of the materials state that nothing of them is there.
+    most_are_invisible: bool,
+    /// Light passes through them.
+    see_through: Groups,
+    /// They ask for that, but are solid.
+    solid: Groups,
+    /// They ask for gloss or relief.
+    matt: Groups,
 }
 
 /// Texture coordinates of the faces of a material.
@@ -179,8 +212,11 @@ impl Shown {
 /// A texture of the scene.
 #[derive(Clone, Copy, Debug)]
 struct Loaded {
-    id: TextureId,
+    /// Nothing where it only cuts out.
+    id: Option<TextureId>,
     is_transparent: bool,
+    /// Where it is not there, if that is anywhere.
+    cutout: Option<CutoutId>,
 }
 
 /// A texture of a material, and how it lies.
@@ -188,15 +224,6 @@ struct Placed {
     texture: Loaded,
     scale: DVec2,
     offset: DVec2,
-}
-
-/// Materials that other programs show transparent.
-#[derive(Default)]
-struct Transparent {
-    /// By what makes them so: their names.
-    names: Vec<(String, Vec<String>)>,
-    /// File and line of the first.
-    place: (String, usize),
 }
 
 impl Import<'_> {
@@ -217,13 +244,21 @@ impl Import<'_> {
             }
         }
         let mut slot_of: HashMap<usize, Slot> = HashMap::new();
-        let mut transparent = Transparent::default();
+        let is_shown = |number: &usize| shown_by[number].has_faces;
+        let numbers: Vec<usize> = shown_by.keys().copied().filter(is_shown).collect();
+        let invisible = numbers
+            .iter()
+            .filter(|number| library.get(**number).material.is_invisible());
+        let mut remarks = Remarks {
+            most_are_invisible: 2 * invisible.count() > numbers.len(),
+            ..Remarks::default()
+        };
         let mut unknown = Vec::new();
         for (mention, number) in mentions.into_iter().zip(found) {
             let slot = match number {
                 Some(number) => *slot_of.entry(number).or_insert_with(|| {
                     let shown = shown_by[&number];
-                    self.define(library.get(number), shown, &mut transparent)
+                    self.define(library.get(number), shown, &mut remarks)
                 }),
                 None => {
                     let grey = Material::plain(&mention.name, DEFAULT_REFLECTANCE, Vec3::ZERO);
@@ -237,7 +272,7 @@ impl Import<'_> {
             self.slots.push(slot);
         }
         self.warn_of_unknown(&unknown);
-        self.warn_of_transparent(&transparent);
+        self.tell(&remarks);
     }
 
     /// By material that is mentioned: whether its faces have texture coordinates.
@@ -270,23 +305,28 @@ impl Import<'_> {
             .note_times(kind, &message, count, file, first.line);
     }
 
-    /// Say once what is done about transparency: many programs write `illum 4` into every material, or `d 0` into opaque
-    /// ones.
-    fn warn_of_transparent(&mut self, transparent: &Transparent) {
-        if transparent.names.is_empty() {
-            return;
+    /// Say once what lets light pass, what does not though it asks for it, and what is not computed.
+    fn tell(&mut self, remarks: &Remarks) {
+        for (kind, what, groups) in [
+            (
+                WarningKind::SeeThrough,
+                "light passes through",
+                &remarks.see_through,
+            ),
+            (WarningKind::SeeThrough, "treated as solid:", &remarks.solid),
+            (
+                WarningKind::Unsupported,
+                "gloss and relief are not computed, so these surfaces are matt and flat:",
+                &remarks.matt,
+            ),
+        ] {
+            if groups.names.is_empty() {
+                continue;
+            }
+            let message = format!("{what} {}", groups.listed());
+            let (file, line) = &groups.place;
+            self.notes.log.note(kind, &message, file, *line);
         }
-        let mut most = MOST_LISTED;
-        let groups = transparent.names.iter().map(|(statement, names)| {
-            let listed = listed(names.iter().map(|name| &**name), most);
-            most = most.saturating_sub(names.len());
-            format!("{listed} ({statement})")
-        });
-        let groups = groups.collect::<Vec<_>>().join(", ");
-        let message = format!("transparency is not computed; treated as opaque: {groups}");
-        let (file, line) = &transparent.place;
-        let kind = WarningKind::Unsupported;
-        self.notes.log.note(kind, &message, file, *line);
     }
 
     /// Read every MTL file that is mentioned; later definitions of a name replace earlier ones.
@@ -373,7 +413,7 @@ impl Import<'_> {
 
     /// Turn a material of an MTL file into one of the scene. Pictures that no face shows are not read, but where a missing
     /// colour depends on whether there is one.
-    fn define(&mut self, defined: &Defined, shown: Shown, transparent: &mut Transparent) -> Slot {
+    fn define(&mut self, defined: &Defined, shown: Shown, remarks: &mut Remarks) -> Slot {
         let MtlMaterial {
             name,
             diffuse_map,
@@ -386,6 +426,7 @@ impl Import<'_> {
         };
         let diffuse = color_beside(diffuse_map, defined.material.diffuse);
         let emissive = color_beside(emissive_map, defined.material.emissive);
+        let is_all_solid = self.options.is_opaque;
         let mut texture = |map: &Option<TextureStatement>, color: Option<Vec3>, role| {
             if shown.has_texcoords || (shown.has_faces && color.is_none()) {
                 return self.texture(map.as_ref()?, defined, role);
@@ -397,13 +438,38 @@ impl Import<'_> {
             None
         };
         let reflecting = texture(diffuse_map, diffuse, Role::Reflects);
-        let emitting = texture(emissive_map, emissive, Role::Emits);
-        let statement = match &reflecting {
-            Some(placed) if placed.texture.is_transparent => Some("alpha of map_Kd".to_owned()),
-            _ => defined.material.transparent_by(),
+        let is_same = |map: &TextureStatement| {
+            let same = diffuse_map.as_ref().map(|colors| colors.means_file_of(map));
+            same.unwrap_or(false)
         };
-        if let Some(statement) = statement.filter(|_| shown.has_faces) {
-            transparent.add(statement, defined);
+        let cuts_out = reflecting
+            .as_ref()
+            .is_some_and(|placed| placed.texture.cutout.is_some() && !is_all_solid);
+        // What is cut out is dark without being black.
+        let emits = match emissive_map.as_ref().is_some_and(is_same) && cuts_out {
+            true => Role::Reflects,
+            false => Role::Emits,
+        };
+        let emitting = texture(emissive_map, emissive, emits);
+        // Exporters name the coloured picture itself, whose alpha counts anyway.
+        let dissolve_map = defined.material.dissolve_map.clone();
+        let dissolve_map = dissolve_map.filter(|map| shown.has_texcoords && !is_same(map));
+        let cutting = texture(&dissolve_map, None, Role::CutsOut);
+        let mut cutout = self.cutout(
+            defined,
+            shown,
+            reflecting.as_ref(),
+            cutting.as_ref(),
+            remarks,
+        );
+        let opacity = self.opacity(defined, shown, remarks);
+        if self.options.is_opaque {
+            cutout = None;
+        }
+        if shown.has_faces && !defined.material.uncomputed.is_empty() {
+            remarks
+                .matt
+                .add(defined.material.uncomputed.join(", "), defined);
         }
         let linear = |colour: Vec3| {
             if self.options.mtl_color_is_srgb {
@@ -417,36 +483,102 @@ impl Import<'_> {
             Some(_) => given.map_or(Vec3::ONE, linear),
             None => given.map_or(otherwise, linear),
         };
-        let id_of = |texture: &Option<Placed>| texture.as_ref().map(|placed| placed.texture.id);
+        let id_of =
+            |texture: &Option<Placed>| texture.as_ref().and_then(|placed| placed.texture.id);
         let material = Material {
             name: name.clone(),
             reflectance: color(diffuse, &reflecting, DEFAULT_REFLECTANCE),
             emission: color(emissive, &emitting, Vec3::ZERO),
             reflectance_texture: id_of(&reflecting),
             emission_texture: id_of(&emitting),
+            opacity: opacity as f32,
+            filter: defined.material.filter.unwrap_or(Vec3::ONE),
+            cutout,
         };
-        let mapping = self.mapping(reflecting, emitting, defined);
+        let cutting = cutting.filter(|_| cutout.is_some());
+        let mapping = self.mapping([reflecting, emitting, cutting], defined);
         Slot {
             id: self.builder.push_material(material),
             mapping,
         }
     }
 
-    /// How the material's textures lie; both share the coordinates of a face.
+    /// What is cut out of a material: by its `map_d`, else by the alpha of its `map_Kd`.
+    fn cutout(
+        &self,
+        defined: &Defined,
+        shown: Shown,
+        reflecting: Option<&Placed>,
+        cutting: Option<&Placed>,
+        remarks: &mut Remarks,
+    ) -> Option<CutoutId> {
+        let (placed, statement) = match (cutting, reflecting) {
+            (Some(cutting), _) => (cutting, "map_d"),
+            (None, reflecting) => (reflecting?, "alpha of map_Kd"),
+        };
+        if !shown.has_faces || !placed.texture.is_transparent {
+            return None;
+        }
+        match placed.texture.cutout {
+            _ if self.options.is_opaque => {
+                remarks
+                    .solid
+                    .add(format!("{statement}, by --opaque"), defined);
+                None
+            }
+            None => {
+                remarks
+                    .solid
+                    .add(format!("{statement} of 0.5 and more"), defined);
+                None
+            }
+            cutout => {
+                remarks
+                    .see_through
+                    .add(format!("cut out by {statement}"), defined);
+                cutout
+            }
+        }
+    }
+
+    /// The opacity of a material. Many programs write `d 0` or `Tr 1` into opaque ones, so that counts only where most
+    /// materials are otherwise, and for those without a picture, which nobody would see.
+    fn opacity(&self, defined: &Defined, shown: Shown, remarks: &mut Remarks) -> f64 {
+        let material = &defined.material;
+        let Some((statement, opacity)) = material.opacity().filter(|_| shown.has_faces) else {
+            return 1.0;
+        };
+        let written = match statement {
+            "d" => format!("d {}", short(opacity)),
+            _ => format!("Tr {}", short(1.0 - opacity)),
+        };
+        let has_picture = material.diffuse_map.is_some() || material.dissolve_map.is_some();
+        let why = match (self.options.is_opaque, material.is_invisible()) {
+            (true, _) => ", by --opaque",
+            (false, true) if remarks.most_are_invisible => ", as most materials",
+            (false, true) if has_picture => " beside a picture",
+            _ => {
+                remarks.see_through.add(written, defined);
+                return opacity;
+            }
+        };
+        remarks.solid.add(written + why, defined);
+        1.0
+    }
+
+    /// How the material's textures lie; all share the coordinates of a face.
     fn mapping(
         &mut self,
-        reflecting: Option<Placed>,
-        emitting: Option<Placed>,
+        placed: [Option<Placed>; 3],
         defined: &Defined,
     ) -> Option<(DVec2, DVec2)> {
-        let of = |placed: Placed| (placed.scale, placed.offset);
-        let (reflecting, emitting) = (reflecting.map(of), emitting.map(of));
-        if reflecting.is_some() && emitting.is_some() && reflecting != emitting {
-            let message =
-                "map_Ke with other -s or -o than map_Kd: those of map_Kd are used for both";
+        let mut placed = placed.into_iter().flatten();
+        let first = placed.next().map(|placed| (placed.scale, placed.offset))?;
+        if placed.any(|placed| (placed.scale, placed.offset) != first) {
+            let message = "the textures of a material have different -s or -o: those of the first of map_Kd, map_Ke and map_d are used for all";
             self.note_defined(WarningKind::Unsupported, message, defined);
         }
-        reflecting.or(emitting)
+        Some(first)
     }
 
     fn note_defined(&mut self, kind: WarningKind, message: &str, defined: &Defined) {
@@ -488,7 +620,11 @@ impl Import<'_> {
             Err(missing) => missing_because(missing).to_owned(),
         };
         let name = shortened(&reading.name);
-        let message = format!("texture '{name}' {why}; the plain colour is used");
+        let instead = match role {
+            Role::CutsOut => "nothing is cut out",
+            Role::Reflects | Role::Emits => "the plain colour is used",
+        };
+        let message = format!("texture '{name}' {why}; {instead}");
         self.note_defined(WarningKind::TextureMissing, &message, defined);
         None
     }
@@ -500,20 +636,30 @@ impl Import<'_> {
         }
         let file = self.folder.path_of(path);
         let read = Texture::read(&file, name, role).map(|picture| {
-            let texture = picture.texture.reduced_to(self.pixel_budget / 4);
-            self.pixel_budget = self.pixel_budget.saturating_sub(texture.pixels.len());
-            self.builder.textures.push(texture);
+            let id = picture.texture.map(|texture| {
+                let texture = texture.reduced_to(self.pixel_budget / 4);
+                self.pixel_budget = self.pixel_budget.saturating_sub(texture.pixels.len());
+                self.builder.textures.push(texture);
+                TextureId(self.builder.textures.len() as u32 - 1)
+            });
+            let cutout = picture.cutout.map(|cutout| {
+                self.builder.cutouts.push(cutout);
+                CutoutId(self.builder.cutouts.len() as u32 - 1)
+            });
             Loaded {
-                id: TextureId(self.builder.textures.len() as u32 - 1),
+                id,
                 is_transparent: picture.is_transparent,
+                cutout,
             }
         });
         self.builder.source.files.push(file);
         let loaded = read.as_ref().ok().copied();
         self.textures.insert(key(role), loaded);
         // Only what is hidden looks different in another role.
-        if loaded.is_some_and(|loaded| !loaded.is_transparent) {
-            self.textures.insert(key(role.other()), loaded);
+        if let Some(loaded) = loaded.filter(|loaded| !loaded.is_transparent)
+            && let Some(other) = role.other()
+        {
+            self.textures.insert(key(other), Some(loaded));
         }
         read
     }
@@ -714,6 +860,11 @@ fn shortened(name: &str) -> String {
         return name.to_owned();
     }
     name.chars().take(LONGEST).chain(['…']).collect()
+}
+
+/// A number with few digits for a message.
+fn short(number: f64) -> f64 {
+    (number * 1000.0).round() / 1000.0
 }
 
 /// The corners of one face of a parsed mesh.

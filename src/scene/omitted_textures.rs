@@ -8,7 +8,7 @@ use glam::Vec2;
 use glam::Vec3;
 
 use super::ranges::finite_non_negative;
-use super::{Face, SceneBuilder, Texture, TextureId};
+use super::{Cutout, CutoutId, Face, SceneBuilder, Texture, TextureId};
 
 /// Pixels that differ by no more than this share of the first are of one colour: means of equal pixels are rounded.
 const ALIKE: f32 = 1e-6;
@@ -48,7 +48,7 @@ impl SceneBuilder {
     /// Drop textures that no face shows, and replace those that are constant where faces show them by plain colours.
     /// For textures and materials within their ranges.
     pub(super) fn omit_textures(&mut self) {
-        if self.textures.is_empty() {
+        if self.textures.is_empty() && self.cutouts.is_empty() {
             return;
         }
         let mut views = vec![View::default(); self.materials.len()];
@@ -74,13 +74,18 @@ impl SceneBuilder {
                 }
                 *slot = None;
             }
+            let is_whole = |id: &CutoutId| is_whole(&self.cutouts[id.index()], view);
+            if material.cutout.is_some_and(|id| is_whole(&id)) {
+                material.cutout = None;
+                self.omitted_textures.constant_textures += 1;
+            }
         }
         if self.omitted_textures != before {
             self.forget_unshown_textures();
         }
     }
 
-    /// Drop textures without a material, and of texture coordinates without a texture.
+    /// Drop textures and cut-outs without a material, and of texture coordinates without a texture.
     fn forget_unshown_textures(&mut self) {
         let mut renamed: Vec<Option<TextureId>> = vec![None; self.textures.len()];
         let mut kept: Vec<Texture> = Vec::new();
@@ -98,13 +103,18 @@ impl SceneBuilder {
             }
         }
         self.textures = kept;
+        let mut renamed: Vec<Option<CutoutId>> = vec![None; self.cutouts.len()];
+        let mut kept: Vec<Cutout> = Vec::new();
+        for id in self.materials.iter_mut().filter_map(|m| m.cutout.as_mut()) {
+            let cutout = &mut self.cutouts[id.index()];
+            *id = *renamed[id.index()].get_or_insert_with(|| {
+                kept.push(std::mem::take(cutout));
+                CutoutId(kept.len() as u32 - 1)
+            });
+        }
+        self.cutouts = kept;
         for face in &mut self.faces {
-            let material = &self.materials[face.material.index()];
-            if material
-                .reflectance_texture
-                .or(material.emission_texture)
-                .is_none()
-            {
+            if !self.materials[face.material.index()].has_pictures() {
                 face.texcoords = None;
             }
         }
@@ -122,6 +132,21 @@ fn fate(texture: &Texture, view: &View) -> Fate {
         Some(color) => Fate::Constant(color),
         None => Fate::Kept,
     }
+}
+
+/// Whether faces show nothing of what is cut out: lookups that interpolate reach further than those of a cut-out.
+fn is_whole(cutout: &Cutout, view: &View) -> bool {
+    let Some([min, max]) = view.bounds else {
+        return true;
+    };
+    let columns = pixels_between(min.x, max.x, cutout.width);
+    let rows = pixels_between(1.0 - max.y, 1.0 - min.y, cutout.height);
+    let has_row = |row: u32| {
+        (0..)
+            .map_while(&columns)
+            .all(|column| cutout.has(column, row))
+    };
+    (0..).map_while(&rows).all(has_row)
 }
 
 /// The colour of all pixels that lookups within a box of texture coordinates read, where it is one.

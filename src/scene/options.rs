@@ -23,6 +23,8 @@ pub struct SceneOptions {
     pub max_reflectance: f32,
     /// Whether `Kd` and `Ke` in the MTL file are sRGB-encoded. Textures of 8 bits always are.
     pub mtl_color_is_srgb: bool,
+    /// Whether nothing lets light pass, whatever the materials say.
+    pub is_opaque: bool,
 }
 
 impl Default for SceneOptions {
@@ -31,6 +33,7 @@ impl Default for SceneOptions {
             sides: Sides::Auto,
             max_reflectance: DEFAULT_MAX_REFLECTANCE,
             mtl_color_is_srgb: false,
+            is_opaque: false,
         }
     }
 }

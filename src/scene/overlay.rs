@@ -2,7 +2,7 @@
 //!
 //! Of faces that look the same way, the first in the file stays, and later ones lose what it covers. Of faces that look
 //! opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are covered in part are cut
-//! along the edges of what covers them.
+//! along the edges of what covers them. What light passes through covers only what has its material.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -38,13 +38,19 @@ struct Piece {
     has_back: bool,
 }
 
-/// Faces that have the corners of an earlier one in the same sense.
-pub(super) fn repeated(overlaps: &Overlaps, corners: &[[u32; 3]]) -> Vec<u32> {
+/// Faces that have the corners of an earlier one in the same sense; `may_cover` tells whether the second of two faces
+/// covers the first where it lies on it.
+pub(super) fn repeated(
+    overlaps: &Overlaps,
+    corners: &[[u32; 3]],
+    may_cover: impl Fn(u32, u32) -> bool,
+) -> Vec<u32> {
     let sorted = |triangle: u32| sorted_corners(corners[triangle as usize]);
     overlaps
         .by_triangle()
         .filter_map(|(face, mut others)| {
-            let repeats = |other| other < face && sorted(other) == sorted(face);
+            let repeats =
+                |other| other < face && sorted(other) == sorted(face) && may_cover(face, other);
             others.any(repeats).then_some(face)
         })
         .collect()
@@ -75,7 +81,9 @@ impl SceneBuilder {
         let fates: Vec<(u32, Fate)> = overlapping
             .par_iter()
             .filter_map(|(face, others)| {
-                let fate = fate(*face, others, triangles, positions)?;
+                let may_cover = |&other: &u32| self.may_cover(*face, other);
+                let others: Vec<u32> = others.iter().copied().filter(may_cover).collect();
+                let fate = fate(*face, &others, triangles, positions)?;
                 Some((*face, fate))
             })
             .collect();
@@ -136,6 +144,13 @@ impl SceneBuilder {
         self.doubled_faces += dropped.len();
         self.warn_of_lines("a face", DOUBLED, &dropped);
         self.warn_of_lines("a part of a face", PARTLY_DOUBLED, &cut);
+    }
+
+    /// Whether nothing of a face is seen through another one that lies on it.
+    pub(super) fn may_cover(&self, face: u32, other: u32) -> bool {
+        let [material, covering] =
+            [face, other].map(|face| self.faces[face as usize].material.index());
+        material == covering || !self.materials[covering].is_see_through()
     }
 
     /// The corner at a place of a face: one that it has, or a new one.

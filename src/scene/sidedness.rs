@@ -1,5 +1,6 @@
 //! Which faces are two-sided, and which are turned: sheets are lit on both sides, faces of a consistently wound closed
-//! shell on one.
+//! shell on one. What light passes through is lit on both sides, and so is a shell that looks outward if light gets in
+//! through a part of it.
 
 use glam::Vec3;
 
@@ -28,8 +29,9 @@ impl SceneBuilder {
         let facings = self.orient(&mut list, &shells, positions, options.sides);
         let flags = two_sided(&shells, &facings, options.sides);
         for (triangle, two_sided) in list.iter_mut().zip(flags) {
-            triangle.two_sided = two_sided;
-            triangle.bounds_solid &= !two_sided;
+            let is_pane = self.is_see_through(triangle) && options.sides == Sides::Auto;
+            triangle.two_sided = two_sided || is_pane;
+            triangle.bounds_solid &= !triangle.two_sided;
         }
         ShelledTriangles { list, shells }
     }
@@ -64,11 +66,20 @@ impl SceneBuilder {
             (regions, meant)
         };
         self.warn_of_orientation(shells, &regions, &meant, sides);
-        let facings = match sides {
+        let mut facings = match sides {
             Sides::Auto => meant,
             Sides::One | Sides::Two => vec![Facing::AsWound; meant.len()],
         };
-        let solids = regions.solids(&facings);
+        let mut solids = regions.solids(&facings);
+        for (triangle, &shell) in list.iter().zip(&shells.of_triangle) {
+            let shell = shell as usize;
+            if self.is_see_through(triangle) {
+                solids[shell] = false;
+                if sides == Sides::Auto && shells.volume[shell] > 0.0 {
+                    facings[shell] = Facing::Both;
+                }
+            }
+        }
         let faces = self.faces.iter_mut().zip(list);
         for ((face, triangle), &shell) in faces.zip(&shells.of_triangle) {
             triangle.bounds_solid = solids[shell as usize];
@@ -78,6 +89,10 @@ impl SceneBuilder {
             }
         }
         facings
+    }
+
+    fn is_see_through(&self, triangle: &Triangle) -> bool {
+        self.materials[triangle.material.index()].is_see_through()
     }
 
     /// Say which shells are not lit as they are wound, or would not be.

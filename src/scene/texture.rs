@@ -4,9 +4,11 @@ use std::ops::{AddAssign, Mul};
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
-use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Pixel, Primitive, Rgba};
+use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Luma, Pixel, Primitive, Rgba};
 
+use super::Cutout;
 use super::color::linear_from_srgb;
+use super::cutout::LEAST_ALPHA;
 use super::ranges::{MAX_EMISSION, finite_non_negative};
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
@@ -68,6 +70,9 @@ impl Texture {
         let decoded = std::panic::catch_unwind(|| decode(path));
         match decoded {
             Ok(Ok(picture)) if picture.width() > 0 && picture.height() > 0 => {
+                if role == Role::CutsOut {
+                    return Ok(cutting(picture, name));
+                }
                 Self::from_picture(picture, name, role)
                     .ok_or_else(|| "all of it is transparent".to_owned())
             }
@@ -138,8 +143,9 @@ impl Texture {
             _ => averaged(&picture.into_rgb8(), |pixel| color_of(pixel.0, byte)).into_texture(name),
         };
         Some(Picture {
-            texture,
+            texture: Some(texture),
             is_transparent: false,
+            cutout: None,
         })
     }
 
@@ -153,24 +159,12 @@ impl Texture {
 
     /// The picture with both sides halved (rounded up), each pixel the mean of four.
     pub(super) fn halved(&self) -> Self {
-        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let pixel = |column: u32, row: u32| {
-            let (column, row) = (column.min(self.width - 1), row.min(self.height - 1));
+        let half = half([self.width, self.height], |column, row| {
             self.pixels[row as usize * self.width as usize + column as usize]
-        };
-        let mut pixels = Vec::with_capacity(width as usize * height as usize);
-        for row in 0..height {
-            for column in 0..width {
-                let (x, y) = (2 * column, 2 * row);
-                let sum = pixel(x, y) + pixel(x + 1, y) + pixel(x, y + 1) + pixel(x + 1, y + 1);
-                pixels.push(sum * 0.25);
-            }
-        }
+        });
         Self {
             name: self.name.clone(),
-            width,
-            height,
-            pixels,
+            ..half
         }
     }
 
@@ -178,6 +172,27 @@ impl Texture {
     pub(super) fn is_consistent(&self) -> bool {
         let count = self.width as usize * self.height as usize;
         count > 0 && count == self.pixels.len()
+    }
+}
+
+/// A nameless picture of half the width and height (rounded up), each pixel the mean of four of those that `pixel` gives
+/// by column and row.
+fn half([full_width, full_height]: [u32; 2], pixel: impl Fn(u32, u32) -> Vec3) -> Texture {
+    let (width, height) = (full_width.div_ceil(2), full_height.div_ceil(2));
+    let pixel = |column: u32, row: u32| pixel(column.min(full_width - 1), row.min(full_height - 1));
+    let mut pixels = Vec::with_capacity(width as usize * height as usize);
+    for row in 0..height {
+        for column in 0..width {
+            let (x, y) = (2 * column, 2 * row);
+            let sum = pixel(x, y) + pixel(x + 1, y) + pixel(x, y + 1) + pixel(x + 1, y + 1);
+            pixels.push(sum * 0.25);
+        }
+    }
+    Texture {
+        name: String::new(),
+        width,
+        height,
+        pixels,
     }
 }
 
@@ -195,24 +210,29 @@ pub(super) enum Role {
     Reflects,
     /// It emits: hidden pixels are black.
     Emits,
+    /// It has no colour, but is cut out where its alpha, or its brightness where that is 1, is small.
+    CutsOut,
 }
 
 impl Role {
-    /// The other one.
-    pub(super) fn other(self) -> Self {
+    /// The other one of those with a colour.
+    pub(super) fn other(self) -> Option<Self> {
         match self {
-            Self::Reflects => Self::Emits,
-            Self::Emits => Self::Reflects,
+            Self::Reflects => Some(Self::Emits),
+            Self::Emits => Some(Self::Reflects),
+            Self::CutsOut => None,
         }
     }
 }
 
 /// A picture as it is read.
 pub(super) struct Picture {
-    /// Its colours.
-    pub(super) texture: Texture,
-    /// Whether any pixel is transparent by its alpha, in full or in part.
+    /// Its colours; nothing where it only cuts out.
+    pub(super) texture: Option<Texture>,
+    /// Whether any pixel is transparent, in full or in part.
     pub(super) is_transparent: bool,
+    /// What is there of it; nothing where all is.
+    pub(super) cutout: Option<Cutout>,
 }
 
 /// A picture of radiance as it is read.
@@ -266,8 +286,8 @@ where
     let is_transparent = picture.pixels().any(|pixel| share_of(pixel) < 1.0);
     let weight = |pixel: &Rgba<T>| match role {
         Role::Reflects => share_of(pixel),
-        Role::Emits if share_of(pixel) > 0.0 => 1.0,
-        Role::Emits => 0.0,
+        _ if share_of(pixel) > 0.0 => 1.0,
+        _ => 0.0,
     };
     let mut grid = averaged(picture, |pixel| color_of(pixel.0, &linear) * weight(pixel));
     if is_transparent && role == Role::Reflects {
@@ -282,10 +302,40 @@ where
             *color = if seen > 0.0 { *color / seen } else { mean };
         }
     }
+    let cutout = (is_transparent && role == Role::Reflects).then(|| {
+        let (width, height) = picture.dimensions();
+        Cutout::new(name, [width, height], |column, row| {
+            share_of(picture.get_pixel(column, row)) >= LEAST_ALPHA
+        })
+    });
     Some(Picture {
-        texture: grid.into_texture(name),
+        texture: Some(grid.into_texture(name)),
         is_transparent,
+        cutout: cutout.filter(|cutout| !cutout.is_whole()),
     })
+}
+
+/// The cut-out of a picture: by its alpha, or by its encoded brightness where the alpha hides nothing.
+fn cutting(picture: DynamicImage, name: &str) -> Picture {
+    let has_alpha = picture.color().has_alpha();
+    let alpha = has_alpha.then(|| picture.to_rgba16());
+    let alpha = alpha.filter(|pixels| pixels.pixels().any(|pixel| pixel.0[3] < u16::MAX));
+    let values = match alpha {
+        Some(pixels) => ImageBuffer::from_fn(pixels.width(), pixels.height(), |x, y| {
+            Luma([pixels.get_pixel(x, y).0[3]])
+        }),
+        None => picture.into_luma16(),
+    };
+    let value = |pixel: &Luma<u16>| f32::from(pixel.0[0]) / 65_535.0;
+    let (width, height) = values.dimensions();
+    let cutout = Cutout::new(name, [width, height], |column, row| {
+        value(values.get_pixel(column, row)) >= LEAST_ALPHA
+    });
+    Picture {
+        texture: None,
+        is_transparent: values.pixels().any(|pixel| value(pixel) < 1.0),
+        cutout: (!cutout.is_whole()).then_some(cutout),
+    }
 }
 
 /// Means of blocks of pixels, of the smallest power of two that leaves at most [`MAX_PIXELS`].
@@ -354,8 +404,19 @@ pub(super) struct TextureAverage {
 impl TextureAverage {
     /// Halve a texture down to one pixel.
     pub(super) fn new(full: &Texture) -> Self {
+        let width = full.width as usize;
+        Self::of([full.width, full.height], |column, row| {
+            full.pixels[row as usize * width + column as usize]
+        })
+    }
+
+    /// Halve a picture of this width and height down to one pixel; `pixel` gives its pixels by column and row.
+    pub(super) fn of([width, height]: [u32; 2], pixel: impl Fn(u32, u32) -> Vec3) -> Self {
         let mut halved: Vec<Texture> = Vec::new();
-        while let last = halved.last().unwrap_or(full)
+        if width > 1 || height > 1 {
+            halved.push(half([width, height], pixel));
+        }
+        while let Some(last) = halved.last()
             && last.pixels.len() > 1
         {
             halved.push(last.halved());
@@ -364,29 +425,37 @@ impl TextureAverage {
     }
 
     /// Mean of the texture over a triangle of texture coordinates. The copy is chosen such that there is about one sample
-    /// a pixel, so that a small bright spot in a large picture is not missed; `most_samples` is at least 4.
-    pub(super) fn over(&self, full: &Texture, uv: [Vec2; 3], most_samples: f32) -> Vec3 {
-        let size = Vec2::new(full.width as f32, full.height as f32);
+    /// a pixel, so that a small bright spot in a large picture is not missed; `most_samples` is at least 4. `full` looks up
+    /// the picture itself, of this width and height.
+    pub(super) fn over(
+        &self,
+        [width, height]: [u32; 2],
+        full: impl Fn(Vec2) -> Vec3,
+        uv: [Vec2; 3],
+        most_samples: f32,
+    ) -> Vec3 {
+        let size = Vec2::new(width as f32, height as f32);
         let [a, b, c] = uv.map(|uv| uv * size);
         let area = 0.5 * (b - a).perp_dot(c - a).abs();
         let length = (b - a).length().max((c - b).length()).max((a - c).length());
         // Two samples a pixel, in a needle two a pixel of its length.
         let mut wanted = 2.0 * area.max(length);
-        let mut texture = full;
+        let mut texture = None;
         for halved in &self.halved {
             // Written so that an overflow ends at the smallest copy.
             if wanted <= most_samples {
                 break;
             }
             wanted *= if area > length { 0.25 } else { 0.5 };
-            texture = halved;
+            texture = Some(halved);
         }
         // Coordinates that are not numbers give the least.
         let count = wanted.max(MIN_SAMPLES).min(most_samples).ceil() as u32;
         let sum: Vec3 = (0..count)
             .map(|index| {
                 let [x, y, z] = barycentric_sample(index);
-                texture.sample(uv[0] * x + uv[1] * y + uv[2] * z)
+                let at = uv[0] * x + uv[1] * y + uv[2] * z;
+                texture.map_or_else(|| full(at), |texture| texture.sample(at))
             })
             .sum();
         sum / count as f32
@@ -432,10 +501,10 @@ mod tests {
     fn large_pictures_are_averaged_in_blocks_that_may_be_cut_at_the_edge() {
         // 4097 × 4097 needs blocks of two; the last row and column have blocks of one.
         let picture = image::GrayImage::from_fn(4097, 4097, |x, y| {
-            image::Luma([if x == 4096 || y == 0 { 255 } else { 0 }])
+            Luma([if x == 4096 || y == 0 { 255 } else { 0 }])
         });
         let texture = Texture::from_picture(picture.into(), "", Role::Reflects);
-        let texture = texture.unwrap().texture;
+        let texture = texture.unwrap().texture.unwrap();
         assert_eq!((texture.width, texture.height), (2049, 2049));
         assert!(texture.is_consistent());
         assert_eq!(texture.pixels[0], Vec3::splat(0.5));
@@ -470,7 +539,7 @@ mod tests {
             let half = 127.0 / 255.0;
             let mean = Vec3::new(1.0, 0.0, half) / (1.0 + half);
             let expected = [Vec3::X, Vec3::Z, mean, mean];
-            for (pixel, expected) in read.texture.pixels.iter().zip(expected) {
+            for (pixel, expected) in read.texture.unwrap().pixels.iter().zip(expected) {
                 assert!(pixel.abs_diff_eq(expected, 1e-5), "{pixel} for {expected}");
             }
         }
@@ -480,7 +549,7 @@ mod tests {
     fn what_is_hidden_emits_nothing() {
         let read = Texture::from_picture(leaf().into(), "", Role::Emits).unwrap();
         let expected = [Vec3::X, Vec3::Z, Vec3::ZERO, Vec3::ZERO];
-        assert_eq!(read.texture.pixels, expected);
+        assert_eq!(read.texture.unwrap().pixels, expected);
     }
 
     #[test]
@@ -489,7 +558,7 @@ mod tests {
         let read = Texture::from_picture(grey.into(), "", Role::Reflects).unwrap();
         assert!(!read.is_transparent);
         let expected = Vec3::splat(linear_from_srgb(188.0 / 255.0));
-        assert_eq!(read.texture.pixels, [expected; 4]);
+        assert_eq!(read.texture.unwrap().pixels, [expected; 4]);
         let nothing = image::RgbaImage::from_pixel(2, 2, Rgba([255, 255, 255, 0]));
         assert!(Texture::from_picture(nothing.into(), "", Role::Reflects).is_none());
     }

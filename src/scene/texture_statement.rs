@@ -46,6 +46,12 @@ impl TextureStatement {
         (!statement.readings().is_empty()).then_some(statement)
     }
 
+    /// Whether another statement names the same file, by the barest reading of both.
+    pub(super) fn means_file_of(&self, other: &Self) -> bool {
+        let name = |statement: &Self| statement.readings().pop().map(|reading| reading.name);
+        name(self) == name(other)
+    }
+
     /// The ways to read the statement, from the longest name to the barest.
     pub(super) fn readings(&self) -> Vec<TextureReference> {
         let mut readings = Vec::new();

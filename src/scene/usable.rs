@@ -50,7 +50,9 @@ impl SceneBuilder {
                 .map(|face| face.corners.map(|corner| corner_of[corner as usize]))
                 .collect();
             let overlaps = Overlaps::of(&corners, positions);
-            let repeated = overlay::repeated(&overlaps, &corners);
+            let repeated = overlay::repeated(&overlaps, &corners, |face, other| {
+                self.may_cover(face, other)
+            });
             if repeated.is_empty() {
                 return overlaps;
             }

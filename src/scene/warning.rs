@@ -17,8 +17,10 @@ pub enum WarningKind {
     ValueClamped,
     /// The file is not UTF-8: it was decoded, or bytes were replaced.
     Encoding,
-    /// A feature of the file that vecrad does not use (transparency, NURBS, …).
+    /// A feature of the file that vecrad does not use (gloss, NURBS, …).
     Unsupported,
+    /// Light passes through surfaces, or does not though they ask for it.
+    SeeThrough,
     /// Nothing in the scene emits light.
     NoEmitter,
     /// Light that was asked for and may not be as meant.

@@ -11,10 +11,10 @@ use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
-use image::{DynamicImage, ImageFormat, Rgb32FImage, RgbImage};
+use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb32FImage, RgbImage};
 
 use super::{
-    Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin, srgb_byte,
+    Cutout, Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin, srgb_byte,
     whole::write_whole,
 };
 
@@ -36,11 +36,18 @@ pub fn write_obj(scene: &Scene, path: &Path) -> io::Result<()> {
         let encoded = encoded_texture(texture)?;
         write_whole(&folder.join(file), |out| out.write_all(&encoded))?;
     }
+    let cutouts: Vec<String> = (0..scene.cutouts.len())
+        .map(|index| format!("{stem}-cutout-{index}.png"))
+        .collect();
+    for (cutout, file) in scene.cutouts.iter().zip(&cutouts) {
+        let encoded = encoded_cutout(cutout)?;
+        write_whole(&folder.join(file), |out| out.write_all(&encoded))?;
+    }
     let names = material_names(&scene.materials);
     let library = format!("{stem}.mtl");
     write_whole(&folder.join(&library), |out| {
         for (material, name) in scene.materials.iter().zip(&names) {
-            out.write_all(material_text(material, name, &textures).as_bytes())?;
+            out.write_all(material_text(material, name, [&textures, &cutouts]).as_bytes())?;
         }
         Ok(())
     })?;
@@ -173,11 +180,20 @@ fn coordinates(frame: &Frame, position: Vec3) -> [String; 3] {
 }
 
 /// A material in MTL.
-fn material_text(material: &Material, name: &str, textures: &[String]) -> String {
+fn material_text(material: &Material, name: &str, [textures, cutouts]: [&[String]; 2]) -> String {
     let triple = |c: Vec3| format!("{} {} {}", c.x, c.y, c.z);
     let mut text = format!("newmtl {name}\nKd {}\n", triple(material.reflectance));
     if material.emission != Vec3::ZERO {
         text += &format!("Ke {}\n", triple(material.emission));
+    }
+    if material.opacity < 1.0 {
+        text += &format!("d {}\n", material.opacity);
+    }
+    if material.filter != Vec3::ONE {
+        text += &format!("Tf {}\n", triple(material.filter));
+    }
+    if let Some(cutout) = material.cutout {
+        text += &format!("map_d {}\n", cutouts[cutout.index()]);
     }
     let mut map = |keyword: &str, texture: Option<TextureId>| {
         if let Some(texture) = texture {
@@ -231,6 +247,17 @@ fn texture_file_name(stem: &str, texture: &Texture) -> String {
 
 fn is_bright(texture: &Texture) -> bool {
     texture.pixels.iter().any(|pixel| pixel.max_element() > 1.0)
+}
+
+/// A grey PNG: white is there.
+fn encoded_cutout(cutout: &Cutout) -> io::Result<Vec<u8>> {
+    let picture = GrayImage::from_fn(cutout.width, cutout.height, |column, row| {
+        Luma([u8::MAX * u8::from(cutout.has(column, row))])
+    });
+    let mut bytes = Cursor::new(Vec::new());
+    let written = picture.write_to(&mut bytes, ImageFormat::Png);
+    written.map_err(io::Error::other)?;
+    Ok(bytes.into_inner())
 }
 
 fn encoded_texture(texture: &Texture) -> io::Result<Vec<u8>> {

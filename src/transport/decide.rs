@@ -127,7 +127,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                     cluster,
                     SELF_RAYS,
                     &mut self.random(cluster, cluster),
-                )
+                ) / self.judge.sampler.opacity(cluster)
             }
         };
         Decision::Keep(Link::over_tables(

@@ -116,12 +116,11 @@ struct Share {
 }
 
 impl Share {
-    fn count(&mut self, weight: f32, is_visible: bool) {
+    /// Count a ray of which a part arrives, 0…1.
+    fn count(&mut self, weight: f32, part: f32) {
         let half = &mut self.halves[self.count % 2];
         half.sent += weight;
-        if is_visible {
-            half.arrived += weight;
-        }
+        half.arrived += weight * part;
         self.count += 1;
     }
 
@@ -313,11 +312,9 @@ impl PairSampler<'_> {
                 continue;
             };
             let from = candidate.from;
-            let visible = !self.rays.occluded(
-                to.point,
-                from.point,
-                [Some(to.triangle), Some(from.triangle)],
-            );
+            let ends = [Some(to.triangle), Some(from.triangle)];
+            let passing = self.rays.transmittance(to.point, from.point, ends);
+            let visible = passing.element_sum() / 3.0;
             all.count(1.0, visible);
             light.count(sum * candidate.light, visible);
             area.count(sum * candidate.area, visible);
@@ -339,22 +336,36 @@ impl PairSampler<'_> {
         if self.rays.is_clear() {
             return self.form_factor_in_clear(source, receiver, random);
         }
-        let mut met = 0;
+        let mut met = 0.0;
         let receiver = self.receiver(receiver);
         for _ in 0..ray_count {
             let from = self.sample(&receiver, random);
             let direction = cosine_direction(from.normal, random.uniform_2d());
-            let hit = self
-                .rays
-                .closest(from.point, direction, Some(from.triangle));
-            met += u32::from(hit.is_some_and(|hit| {
+            let start = Some(from.triangle);
+            let hit = self.rays.closest(from.point, direction, start);
+            let is_met = hit.is_some_and(|hit| {
                 let point = from.point + direction * hit.distance;
                 self.hierarchy
                     .patch_met(hit.triangle, direction)
                     .is_some_and(|patch| self.holds(source, patch, point))
-            }));
+            });
+            if is_met {
+                let tint = self.rays.tint(from.point, direction, start, hit);
+                met += tint.element_sum() / 3.0;
+            }
         }
-        met as f32 / ray_count.max(1) as f32
+        met / ray_count.max(1) as f32
+    }
+
+    /// The part of the area of a cluster that rays meet, above 0: its radiosity is a mean over all of the area.
+    pub fn opacity(&self, cluster: NodeId) -> f32 {
+        let (true, Kind::Cluster(index)) = (self.rays.has_panes(), self.hierarchy.kind(cluster))
+        else {
+            return 1.0;
+        };
+        let cluster = &self.hierarchy.clusters[index];
+        let met = self.areas.total(&cluster.patches()) as f32;
+        if met > 0.0 { met / cluster.area } else { 1.0 }
     }
 
     /// Mean form factor from a receiver to a source without occlusion, 0…1: the exact form factors of all patches of

@@ -75,7 +75,7 @@ pub fn pick(
     let (mut origin, direction) = camera.ray(ndc, aspect);
     let mut from = None;
     for _ in 0..MOST_LAYERS {
-        let hit = loaded.rays.closest(origin, direction, from)?;
+        let hit = loaded.rays.closest_shown(origin, direction, from)?;
         let point = origin + direction * hit.distance;
         let is_back = loaded.scene.surfaces[hit.triangle.index()]
             .area_vector

@@ -117,7 +117,10 @@ pub(super) fn glazed_room() -> SceneBuilder {
     let frame = plain(&mut builder, "frame", [0.8, 0.8, 0.78]);
     let wood = plain(&mut builder, "wood", [0.4, 0.24, 0.12]);
     let glaze = plain(&mut builder, "glaze", [0.15, 0.32, 0.45]);
-    let glass = builder.push_material(glass());
+    let glass = builder.push_material(Material {
+        opacity: 0.12,
+        ..Material::plain("glass", Vec3::splat(0.6), Vec3::ZERO)
+    });
 
     block([-6.0, -0.6, -6.0], [11.0, -0.25, 13.0], earth).add_to(&mut builder, "ground");
     // The window: a hole in the inner and in the outer shell, joined by its reveal.
@@ -172,9 +175,4 @@ pub(super) fn glazed_room() -> SceneBuilder {
         .moved(|p| p * 0.18 + DVec3::new(2.6, 0.935, 1.8))
         .add_to(&mut builder, "vase");
     builder
-}
-
-/// What the panes are made of.
-fn glass() -> Material {
-    Material::plain("glass", Vec3::splat(0.08), Vec3::ZERO)
 }

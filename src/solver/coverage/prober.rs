@@ -318,14 +318,18 @@ impl Prober<'_> {
                 None => a * at.x + b * at.y + c * at.z,
             };
             let direction = cosine_direction(patch.normal, low_discrepancy_2d(index, shift));
-            let hit = self.rays.closest(origin, direction, Some(patch.triangle));
+            let start = Some(patch.triangle);
+            let hit = self.rays.closest(origin, direction, start);
             let is_lit =
                 hit.is_some_and(|hit| self.hierarchy.patch_met(hit.triangle, direction).is_some());
             let is_within = hit.is_some_and(|hit| {
                 self.scene.triangles[hit.triangle.index()].bounds_solid
                     && self.hierarchy.side_met(hit.triangle, direction).is_none()
             });
-            met.hits += f32::from(u8::from(is_lit));
+            if is_lit {
+                let tint = self.rays.tint(origin, direction, start, hit);
+                met.hits += tint.element_sum() / 3.0;
+            }
             if is_within {
                 met.within += 1.0;
             } else {

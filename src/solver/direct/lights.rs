@@ -216,9 +216,9 @@ impl Lights {
             }
             let ends = [Some(receiver.triangle), Some(emitter.triangle)];
             let color = emitter.radiosity / luminance(emitter.radiosity);
-            let is_visible = !rays.occluded(receiver.point, point, ends);
-            outcomes.count(is_visible);
-            bundle.count(weight, color, is_visible);
+            let passing = rays.transmittance(receiver.point, point, ends);
+            outcomes.count(passing != Vec3::ZERO);
+            bundle.count(weight, color, passing);
         }
         light.count(&bundle);
         light.changes += outcomes.changes();

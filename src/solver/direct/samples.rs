@@ -1,6 +1,6 @@
 //! Samples of direct light at a point: the visible fraction of the unoccluded light, and its standard error.
 
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 
 use crate::{geometry::SphericalTriangle, hierarchy::luminance};
 
@@ -31,12 +31,13 @@ impl Bundle {
         }
     }
 
-    pub(super) fn count(&mut self, weight: f32, color: Vec4, is_visible: bool) {
+    /// Count a ray; `passing` is what passes along it, by channel, 0…1.
+    pub(super) fn count(&mut self, weight: f32, color: Vec4, passing: Vec3) {
         self.weight += weight;
         self.sent += color * weight;
         self.shot += 1;
-        if is_visible {
-            self.arrived += color * weight;
+        if passing != Vec3::ZERO {
+            self.arrived += color * weight * passing.extend(1.0);
             self.visible += 1;
         }
     }

@@ -56,8 +56,8 @@ impl<'a> Surfaces<'a> {
             .is_some_and(|field| field.lights.is_sampled(patch))
     }
 
-    /// Radiosity of a leaf under this irradiance, without sampled emission, W/m², with an active share of 1; all 0
-    /// inside a solid.
+    /// Radiosity of a leaf under this irradiance, without sampled emission, W/m²; its active share is the opacity;
+    /// all 0 inside a solid.
     pub(crate) fn radiosity(&self, element: usize, irradiance: Vec4) -> Vec4 {
         if self.hierarchy.mesh.elements[element].is_inside_solid() {
             return Vec4::ZERO;
@@ -68,7 +68,7 @@ impl<'a> Surfaces<'a> {
         } else {
             self.hierarchy.emission_of(element) * PI
         };
-        (reflected + emitted).extend(1.0)
+        (reflected + emitted).extend(self.hierarchy.opacity_of(element))
     }
 
     /// Power of the sampled emitters, summed over the colours.

@@ -40,7 +40,7 @@ impl LinkedLight {
         self.irradiance[leaf] + surfaces.direct(leaf)
     }
 
-    /// Radiosity of a leaf without sampled emission, W/m², with an active share of 1; all 0 inside a solid.
+    /// Radiosity of a leaf without sampled emission, W/m²; its active share is the opacity; all 0 inside a solid.
     pub(crate) fn radiosity(&self, surfaces: Surfaces<'_>, leaf: usize) -> Vec4 {
         surfaces.radiosity(leaf, self.total(surfaces, leaf))
     }

@@ -273,7 +273,8 @@ pub(crate) fn is_behind_wall(
                     return (false, shot as u64);
                 }
             }
-            hit => backs += usize::from(hit.is_some()),
+            Some(hit) if !rays.is_see_through(hit.triangle) => backs += 1,
+            _ => {}
         }
     }
     (backs >= LEAST_BACKS * (1 + lit), shot as u64)

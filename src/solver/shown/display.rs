@@ -166,8 +166,9 @@ impl View<'_> {
             false => Vec4::ZERO,
         };
         let leaves = hierarchy.mesh.leaves();
+        let of_met = |leaf| hierarchy.opacity_of(leaf).max(f32::MIN_POSITIVE);
         leaves
-            .map(|leaf| self.linked.radiosity(surfaces, leaf) + sampled(leaf))
+            .map(|leaf| (self.linked.radiosity(surfaces, leaf) + sampled(leaf)) / of_met(leaf))
             .fold(Vec4::ZERO, Vec4::max)
     }
 
@@ -273,23 +274,22 @@ fn leaf_count(mesh: &DisplayMesh) -> usize {
     mesh.element_of.chunk_by(|a, b| a == b).count()
 }
 
-/// Set the colours of the vertices of a display mesh to the area-weighted means of the elements about them.
+/// Set the colours of the vertices of a display mesh to the means of the elements about them, weighted by the area that
+/// rays meet: what they pass has no colour.
 pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: &mut DisplayMesh) {
     let count = display.positions.len();
     let base = hierarchy.clusters.len() as u32;
     let mut sums = vec![(Vec3::ZERO, Vec3::ZERO, 0.0f32); count];
     for (vertices, element) in display.indices.iter().zip(&display.element_of) {
         let element = (element - base) as usize;
-        let shown = [
-            hierarchy.reflectance_of(element),
-            hierarchy.emission_of(element),
-        ];
+        let Met { colors, opacity } = Met::of(hierarchy, element);
         let corners = vertices.map(|vertex| display.positions[vertex as usize]);
-        let weight = area_vector(corners).length().max(f32::MIN_POSITIVE);
+        let area = area_vector(corners).length().max(f32::MIN_POSITIVE);
+        let weight = area * opacity;
         for &vertex in vertices {
             let (reflectance, emission, weights) = &mut sums[display.own_vertex(vertex)];
-            *reflectance += shown[0] * weight;
-            *emission += shown[1] * weight;
+            *reflectance += colors[0] * area;
+            *emission += colors[1] * area;
             *weights += weight;
         }
     }
@@ -299,6 +299,38 @@ pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: 
     display.appearances = appearances.to_vec();
     display.reflectance = means.clone().map(|&(sum, _, by)| mean(sum, by)).collect();
     display.emission = means.map(|&(_, sum, by)| mean(sum, by)).collect();
+}
+
+/// What rays meet of an element.
+struct Met {
+    /// Reflectance and emission, means over all of the element.
+    colors: [Vec3; 2],
+    /// See [`Hierarchy::opacity_of`].
+    opacity: f32,
+}
+
+impl Met {
+    /// Weight of an element that is cut out. Nobody sees it, but light is interpolated across it: it must have the colours
+    /// of its patch, and next to others not count.
+    const CUT_OUT: f32 = 1e-6;
+
+    fn of(hierarchy: &Hierarchy, element: usize) -> Self {
+        let (opacity, patch) = (hierarchy.opacity_of(element), hierarchy.patch_of(element));
+        if opacity > 0.0 || patch.opacity <= 0.0 {
+            return Self {
+                colors: [
+                    hierarchy.reflectance_of(element),
+                    hierarchy.emission_of(element),
+                ],
+                opacity,
+            };
+        }
+        let scale = Self::CUT_OUT / patch.opacity;
+        Self {
+            colors: [patch.reflectance * scale, patch.emission * scale],
+            opacity: Self::CUT_OUT,
+        }
+    }
 }
 
 /// A colour that is safe to display: finite and not negative.

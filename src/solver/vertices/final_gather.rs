@@ -16,7 +16,7 @@ use super::{
     reconstruct::{LeafLight, VertexMeans},
 };
 use crate::{
-    geometry::{Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
+    geometry::{Hit, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Element, Hierarchy},
     solver::{
         Cancel,
@@ -103,6 +103,8 @@ struct VertexProbe {
     /// Variance of the radiosity (luminance) that one ray meets, known from links; 0 where links carry no emission.
     variance: f32,
     met: Vec<Met>,
+    /// The tints of these rays; empty where no pane is coloured.
+    tints: Vec<Vec3>,
     found: GatherEstimate,
 }
 
@@ -259,6 +261,7 @@ impl FinalGather<'_> {
                 weight: weights[vertex as usize],
                 variance: (square - luminance(linked).powi(2)).max(0.0),
                 met: Vec::new(),
+                tints: Vec::new(),
                 found: GatherEstimate::default(),
             })
         };
@@ -289,7 +292,9 @@ impl FinalGather<'_> {
                 for index in before..rays {
                     let square = low_discrepancy_2d(index, shift);
                     let direction = cosine_direction(probe.place.normal, square);
-                    probe.met.push(self.meet(&probe.place, direction));
+                    let (met, tint) = self.meet(&probe.place, direction);
+                    probe.met.push(met);
+                    probe.tints.extend(tint);
                 }
                 rays - before
             })
@@ -298,17 +303,27 @@ impl FinalGather<'_> {
         Some(shot.into_iter().map(u64::from).sum())
     }
 
-    /// What a ray meets first.
-    fn meet(&self, from: &Receiver, direction: Vec3) -> Met {
-        let hit = self
-            .rays
-            .closest(from.point, direction, Some(from.triangle));
+    /// What a ray meets first, and its tint where some pane is coloured.
+    fn meet(&self, from: &Receiver, direction: Vec3) -> (Met, Option<Vec3>) {
+        let start = Some(from.triangle);
+        let hit = self.rays.closest(from.point, direction, start);
+        let tint = self.rays.has_coloured_panes();
+        let tint = tint.then(|| self.rays.tint(from.point, direction, start, hit));
+        (self.met(from, direction, hit), tint)
+    }
+
+    /// What a ray met by the triangle that it hit.
+    fn met(&self, from: &Receiver, direction: Vec3, hit: Option<Hit>) -> Met {
         let Some(hit) = hit else {
             return Met::Nothing;
         };
         let hierarchy = self.surfaces.hierarchy;
         let Some(patch) = hierarchy.side_met(hit.triangle, direction) else {
-            return Met::Back;
+            // Through a pane one gets behind it.
+            return match self.rays.is_see_through(hit.triangle) {
+                true => Met::Nothing,
+                false => Met::Back,
+            };
         };
         if !hierarchy.active_patches().contains(&patch) {
             return Met::Nothing;
@@ -325,10 +340,14 @@ impl FinalGather<'_> {
     fn senders(&self) -> Vec<Sender> {
         let hierarchy = self.surfaces.hierarchy;
         let elements = &hierarchy.mesh.elements;
-        let sender = |index: usize| Sender {
-            vertices: elements[index].vertices,
-            reflectance: hierarchy.reflectance_of(index).extend(0.0),
-            emitted: self.surfaces.radiosity(index, Vec4::ZERO).with_w(0.0),
+        let sender = |index: usize| {
+            // Of what rays meet, where some pass.
+            let met = 1.0 / hierarchy.opacity_of(index).max(f32::MIN_POSITIVE);
+            Sender {
+                vertices: elements[index].vertices,
+                reflectance: (hierarchy.reflectance_of(index) * met).extend(0.0),
+                emitted: self.surfaces.radiosity(index, Vec4::ZERO).with_w(0.0) * met,
+            }
         };
         (0..elements.len())
             .into_par_iter()
@@ -354,8 +373,10 @@ fn evaluate(probes: &mut [VertexProbe], senders: &[Sender], received: &[Vec4]) {
     };
     probes.par_iter_mut().with_min_len(64).for_each(|probe| {
         probe.found = GatherEstimate::default();
-        for met in &probe.met {
-            probe.found.count(radiosity(met));
+        for (ray, met) in probe.met.iter().enumerate() {
+            let tint = probe.tints.get(ray).copied().unwrap_or(Vec3::ONE);
+            let met = radiosity(met).map(|radiosity| radiosity * tint.extend(1.0));
+            probe.found.count(met);
         }
     });
 }

@@ -1,4 +1,5 @@
-//! Textures on the adapter: one group for each textured material, and group 0 for everything without a texture.
+//! Textures on the adapter: one group for each material with a texture or through which light passes, and group 0 for all
+//! others.
 
 use std::{ops::Range, sync::Arc};
 
@@ -7,7 +8,7 @@ use wgpu::util::DeviceExt as _;
 
 use super::Gpu;
 use crate::{
-    scene::{Appearance, Scene, Texture, TextureId, srgb_byte},
+    scene::{Appearance, Cutout, CutoutId, Material, Scene, Texture, TextureId, srgb_byte},
     solver::DisplayMesh,
 };
 
@@ -26,6 +27,27 @@ pub(super) enum FaceCopy {
     Front,
     /// Its back, which is the other copy turned around.
     Back,
+}
+
+/// How a group is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// It hides what is behind it.
+    Opaque,
+    /// It hides that where it is not cut out.
+    CutOut,
+    /// It filters that where it is not cut out.
+    Pane,
+}
+
+impl Look {
+    fn of(material: &Material) -> Self {
+        match material.cutout {
+            _ if material.transmission() != Vec3::ZERO => Self::Pane,
+            Some(_) => Self::CutOut,
+            None => Self::Opaque,
+        }
+    }
 }
 
 /// A run of indices that are drawn alike.
@@ -54,12 +76,14 @@ pub(super) struct DetailSet {
     is_tame: bool,
     /// Its textures, those that were needed.
     views: Vec<Option<Uploaded>>,
+    /// Its cut-outs, those that were needed.
+    cutouts: Vec<Option<wgpu::TextureView>>,
     /// Factors of each material on its textures; empty where they are those of the scene.
     appearances: Vec<Appearance>,
     /// Number of the group of each material.
     group_of: Vec<usize>,
     /// Groups from 1 on.
-    textured: Vec<wgpu::BindGroup>,
+    textured: Vec<(wgpu::BindGroup, Look)>,
 }
 
 /// A texture on the adapter.
@@ -111,7 +135,7 @@ impl DetailSet {
         };
         let white = upload(gpu, &white).view;
         let upright = sampler(1);
-        let plain = bind_group(gpu, &layout, &upright, [&white, &white], [[0.0; 4]; 2]);
+        let plain = bind_group(gpu, &layout, &upright, [&white; 3], [[0.0; 4]; 3]);
         Self {
             layout,
             // Floors are seen at a slant.
@@ -122,6 +146,7 @@ impl DetailSet {
             scene: None,
             is_tame: true,
             views: Vec::new(),
+            cutouts: Vec::new(),
             appearances: Vec::new(),
             group_of: Vec::new(),
             textured: Vec::new(),
@@ -136,9 +161,20 @@ impl DetailSet {
     /// A group by its number.
     pub(super) fn bind_group(&self, number: usize) -> &wgpu::BindGroup {
         match number.checked_sub(1) {
-            Some(index) => self.textured.get(index).unwrap_or(&self.plain),
+            Some(index) => self
+                .textured
+                .get(index)
+                .map_or(&self.plain, |(group, _)| group),
             None => &self.plain,
         }
+    }
+
+    /// How a group is drawn, by its number.
+    pub(super) fn look(&self, number: usize) -> Look {
+        let textured = number
+            .checked_sub(1)
+            .and_then(|index| self.textured.get(index));
+        textured.map_or(Look::Opaque, |(_, look)| *look)
     }
 
     /// Upload the textures of another scene, and take other appearances of materials over.
@@ -148,6 +184,7 @@ impl DetailSet {
             self.scene = Some(scene.clone());
             self.is_tame = is_tame(scene);
             self.views = vec![None; scene.textures.len()];
+            self.cutouts = vec![None; scene.cutouts.len()];
         } else if self.appearances == appearances {
             return;
         }
@@ -160,14 +197,21 @@ impl DetailSet {
         };
         for (index, material) in scene.materials.iter().enumerate() {
             let textures = [material.reflectance_texture, material.emission_texture];
-            if textures == [None, None] {
+            if !material.has_pictures() && !material.is_see_through() {
                 continue;
             }
             let appearance = appearances.get(index).copied();
             let appearance = appearance.unwrap_or_else(|| Appearance::of(material));
-            let colors = [appearance.reflectance, appearance.emission];
-            let (mut views, mut factors) =
-                ([self.white.clone(), self.white.clone()], [[0.0; 4]; 2]);
+            let met = material.share_of_met();
+            let colors = [appearance.reflectance * met, appearance.emission * met];
+            let passing = material.transmission();
+            let mut views = [(); 3].map(|()| self.white.clone());
+            let mut factors = [[0.0; 4], [0.0; 4], passing.extend(0.0).to_array()];
+            if let Some(cutout) = material.cutout.map(CutoutId::index) {
+                let uploaded = self.cutouts[cutout]
+                    .get_or_insert_with(|| upload_cutout(gpu, &scene.cutouts[cutout]));
+                (views[2], factors[2]) = (uploaded.clone(), passing.extend(1.0).to_array());
+            }
             for (kind, texture) in textures.into_iter().enumerate() {
                 let Some(texture) = texture.map(TextureId::index) else {
                     continue;
@@ -177,13 +221,8 @@ impl DetailSet {
                 let factor = (colors[kind] * uploaded.scale).extend(1.0);
                 (views[kind], factors[kind]) = (uploaded.view.clone(), factor.to_array());
             }
-            self.textured.push(bind_group(
-                gpu,
-                &self.layout,
-                sampler,
-                [&views[0], &views[1]],
-                factors,
-            ));
+            let group = bind_group(gpu, &self.layout, sampler, views.each_ref(), factors);
+            self.textured.push((group, Look::of(material)));
             self.group_of[index] = self.textured.len();
         }
     }
@@ -194,7 +233,7 @@ impl DetailSet {
         scene: &Scene,
         mesh: &DisplayMesh,
     ) -> (Vec<[u32; 3]>, Vec<DrawRange>) {
-        let has_details = !self.textured.is_empty() && !mesh.texcoords.is_empty();
+        let has_texcoords = !mesh.texcoords.is_empty();
         let kind = |index: usize| {
             let triangle = &scene.triangles[mesh.triangle_of[index] as usize];
             let copy = match (mesh.is_back[index], triangle.two_sided) {
@@ -202,8 +241,9 @@ impl DetailSet {
                 (false, true) => FaceCopy::Front,
                 (false, false) => FaceCopy::Only,
             };
-            let group = match has_details {
-                true => self.group_of[triangle.material.index()],
+            let material = triangle.material.index();
+            let group = match has_texcoords || !scene.materials[material].has_pictures() {
+                true => self.group_of.get(material).copied().unwrap_or(0),
                 false => 0,
             };
             (copy, group)
@@ -258,6 +298,7 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
                 3,
                 wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             ),
+            entry(4, texture),
         ],
     })
 }
@@ -266,8 +307,8 @@ fn bind_group(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
     sampler: &wgpu::Sampler,
-    [reflectance, emission]: [&wgpu::TextureView; 2],
-    factors: [[f32; 4]; 2],
+    [reflectance, emission, cutout]: [&wgpu::TextureView; 3],
+    factors: [[f32; 4]; 3],
 ) -> wgpu::BindGroup {
     let uniform = gpu.buffer(
         "detail",
@@ -294,8 +335,79 @@ fn bind_group(
                 binding: 3,
                 resource: wgpu::BindingResource::Sampler(sampler),
             },
+            wgpu::BindGroupEntry {
+                binding: 4,
+                resource: wgpu::BindingResource::TextureView(cutout),
+            },
         ],
     })
+}
+
+/// A cut-out with all its smaller levels. In each as large a part is above a half as in the whole, so that leaves do not
+/// vanish in the distance (Castaño 2010).
+fn upload_cutout(gpu: &Gpu, cutout: &Cutout) -> wgpu::TextureView {
+    let places = (0..cutout.height).flat_map(|y| (0..cutout.width).map(move |x| (x, y)));
+    let pixel = |(x, y)| Vec3::splat(f32::from(u8::from(cutout.has(x, y))));
+    let mut level = (cutout.width, cutout.height, places.map(pixel).collect());
+    while level.0.max(level.1) > MAX_SIDE.min(gpu.max_picture_side()) {
+        level = halved(&level);
+    }
+    let count = level.2.len();
+    let share = level.2.iter().map(|pixel| f64::from(pixel.x)).sum::<f64>() / count as f64;
+    let size = (level.0, level.1);
+    let level_count = size.0.max(size.1).ilog2() + 1;
+    let mut bytes = Vec::new();
+    for index in 0..level_count {
+        // The value that as many pixels are above becomes a half.
+        let mut sorted: Vec<f32> = level.2.iter().map(|pixel| pixel.x).collect();
+        sorted.sort_unstable_by(f32::total_cmp);
+        let below = ((1.0 - share) * sorted.len() as f64) as usize;
+        let limit = sorted[below.min(sorted.len() - 1)].clamp(1.0 / 255.0, 1.0);
+        let scale = 0.5 / limit.min(0.5);
+        bytes.extend(
+            level
+                .2
+                .iter()
+                .map(|pixel| (255.0 * (pixel.x * scale).min(1.0)).round() as u8),
+        );
+        if index + 1 < level_count {
+            level = halved(&level);
+        }
+    }
+    let made = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &texture_of(
+            &cutout.name,
+            size,
+            level_count,
+            wgpu::TextureFormat::R8Unorm,
+        ),
+        wgpu::util::TextureDataOrder::LayerMajor,
+        &bytes,
+    );
+    made.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+fn texture_of(
+    label: &str,
+    (width, height): (u32, u32),
+    mip_level_count: u32,
+    format: wgpu::TextureFormat,
+) -> wgpu::TextureDescriptor<'_> {
+    wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    }
 }
 
 /// A texture with all its smaller levels, sRGB-encoded.
@@ -320,20 +432,12 @@ fn upload(gpu: &Gpu, texture: &Texture) -> Uploaded {
     }
     let made = gpu.device.create_texture_with_data(
         &gpu.queue,
-        &wgpu::TextureDescriptor {
-            label: Some(&texture.name),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: level_count,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba8UnormSrgb,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        },
+        &texture_of(
+            &texture.name,
+            (width, height),
+            level_count,
+            wgpu::TextureFormat::Rgba8UnormSrgb,
+        ),
         wgpu::util::TextureDataOrder::LayerMajor,
         &bytes,
     );

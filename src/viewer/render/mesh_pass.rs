@@ -2,10 +2,11 @@
 //!
 //! Of the two sides of a triangle, one is drawn in a pixel: a two-sided triangle has a copy for each, and a back is drawn
 //! of one-sided ones only.
+//! Panes come last: what is behind them is multiplied by what they let pass, and what they reflect is added.
 
 use super::{
     DEPTH_FORMAT, Gpu,
-    detail::{DetailSet, FaceCopy},
+    detail::{DetailSet, DrawRange, FaceCopy, Look},
     meter::METER_FORMAT,
     uploads::Uploads,
 };
@@ -18,7 +19,12 @@ pub(super) struct MeshPass {
     turned: wgpu::RenderPipeline,
     back: wgpu::RenderPipeline,
     edge: wgpu::RenderPipeline,
+    cut_out: wgpu::RenderPipeline,
+    cut_out_light: wgpu::RenderPipeline,
+    filter: wgpu::RenderPipeline,
+    pane: wgpu::RenderPipeline,
     meter: wgpu::RenderPipeline,
+    meter_cut_out: wgpu::RenderPipeline,
     meter_back: wgpu::RenderPipeline,
 }
 
@@ -46,7 +52,12 @@ impl MeshPass {
             turned: build(Kind::Turned),
             back: build(Kind::Back),
             edge: build(Kind::Edge),
+            cut_out: build(Kind::CutOut),
+            cut_out_light: build(Kind::CutOutLight),
+            filter: build(Kind::Filter),
+            pane: build(Kind::Pane),
             meter: build(Kind::Meter),
+            meter_cut_out: build(Kind::MeterCutOut),
             meter_back: build(Kind::MeterBack),
         }
     }
@@ -59,12 +70,15 @@ impl MeshPass {
         view: &ViewSettings,
     ) {
         let shows_orientation = view.mode == ViewMode::FaceOrientation;
-        let front_of = |copy| match (shows_orientation, copy) {
-            (true, FaceCopy::Back) => &self.turned,
-            _ => &self.front,
+        let pipelines_of = |copy, look| match (shows_orientation, copy, look) {
+            (true, FaceCopy::Back, _) => vec![&self.turned],
+            (true, _, _) | (_, _, Look::Opaque) => vec![&self.front],
+            // What is light is said last, of the samples that were drawn.
+            (_, _, Look::Pane) if view.mode.is_light() => vec![&self.filter, &self.pane],
+            (_, _, Look::Pane | Look::CutOut) => vec![&self.cut_out, &self.cut_out_light],
         };
         let back = (view.backs || shows_orientation).then_some(&self.back);
-        draw_sides(pass, uploads, front_of, back);
+        draw_sides(pass, uploads, pipelines_of, back);
         if view.mode.shows_edges(view.edges)
             && let Some((edges, count)) = uploads.mesh().and_then(|mesh| mesh.edges.as_ref())
         {
@@ -83,16 +97,22 @@ impl MeshPass {
         view: &ViewSettings,
     ) {
         let back = view.backs.then_some(&self.meter_back);
-        draw_sides(pass, uploads, |_| &self.meter, back);
+        let pipelines_of = |_, look| match look {
+            Look::Opaque => vec![&self.meter],
+            Look::CutOut => vec![&self.meter_cut_out],
+            // What is seen through them is metered.
+            Look::Pane => Vec::new(),
+        };
+        draw_sides(pass, uploads, pipelines_of, back);
     }
 }
 
-/// Draw each triangle's side that faces the viewer: copies by the pipeline for them, backs of one-sided triangles by
+/// Draw each triangle's side that faces the viewer: copies by the pipelines for them, backs of one-sided triangles by
 /// `back` or not at all.
 fn draw_sides<'p>(
     pass: &mut wgpu::RenderPass<'_>,
     uploads: &Uploads,
-    front_of: impl Fn(FaceCopy) -> &'p wgpu::RenderPipeline,
+    pipelines_of: impl Fn(FaceCopy, Look) -> Vec<&'p wgpu::RenderPipeline>,
     back: Option<&wgpu::RenderPipeline>,
 ) {
     let (Some(mesh), Some(light)) = (uploads.mesh(), uploads.light()) else {
@@ -112,10 +132,16 @@ fn draw_sides<'p>(
         pass.set_vertex_buffer(slot as u32, buffer.slice(..));
     }
     pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-    for range in &mesh.ranges {
-        pass.set_pipeline(front_of(range.copy));
-        pass.set_bind_group(1, details.bind_group(range.group), &[]);
-        pass.draw_indexed(range.indices.clone(), 0, 0..1);
+    let draw = |pass: &mut wgpu::RenderPass<'_>, range: &DrawRange| {
+        for pipeline in pipelines_of(range.copy, details.look(range.group)) {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(1, details.bind_group(range.group), &[]);
+            pass.draw_indexed(range.indices.clone(), 0, 0..1);
+        }
+    };
+    let is_pane = |range: &&DrawRange| details.look(range.group) == Look::Pane;
+    for range in mesh.ranges.iter().filter(|range| !is_pane(range)) {
+        draw(pass, range);
     }
     if let Some(back) = back {
         pass.set_pipeline(back);
@@ -127,6 +153,9 @@ fn draw_sides<'p>(
         for range in one_sided {
             pass.draw_indexed(range.indices.clone(), 0, 0..1);
         }
+    }
+    for range in mesh.ranges.iter().filter(is_pane) {
+        draw(pass, range);
     }
 }
 
@@ -141,8 +170,18 @@ enum Kind {
     Back,
     /// Edges of both sides.
     Edge,
+    /// Colours of what is left of a cut-out, in the samples that it covers.
+    CutOut,
+    /// Whether they are light.
+    CutOutLight,
+    /// What panes let pass.
+    Filter,
+    /// What panes reflect and emit.
+    Pane,
     /// Luminance of fronts.
     Meter,
+    /// The same of what is left of a cut-out.
+    MeterCutOut,
     /// Backs, which are not metered, but hide what is behind them.
     MeterBack,
 }
@@ -168,11 +207,17 @@ fn pipeline(
         Kind::Turned => ("mesh turned", "vs_main", "fs_back"),
         Kind::Back => ("mesh backs", "vs_main", "fs_back"),
         Kind::Edge => ("mesh edges", "vs_edge", "fs_edge"),
+        Kind::CutOut => ("mesh cut-outs", "vs_main", "fs_cut_out"),
+        Kind::CutOutLight => ("mesh light of cut-outs", "vs_main", "fs_main"),
+        Kind::Filter => ("mesh filters", "vs_main", "fs_filter"),
+        Kind::Pane => ("mesh panes", "vs_main", "fs_pane"),
+        Kind::MeterCutOut => ("mesh meter cut-outs", "vs_main", "fs_meter_cut_out"),
         Kind::Meter => ("mesh meter", "vs_main", "fs_meter"),
         Kind::MeterBack => ("mesh meter backs", "vs_main", "fs_meter_back"),
     };
     let is_back = matches!(kind, Kind::Back | Kind::MeterBack);
-    let is_meter = matches!(kind, Kind::Meter | Kind::MeterBack);
+    let is_meter = matches!(kind, Kind::Meter | Kind::MeterCutOut | Kind::MeterBack);
+    let sample_count = if is_meter { 1 } else { gpu.sample_count };
     let attributes = [
         wgpu::vertex_attr_array![0 => Float32x3],
         wgpu::vertex_attr_array![1 => Float32x3],
@@ -188,19 +233,31 @@ fn pipeline(
             attributes: attribute,
         })
     });
-    // Edges darken light and leave it light: alpha says which of the two a pixel is.
-    let blend = (kind == Kind::Edge).then_some(wgpu::BlendState {
-        color: BlendComponent {
-            src_factor: BlendFactor::SrcAlpha,
-            dst_factor: BlendFactor::OneMinusSrcAlpha,
-            operation: BlendOperation::Add,
-        },
-        alpha: BlendComponent {
-            src_factor: BlendFactor::Zero,
-            dst_factor: BlendFactor::One,
-            operation: BlendOperation::Add,
-        },
-    });
+    let add = |src_factor, dst_factor| BlendComponent {
+        src_factor,
+        dst_factor,
+        operation: BlendOperation::Add,
+    };
+    // Alpha says whether a pixel is light.
+    let keep = add(BlendFactor::Zero, BlendFactor::One);
+    let blend = match kind {
+        // Edges darken light and leave it light.
+        Kind::Edge => Some((
+            add(BlendFactor::SrcAlpha, BlendFactor::OneMinusSrcAlpha),
+            keep,
+        )),
+        Kind::Filter => Some((add(BlendFactor::Zero, BlendFactor::Src), keep)),
+        Kind::Pane => Some((
+            add(BlendFactor::One, BlendFactor::One),
+            add(BlendFactor::One, BlendFactor::OneMinusSrcAlpha),
+        )),
+        _ => None,
+    };
+    let blend = blend.map(|(color, alpha)| wgpu::BlendState { color, alpha });
+    let hides = !matches!(
+        kind,
+        Kind::Edge | Kind::CutOutLight | Kind::Filter | Kind::Pane
+    );
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(label),
@@ -230,8 +287,11 @@ fn pipeline(
             },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
-                depth_write_enabled: Some(kind != Kind::Edge),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
+                depth_write_enabled: Some(hides),
+                depth_compare: Some(match kind {
+                    Kind::CutOutLight => wgpu::CompareFunction::Equal,
+                    _ => wgpu::CompareFunction::Greater,
+                }),
                 stencil: Default::default(),
                 bias: if is_back {
                     BACK_BIAS
@@ -240,7 +300,8 @@ fn pipeline(
                 },
             }),
             multisample: wgpu::MultisampleState {
-                count: if is_meter { 1 } else { gpu.sample_count },
+                count: sample_count,
+                alpha_to_coverage_enabled: kind == Kind::CutOut && sample_count > 1,
                 ..Default::default()
             },
             fragment: Some(wgpu::FragmentState {
@@ -254,7 +315,11 @@ fn pipeline(
                         gpu.linear_format
                     },
                     blend,
-                    write_mask: wgpu::ColorWrites::ALL,
+                    write_mask: match kind {
+                        Kind::CutOut => wgpu::ColorWrites::COLOR,
+                        Kind::CutOutLight => wgpu::ColorWrites::ALPHA,
+                        _ => wgpu::ColorWrites::ALL,
+                    },
                 })],
             }),
             multiview_mask: None,

@@ -5,12 +5,15 @@ struct Detail {
     // rgb: what multiplies the texture; w: 1 where there is a texture.
     reflectance: vec4<f32>,
     emission: vec4<f32>,
+    // rgb: the part of the light that passes; w: 1 where something is cut out.
+    passing: vec4<f32>,
 };
 
 @group(1) @binding(0) var<uniform> detail: Detail;
 @group(1) @binding(1) var reflectance_texture: texture_2d<f32>;
 @group(1) @binding(2) var emission_texture: texture_2d<f32>;
 @group(1) @binding(3) var detail_sampler: sampler;
+@group(1) @binding(4) var cutout_texture: texture_2d<f32>;
 
 struct Surface {
     @builtin(position) clip: vec4<f32>,
@@ -97,8 +100,7 @@ fn shown_emission(surface: Surface) -> vec3<f32> {
     return in_detail(emission_texture, detail.emission, surface.emission, surface.texcoord);
 }
 
-@fragment
-fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
+fn shown(surface: Surface) -> vec4<f32> {
     let reflectance = shown_reflectance(surface);
     let radiance = shown_emission(surface) + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
@@ -118,10 +120,64 @@ fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
     }
 }
 
+@fragment
+fn fs_main(surface: Surface) -> @location(0) vec4<f32> {
+    return shown(surface);
+}
+
+// The part of a pixel that is not cut out: the edge, where the cut-out is a half, is one pixel wide.
+fn coverage(surface: Surface) -> f32 {
+    let at = vec2<f32>(surface.texcoord.x, 1.0 - surface.texcoord.y);
+    let there = textureSample(cutout_texture, detail_sampler, at).r;
+    let slope = max(fwidth(there), 1e-3);
+    if (detail.passing.w < 0.5) {
+        return 1.0;
+    }
+    return clamp((there - 0.5) / slope + 0.5, 0.0, 1.0);
+}
+
+// What is left of a surface; alpha is its coverage.
+@fragment
+fn fs_cut_out(surface: Surface) -> @location(0) vec4<f32> {
+    let color = shown(surface).rgb;
+    let covered = coverage(surface);
+    if (covered < 0.125) {
+        discard;
+    }
+    return vec4<f32>(color, covered);
+}
+
+// What a pane lets pass.
+@fragment
+fn fs_filter(surface: Surface) -> @location(0) vec4<f32> {
+    if (coverage(surface) < 0.5) {
+        discard;
+    }
+    return vec4<f32>(detail.passing.rgb, 1.0);
+}
+
+// What a pane reflects and emits; alpha is the part of what is behind that it hides.
+@fragment
+fn fs_pane(surface: Surface) -> @location(0) vec4<f32> {
+    let color = shown(surface);
+    if (coverage(surface) < 0.5) {
+        discard;
+    }
+    return color * (1.0 - dot(detail.passing.rgb, vec3<f32>(1.0 / 3.0)));
+}
+
+@fragment
+fn fs_meter_cut_out(surface: Surface) -> @location(0) vec4<u32> {
+    let seen = metered(surface);
+    if (coverage(surface) < 0.5) {
+        discard;
+    }
+    return seen;
+}
+
 // Bits of the luminance that a light mode shows, before emission scale and exposure: with the sign set where most of it
 // is emitted, 0 where there is none. Read by `Meter`.
-@fragment
-fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
+fn metered(surface: Surface) -> vec4<u32> {
     let reflectance = shown_reflectance(surface);
     var emitted = luminance(shown_emission(surface));
     var reflected = luminance(reflectance * surface.light / PI);
@@ -131,6 +187,11 @@ fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
     }
     let seen = max(emitted + reflected, 0.0);
     return vec4<u32>(bitcast<u32>(select(seen, -seen, emitted > reflected)), 0u, 0u, 0u);
+}
+
+@fragment
+fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
+    return metered(surface);
 }
 
 @fragment
