@@ -62,7 +62,7 @@ pub use builder::{BuildError, Face, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use cutout::{Cutout, SeeThrough};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
-pub use environment::{Environment, Sky, SkyPicture, Sun};
+pub use environment::{Environment, Sky, SkyPicture, SkySample, Sun};
 pub use frame::Frame;
 pub use hosek::HosekSky;
 pub use lighting::{Lamp, Lighting, SkySource, SunSource};
