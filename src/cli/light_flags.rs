@@ -329,7 +329,7 @@ mod tests {
         let name = path.to_str().unwrap();
         let found =
             lighting(&["--sky", name, "--sky-rotation", "-30", "--sky-scale", "2"]).unwrap();
-        assert_eq!(found.files, [path.clone()]);
+        assert_eq!(found.files, std::slice::from_ref(&path));
         let Some(SkySource::Picture {
             picture,
             scale,
