@@ -246,6 +246,30 @@ fn the_sun_gives_its_irradiance_times_the_cosine() {
     }
 }
 
+#[test]
+fn a_pane_lets_its_part_of_sky_and_sun_through() {
+    let mut plates = Plates::default();
+    let paint = plates.material(0.5, 0.0);
+    let pane = plates.pane(0.25);
+    plates.rectangle(DVec3::ZERO, DVec3::Z, DVec3::X, 2, paint);
+    // So wide and low that less than a thousandth of the light passes beside it.
+    let corner = DVec3::new(-10.0, 0.1, -10.0);
+    plates.rectangle(corner, DVec3::Z * 20.0, DVec3::X * 20.0, 1, pane);
+    let environment = Environment {
+        sun: Some(Sun {
+            direction: Sun::towards(40.0, 50.0, UpAxis::Y),
+            irradiance: Vec3::splat(6.0),
+            diameter: Sun::DEGREES.to_radians(),
+        }),
+        ..uniform(1.0)
+    };
+    let expected = 0.75 * (PI + 6.0 * 50f64.to_radians().sin());
+    let scene = plates.finish(Sides::Two).in_environment(environment);
+    assert_light_where(scene, 0.02, |position, normal| {
+        (normal.y > 0.5 && position.y < 0.05).then_some(expected)
+    });
+}
+
 /// Part of a disc of radius 1 to the right of a line at `x` from its centre, -1 to 1.
 fn disc_beyond(x: f64) -> f64 {
     let x = x.clamp(-1.0, 1.0);

@@ -19,6 +19,14 @@ impl Plates {
             .push_material(Material::plain("", reflectance, emission))
     }
 
+    /// Add a black pane: all but the part `opacity` of the light passes.
+    pub(crate) fn pane(&mut self, opacity: f32) -> MaterialId {
+        self.builder.push_material(Material {
+            opacity,
+            ..Material::plain("", Vec3::ZERO, Vec3::ZERO)
+        })
+    }
+
     /// Add a rectangle of `2 n²` triangles; its front shows along `u × v`.
     pub(crate) fn rectangle(
         &mut self,
