@@ -49,11 +49,11 @@ pub struct SceneFlags {
     #[arg(
         long,
         value_enum,
-        default_value = "+Y",
+        default_value = "auto",
         allow_hyphen_values = true,
         help_heading = "Scene"
     )]
-    pub up: UpAxis,
+    pub up: UpFlag,
 }
 
 impl SceneFlags {
@@ -64,6 +64,7 @@ impl SceneFlags {
             sides: self.sides,
             max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
             mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
+            up: self.up.axis(),
         }
     }
 }
@@ -333,6 +334,30 @@ impl FromStr for Reference {
             _ => return Err("expected paths, paths=SAMPLES or matrix".to_owned()),
         };
         Ok(Self::Paths(samples))
+    }
+}
+
+/// `--up`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum UpFlag {
+    /// +Z where the floor or a comment of the exporter shows it, else +Y
+    Auto,
+    /// +Y
+    #[value(name = "+Y")]
+    Y,
+    /// +Z
+    #[value(name = "+Z")]
+    Z,
+}
+
+impl UpFlag {
+    /// The axis that is asked for.
+    fn axis(self) -> Option<UpAxis> {
+        match self {
+            Self::Auto => None,
+            Self::Y => Some(UpAxis::Y),
+            Self::Z => Some(UpAxis::Z),
+        }
     }
 }
 

@@ -41,6 +41,7 @@ pub(super) struct SceneFacts {
     materials: usize,
     textures: usize,
     emitters: usize,
+    up: &'static str,
     bounds: Bounds,
 }
 
@@ -62,6 +63,7 @@ impl SceneFacts {
             materials: scene.materials.len(),
             textures: scene.textures.len(),
             emitters: scene.surfaces.iter().filter(emits).count(),
+            up: scene.up.name(),
             bounds: bounds(scene, &scene.frame),
         }
     }

@@ -120,6 +120,9 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     for warning in &scene.warnings {
         output::say(format_args!("warning: {warning}"));
     }
+    if let Some(sentence) = scene.up_sentence() {
+        output::say(format_args!("note: {sentence}"));
+    }
     let errors = Errors::default();
     let traced = Instant::now();
     let (mut worker, reference) = worker(arguments, &scene, &interrupted, &errors)?;
@@ -151,7 +154,6 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &run.snapshot,
         errors_of(arguments, &scene, &run, &measured.errors, &interrupted).as_ref(),
         &arguments.run_flags,
-        arguments.scene_flags.up,
     );
     export?;
     report?;
@@ -357,8 +359,7 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
     let Some(path) = &arguments.export else {
         return Ok(());
     };
-    let up = arguments.scene_flags.up;
-    let export = arguments.run_flags.export(up, scene.radiance_unit);
+    let export = arguments.run_flags.export(scene.up, scene.radiance_unit);
     let format = MeshFormat::of(path)?;
     output::write_whole(path, |out| {
         format.write(out, &run.snapshot, &scene.frame, &export)
@@ -412,7 +413,7 @@ fn report(
         settings: arguments.setting_flags.settings(),
         color: arguments
             .run_flags
-            .export(arguments.scene_flags.up, scene.radiance_unit)
+            .export(scene.up, scene.radiance_unit)
             .color,
         left_out: run.snapshot.omitted.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),

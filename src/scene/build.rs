@@ -56,6 +56,7 @@ impl SceneBuilder {
         );
         let averages = TextureAverages::new(&self.textures, &self.materials);
         let surfaces = self.surfaces(&frame, &averages, options);
+        let told = self.source.up;
         let mut scene = Scene {
             name: self.source.name,
             files: self.source.files,
@@ -74,9 +75,14 @@ impl SceneBuilder {
             doubled_faces: self.doubled_faces,
             max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
+            up: options.up.unwrap_or_default(),
+            up_evidence: None,
             environment: Arc::default(),
             radiance_unit,
         };
+        if options.up.is_none() {
+            scene.find_up(told);
+        }
         if !scene.has_emitter() {
             scene.warnings.push(Warning {
                 kind: WarningKind::NoEmitter,

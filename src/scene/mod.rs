@@ -47,6 +47,7 @@ mod texture;
 mod texture_statement;
 mod triangulate;
 mod up_axis;
+mod upright;
 mod usable;
 mod warning;
 mod whole;
@@ -67,6 +68,7 @@ pub use relight::ActiveMaterials;
 pub use size_classes::SizeClasses;
 pub use texture::{OmittedTextures, Texture};
 pub use up_axis::UpAxis;
+pub use upright::UpEvidence;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
@@ -203,6 +205,10 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
+    /// Which axis points up: what the options say, else what is plain, else +Y.
+    pub up: UpAxis,
+    /// What shows that this axis points up; nothing where it was asked for or is the usual one.
+    pub up_evidence: Option<UpEvidence>,
     /// Light from outside; dark as a scene is read.
     pub environment: Arc<Environment>,
     /// Warnings: what was skipped, corrected or clamped.

@@ -1,6 +1,6 @@
 //! How a scene is read.
 
-use super::ranges::DEFAULT_MAX_REFLECTANCE;
+use super::{UpAxis, ranges::DEFAULT_MAX_REFLECTANCE};
 
 /// Which sides of a triangle reflect and emit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -23,6 +23,8 @@ pub struct SceneOptions {
     pub max_reflectance: f32,
     /// Whether `Kd` and `Ke` in the MTL file are sRGB-encoded. Textures of 8 bits always are.
     pub mtl_color_is_srgb: bool,
+    /// The axis that points up; `None` recognises it.
+    pub up: Option<UpAxis>,
 }
 
 impl Default for SceneOptions {
@@ -31,6 +33,7 @@ impl Default for SceneOptions {
             sides: Sides::Auto,
             max_reflectance: DEFAULT_MAX_REFLECTANCE,
             mtl_color_is_srgb: false,
+            up: None,
         }
     }
 }

@@ -257,7 +257,7 @@ fn is_grey(scene: &Scene) -> bool {
 pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
     let eye = scene.frame.from_world(builtin.viewpoint.position);
     let target = scene.frame.from_world(builtin.viewpoint.target);
-    Camera::looking(eye, target, Vec3::Y)
+    Camera::looking(eye, target, scene.up.vector())
 }
 
 /// Box around a scene in frame units.

@@ -160,6 +160,8 @@ impl App {
                 state.rig.current.orthographic = state.rig.target.orthographic;
             }
             Action::Up(up) => {
+                // It holds for the next file, too.
+                state.scene_options.up = Some(*up);
                 state.rig.target.up = up.vector();
                 state.rig.current.up = up.vector();
             }

@@ -8,7 +8,6 @@ use super::{
         loader::{LoadedScene, Loader, SceneSource},
         materials::Materials,
         messages::Severity,
-        options::CameraRequest,
         session,
         truth::Truth,
         view::ViewMode,
@@ -43,6 +42,10 @@ impl App {
         for warning in &loaded.scene.warnings {
             let text = wording::without_flags(&warning.to_string());
             self.state.messages.push(Severity::Warning, text);
+        }
+        if let Some(sentence) = loaded.scene.up_sentence() {
+            let text = wording::without_flags(&sentence);
+            self.state.messages.push(Severity::Note, text);
         }
         if let Some(path) = loaded.source.path() {
             self.state.recent.push(path);
@@ -89,14 +92,6 @@ impl App {
     fn open_view(&mut self, loaded: &LoadedScene) {
         let frame = &loaded.scene.frame;
         let mut camera = loaded.viewpoint;
-        if loaded.source.path().is_some() {
-            // The axis chosen before holds for the next file, too; built-in scenes know theirs.
-            let chosen = CameraRequest {
-                up: Some(self.state.rig.target.up),
-                ..CameraRequest::default()
-            };
-            camera = chosen.apply(camera, frame);
-        }
         match session::load(&loaded.source, frame) {
             Some(Ok(saved)) => {
                 camera = saved.camera.unwrap_or(camera);
