@@ -13,8 +13,9 @@ use crate::{
     solver::Snapshot,
     viewer::{
         CameraRequest,
+        first_look::first_look,
         headless::{self, Subject},
-        loader, opening,
+        loader,
         stderr::StderrCapture,
         view::{ClusterOverlay, ClusterRequest, ViewMode, ViewRequest, ViewSettings},
     },
@@ -170,12 +171,10 @@ impl PictureFlags {
             return Ok(());
         };
         let Size(size) = self.size;
+        let look = first_look(scene, &RayTree::new(scene));
         let opening = match builtin_name.and_then(builtin::find_builtin) {
             Some(found) => loader::builtin_camera(found, scene),
-            None => {
-                let (min, max) = loader::bounds(scene);
-                opening::deepest_view(scene, &RayTree::new(scene), min, max)
-            }
+            None => look.camera,
         };
         let camera = self.view.camera().apply(opening, &scene.frame);
         let view = self.view.request(run_flags).apply(&ViewSettings::default());

@@ -14,7 +14,10 @@ use std::{
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{camera::Camera, opening};
+use super::{
+    camera::Camera,
+    first_look::{Interior, first_look},
+};
 use crate::{
     geometry::RayTree,
     scene::{self, ReadProgress, Scene, SceneOptions, builtin},
@@ -66,10 +69,12 @@ pub struct LoadedScene {
     pub scene: Arc<Scene>,
     /// For picking, and for the reference.
     pub rays: Arc<RayTree>,
-    /// Lower corner in frame units.
+    /// Lower corner of what matters, in frame units.
     pub min: Vec3,
-    /// Upper corner in frame units.
+    /// Upper corner of what matters, in frame units.
     pub max: Vec3,
+    /// The room, where it is one.
+    pub interior: Option<Interior>,
     /// Triangles that emit.
     pub emitter_count: usize,
     /// Whether there are one-sided faces, whose backs can be shown or looked through.
@@ -226,11 +231,11 @@ fn load(
             (scene, Some(viewpoint))
         }
     };
-    let (min, max) = bounds(&scene);
     tracker.enter(Phase::BuildingRayTree);
     let rays = RayTree::new(&scene);
     tracker.enter(Phase::ChoosingView);
-    let viewpoint = viewpoint.unwrap_or_else(|| opening::deepest_view(&scene, &rays, min, max));
+    let look = first_look(&scene, &rays);
+    let [min, max] = look.bounds;
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
         emitter_count: scene.surfaces.iter().filter(emits).count(),
@@ -241,7 +246,8 @@ fn load(
         source,
         min,
         max,
-        viewpoint,
+        interior: look.interior,
+        viewpoint: viewpoint.unwrap_or(look.camera),
     })
 }
 
@@ -258,16 +264,6 @@ pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
     let eye = scene.frame.from_world(builtin.viewpoint.position);
     let target = scene.frame.from_world(builtin.viewpoint.target);
     Camera::looking(eye, target, scene.up.vector())
-}
-
-/// Box around a scene in frame units.
-pub fn bounds(scene: &Scene) -> (Vec3, Vec3) {
-    scene
-        .positions
-        .iter()
-        .fold((Vec3::MAX, Vec3::MIN), |(min, max), position| {
-            (min.min(*position), max.max(*position))
-        })
 }
 
 #[cfg(test)]
