@@ -16,7 +16,10 @@ use vecrad::{
         Environment, Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, UpAxis,
         builtin,
     },
-    viewer::first_look::{FirstLook, first_look},
+    viewer::{
+        first_look::{FirstLook, first_look},
+        view::{ViewMode, ViewSettings},
+    },
 };
 
 /// Walls of a reflectance, and a lamp.
@@ -182,6 +185,20 @@ fn far_things_do_not_move_the_camera_away() {
 }
 
 #[test]
+fn a_room_in_a_dome_that_glows_is_seen_from_inside() {
+    // Without the wall at high x, as with a large window.
+    let mut builder = room(|side| side != 1, true, false);
+    let glow = builder.push_material(Material::plain("sky", Vec3::ZERO, Vec3::ONE));
+    let far = DVec3::splat(60.0);
+    cuboid(&mut builder, -far, far, true, glow);
+    let scene = finished(builder, Sides::Auto);
+    let look = look(&scene);
+    let eye = eye(&scene, &look);
+    assert!(eye.abs().max_element() < 20.0, "{eye}");
+    assert!(lit_share(&scene, &look) > 0.5);
+}
+
+#[test]
 fn built_in_scenes_open_with_lit_surfaces() {
     for found in builtin::builtins() {
         if found.name == "room-1m" {
@@ -198,6 +215,44 @@ fn built_in_scenes_open_with_lit_surfaces() {
         let least = if is_room { 0.8 } else { 0.05 };
         let shown = lit_share(&scene, &look);
         assert!(shown > least, "{}: {shown}", found.name);
+    }
+}
+
+#[test]
+fn a_room_is_entered_where_its_wall_is() {
+    let scene = finished(room(|_| true, true, true), Sides::Two);
+    let room = look(&scene).interior.unwrap();
+    let scale = scene.frame.scale as f32;
+    let middle = scene.frame.from_world(DVec3::new(3.0, 1.5, 2.5));
+    let eye = middle + Vec3::new(10.0, 0.0, 0.0) * scale;
+    let entered = room.entered(eye, Vec3::NEG_X).unwrap() / scale;
+    // The wall stands 7 away, and lies before what is entered, so that it is not drawn.
+    assert!(entered > 7.0 && entered < 7.1, "{entered}");
+    assert_eq!(room.entered(middle, Vec3::NEG_X), Some(0.0));
+    assert_eq!(room.entered(eye, Vec3::X), None);
+}
+
+#[test]
+fn a_room_is_looked_into_from_outside_only() {
+    let scene = finished(room(|_| true, true, true), Sides::Two);
+    let look = look(&scene);
+    let room = look.interior.unwrap();
+    let view = ViewSettings::default();
+    assert!(!room.is_looked_into(&look.camera, &view));
+    let mut outside = look.camera;
+    outside.frame_box(look.bounds[0], look.bounds[1], 1.0);
+    assert!(room.is_looked_into(&outside, &view));
+    for shows_walls in [
+        ViewSettings {
+            see_through: false,
+            ..ViewSettings::default()
+        },
+        ViewSettings {
+            mode: ViewMode::FaceOrientation,
+            ..ViewSettings::default()
+        },
+    ] {
+        assert!(!room.is_looked_into(&outside, &shows_walls));
     }
 }
 

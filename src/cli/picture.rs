@@ -188,6 +188,7 @@ impl PictureFlags {
             scene,
             snapshot,
             errors,
+            interior: look.interior,
         };
         let encoded = {
             let _capture = StderrCapture::begin();

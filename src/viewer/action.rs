@@ -62,6 +62,10 @@ pub enum Action {
     ClusterLevelBy(i32),
     /// Backs of one-sided faces on or off.
     ToggleBacks,
+    /// Walls before the inside of a room drawn, or not.
+    ToggleSeeThrough,
+    /// The view that the scene opened with.
+    FirstLook,
     /// Show the whole scene.
     FrameAll,
     /// Show the selected object or cluster.

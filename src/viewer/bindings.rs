@@ -120,7 +120,12 @@ pub fn bindings() -> Vec<Binding> {
     let alt =
         |key, mode: ViewMode| bind(Modifiers::ALT, key, View, mode.label(), Action::Mode(mode));
     let mut all = vec![
-        plain(Key::Home, Camera, "Show the whole scene", Action::FrameAll),
+        plain(
+            Key::Home,
+            Camera,
+            "Back to the first view",
+            Action::FirstLook,
+        ),
         plain(Key::Enter, Camera, "Show the whole scene", Action::FrameAll),
         plain(Key::F, Camera, "Show the selection", Action::FrameSelected),
         plain(
@@ -183,6 +188,12 @@ pub fn bindings() -> Vec<Binding> {
         plain(Key::L, View, "Links of what is picked", Action::ToggleLinks),
         plain(Key::N, View, "Normals and back", Action::ToggleNormals),
         plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
+        plain(
+            Key::X,
+            View,
+            "See through walls from outside",
+            Action::ToggleSeeThrough,
+        ),
         plain(Key::Minus, View, "Darker by ½ EV", Action::ExposureBy(-0.5)),
         plain(
             Key::Equals,

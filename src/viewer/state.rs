@@ -11,6 +11,7 @@ use super::{
     loader::{LoadedScene, Loader},
     materials::Materials,
     messages::Messages,
+    options::CameraRequest,
     panel_state::PanelState,
     pick::{ObjectLight, Pick, Probe},
     run::Run,
@@ -106,6 +107,17 @@ impl State {
         }
     }
 
+    /// Go back to the view that the scene opened with, with the axis up that is up now.
+    pub fn look_first(&mut self) {
+        if let Some(loaded) = &self.loaded {
+            let upright = CameraRequest {
+                up: Some(self.rig.target.up),
+                ..CameraRequest::default()
+            };
+            self.rig.target = upright.apply(loaded.viewpoint, &loaded.scene.frame);
+        }
+    }
+
     /// A cluster was guessed from boxes around the picked point; once the solver has said which ones really hold it, take
     /// the one of those.
     pub fn correct_cluster(&mut self) {
@@ -161,6 +173,12 @@ impl State {
     /// Whether there are one-sided faces, whose backs can be shown.
     pub fn has_backs(&self) -> bool {
         self.loaded.as_ref().is_some_and(|loaded| loaded.has_backs)
+    }
+
+    /// Whether the scene is a room, whose walls can be looked through.
+    pub fn has_interior(&self) -> bool {
+        let loaded = self.loaded.as_ref();
+        loaded.is_some_and(|loaded| loaded.interior.is_some())
     }
 
     /// Whether there are emitters; of no scene nobody knows.

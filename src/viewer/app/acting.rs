@@ -153,6 +153,14 @@ impl App {
                 }
                 state.view.clusters.shown = true;
             }
+            Action::ToggleSeeThrough if state.has_interior() => {
+                state.view.see_through = !state.view.see_through;
+            }
+            Action::ToggleSeeThrough => {
+                let text = "there are no walls to see through: the scene is no room";
+                state.messages.push(Severity::Note, text);
+            }
+            Action::FirstLook => state.look_first(),
             Action::FrameAll => state.frame_all(),
             Action::LookFrom(view) => state.rig.target.look_from(*view),
             Action::ToggleProjection => {

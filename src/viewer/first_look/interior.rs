@@ -3,7 +3,13 @@
 use glam::Vec3;
 
 use super::even_direction;
-use crate::geometry::RayTree;
+use crate::{
+    geometry::RayTree,
+    viewer::{
+        camera::Camera,
+        view::{ViewMode, ViewSettings},
+    },
+};
 
 /// A box about the free space of a room, in frame units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,12 +21,12 @@ pub struct Interior {
 }
 
 /// Rays around a place. Fewer miss walls at the ends of long rooms.
-const DIRECTIONS: usize = 256;
+const DIRECTIONS: usize = 128;
 /// Share of them that must end on a surface: an open box ends five of six. Less, and a place between two houses is a room.
 const LEAST_SHARE: f32 = 0.6;
 /// Share of the rays on each side of an axis that go through windows and doors. Less, and what lies behind a window
 /// belongs to the room; more, and its own ends do not.
-const OUTSIDE: f32 = 0.03;
+const OUTSIDE: f32 = 0.02;
 /// The box ends this far before the walls, in frame units, so that these lie outside.
 const MARGIN: f32 = 0.2;
 
@@ -54,6 +60,13 @@ impl Interior {
     /// Whether a point lies in it.
     pub fn holds(&self, point: Vec3) -> bool {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
+    }
+
+    /// Whether it is looked into from outside, so that what stands before it is not drawn.
+    pub fn is_looked_into(&self, camera: &Camera, view: &ViewSettings) -> bool {
+        let shows_walls = !view.see_through || view.mode == ViewMode::FaceOrientation;
+        let is_outside = camera.orthographic || !self.holds(camera.eye());
+        is_outside && !shows_walls
     }
 
     /// How far along a ray of unit direction it is entered: 0 from inside; `None` where it is passed by.

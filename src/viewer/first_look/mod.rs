@@ -18,7 +18,7 @@ pub use interior::Interior;
 use super::camera::Camera;
 use crate::{
     geometry::{Random, RayTree, cosine_direction},
-    scene::{Frame, Scene},
+    scene::{Frame, Scene, TriangleId},
 };
 use spots::{Spot, Spots};
 
@@ -44,8 +44,8 @@ const INNER_PITCHES: [f32; 2] = [0.0, 0.15];
 const PLACES: usize = 24;
 /// Cameras that are judged in full, after all were judged by a part of the spots.
 const FINALISTS: usize = 24;
-/// That part: each such spot.
-const STRIDE: usize = 4;
+/// That part: each such spot. Odd, since fronts and backs take turns.
+const STRIDE: usize = 5;
 /// Width over height of the pictures that are judged.
 const ASPECT: f32 = 1.5;
 /// Cameras around the scene show all of it in pictures that are narrower yet: windows differ.
@@ -75,7 +75,8 @@ pub fn first_look(scene: &Scene, rays: &RayTree) -> FirstLook {
     let outer = judge.outer();
     let usual = outer[0].camera;
     let mut candidates = outer;
-    candidates.extend(judge.inner());
+    let places = judge.free_places();
+    candidates.extend(judge.inner(&places, usual.distance));
     let mut ranked = judge.rank(candidates, STRIDE, Judge::seen);
     ranked.truncate(FINALISTS);
     let ranked = judge.rank(ranked, 1, Judge::worth);
@@ -88,29 +89,40 @@ pub fn first_look(scene: &Scene, rays: &RayTree) -> FirstLook {
     };
     FirstLook {
         camera: best.camera,
-        interior: judge.interior(best),
+        interior: judge.interior(best, &places),
         bounds,
     }
 }
 
-/// Box about the corners near the origin, where what matters lies: see [`Frame`]. In most scenes that is all.
+/// Box about the faces near the origin, where what matters lies: see [`Frame`]. Lamps are left out where there is anything
+/// else: a dome that stands for the sky is as far away as it likes. In most scenes that is all.
 fn bounds(scene: &Scene) -> [Vec3; 2] {
     let reach = Frame::EXTENT as f32;
-    let near = |corner: &Vec3| corner.abs().max_element() <= reach;
-    let around = |corners: &mut dyn Iterator<Item = Vec3>| {
-        corners.fold([Vec3::MAX, Vec3::MIN], |[min, max], corner| {
-            [min.min(corner), max.max(corner)]
-        })
+    let around = |shows: &(dyn Fn(TriangleId, Vec3) -> bool + Sync)| {
+        let empty = || [Vec3::MAX, Vec3::MIN];
+        (0..scene.triangles.len())
+            .into_par_iter()
+            .fold(empty, |[min, max], index| {
+                let id = TriangleId(index as u32);
+                let [a, b, c] = scene.corners(id);
+                let [low, high] = [a.min(b).min(c), a.max(b).max(c)];
+                match shows(id, low.abs().max(high.abs())) {
+                    true => [min.min(low), max.max(high)],
+                    false => [min, max],
+                }
+            })
+            .reduce(empty, |a, b| [a[0].min(b[0]), a[1].max(b[1])])
     };
-    let whole = scene.triangle_ids().map(|id| scene.corners(id));
-    let whole = whole.filter(|corners| corners.iter().all(near));
-    let [min, max] = around(&mut whole.flatten());
-    if min.cmple(max).all() && (max - min).max_element() > 0.0 {
-        return [min, max];
-    }
+    let is_near = |farthest: Vec3| farthest.max_element() <= reach;
+    let emits = |id: TriangleId| scene.surfaces[id.index()].emission != Vec3::ZERO;
+    let is_some = |[min, max]: &[Vec3; 2]| (*max - *min).max_element() > 0.0;
     let half = Vec3::splat(0.5 * reach);
-    let all = scene.positions.iter();
-    around(&mut all.map(|corner| corner.clamp(-half, half)))
+    let found = [
+        around(&|id, farthest| is_near(farthest) && !emits(id)),
+        around(&|_, farthest| is_near(farthest)),
+    ];
+    let all = || around(&|_, _| true).map(|corner| corner.clamp(-half, half));
+    found.into_iter().find(is_some).unwrap_or_else(all)
 }
 
 /// A camera to be judged.
@@ -166,12 +178,7 @@ impl Judge<'_> {
     }
 
     /// Cameras in the free space that surfaces look into.
-    fn inner(&self) -> Vec<Candidate> {
-        let places: Vec<Vec3> = (0..8 * PLACES)
-            .into_par_iter()
-            .filter_map(|index| self.free_place(index))
-            .collect();
-        let places = &places[..places.len().min(PLACES)];
+    fn inner(&self, places: &[Vec3], farthest: f32) -> Vec<Candidate> {
         let directions = INNER_PITCHES
             .into_iter()
             .flat_map(|pitch| (0..YAWS).map(move |step| (step as f32 / YAWS as f32 * TAU, pitch)));
@@ -179,10 +186,20 @@ impl Judge<'_> {
         places
             .par_iter()
             .flat_map_iter(|&place| {
-                let of = move |&(yaw, pitch)| self.standing_back(place, yaw, pitch);
+                let of = move |&(yaw, pitch)| self.standing_back(place, yaw, pitch, farthest);
                 directions.iter().filter_map(of)
             })
             .collect()
+    }
+
+    /// Places in that free space.
+    fn free_places(&self) -> Vec<Vec3> {
+        let mut places: Vec<Vec3> = (0..8 * PLACES)
+            .into_par_iter()
+            .filter_map(|index| self.free_place(index))
+            .collect();
+        places.truncate(PLACES);
+        places
     }
 
     /// A place between a spot and what it looks at, at the height of an eye.
@@ -204,8 +221,8 @@ impl Judge<'_> {
         (height > 2.0 * TOO_NEAR).then(|| place + self.up * (EYE_HEIGHT * height - below))
     }
 
-    /// A camera that looks from a place, as far behind it as there is room.
-    fn standing_back(&self, place: Vec3, yaw: f32, pitch: f32) -> Option<Candidate> {
+    /// A camera that looks from a place, as far behind it as there is room, and as is needed to see all.
+    fn standing_back(&self, place: Vec3, yaw: f32, pitch: f32, farthest: f32) -> Option<Candidate> {
         let mut camera = Camera {
             up: self.up,
             pivot: place,
@@ -216,6 +233,7 @@ impl Judge<'_> {
         let backward = camera.backward();
         let (behind, _) = self.meets_from(place, backward)?;
         let eye = place + backward * (STEP_BACK * behind).min(behind - TOO_NEAR).max(0.0);
+        let eye = place + (eye - place).clamp_length_max(farthest);
         let (ahead, _) = self.meets_from(eye, -backward)?;
         camera.distance = (0.5 * ahead).max(TOO_NEAR);
         camera.pivot = eye - backward * camera.distance;
@@ -300,26 +318,34 @@ impl Judge<'_> {
         spot.weight * (2.0 * slant).min(1.0)
     }
 
-    /// The part of a picture that shows surfaces from their lit side, not too near.
+    /// The part of a picture that shows surfaces from their lit side, of what matters and not too near.
     fn filled(&self, camera: &Camera) -> f32 {
         let [across, down] = RAYS;
+        let [min, max] = [self.bounds[0] - TOO_NEAR, self.bounds[1] + TOO_NEAR];
         let place = |index: usize, count: usize| (index as f32 + 0.5) / count as f32 * 2.0 - 1.0;
         let mut shown = 0;
         for ray in 0..across * down {
             let ndc = Vec2::new(place(ray % across, across), place(ray / across, down));
             let (origin, direction) = camera.ray(ndc, ASPECT);
-            let met = self.meets_from(origin, direction);
-            shown +=
-                usize::from(met.is_some_and(|(distance, is_lit)| is_lit && distance > TOO_NEAR));
+            let shows = |(distance, is_lit): (f32, bool)| {
+                let point = origin + direction * distance;
+                let is_near = point.cmpge(min).all() && point.cmple(max).all();
+                is_lit && is_near && distance > TOO_NEAR
+            };
+            shown += usize::from(self.meets_from(origin, direction).is_some_and(shows));
         }
         shown as f32 / (across * down) as f32
     }
 
     /// The room that a camera shows: about the place that it was found from, or, of one around the scene that looks
     /// into it, about the middle.
-    fn interior(&self, best: &Candidate) -> Option<Interior> {
+    fn interior(&self, best: &Candidate, places: &[Vec3]) -> Option<Interior> {
         if let Some(place) = best.place {
-            return Interior::about(self.rays, &[place, best.camera.eye()]);
+            // Long rooms show their ends from other places in them.
+            let is_in_sight = |&&other: &&Vec3| !self.rays.occluded(place, other, [None; 2]);
+            let mut places: Vec<Vec3> = places.iter().filter(is_in_sight).copied().collect();
+            places.push(best.camera.eye());
+            return Interior::about(self.rays, &places);
         }
         let [min, max] = self.bounds;
         let middle = 0.5 * (min + max);

@@ -56,31 +56,43 @@ impl Spots {
     }
 }
 
-/// Numbered triangles, by area and by the root of the area, of those near the origin where there are any.
-fn chosen(scene: &Scene) -> Vec<(u32, TriangleId)> {
-    let reach = Frame::EXTENT as f32;
-    let longest = |corners: [Vec3; 3]| {
-        let [a, b, c] = corners;
+/// How far a face lies from the middle of what matters at most, in frame units, where others lie nearer.
+const REACH: f32 = Frame::EXTENT as f32;
+
+/// How much the area of each triangle counts: that of lamps, of black surfaces and of far ones not at all, and that of huge
+/// ones in part. Where nothing else is left, all counts.
+fn counted_areas(scene: &Scene) -> Vec<f64> {
+    let of_face = |index: usize| {
+        let [a, b, c] = scene.corners(TriangleId(index as u32));
         let squares = [a - b, b - c, c - a].map(Vec3::length_squared);
-        f64::from(squares.into_iter().fold(0.0, f32::max))
-    };
-    let area = |id: TriangleId| f64::from(scene.surfaces[id.index()].area_vector.length());
-    let sizes = scene
-        .triangle_ids()
-        .map(|id| (longest(scene.corners(id)), area(id)));
-    let classes = SizeClasses::new(sizes);
-    let counted = |id: TriangleId| {
-        let corners = scene.corners(id);
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let is_near = middle.abs().max_element() <= reach;
-        let share = if is_near {
-            classes.share(longest(corners))
+        let longest = f64::from(squares.into_iter().fold(0.0, f32::max));
+        let surface = &scene.surfaces[index];
+        let is_near = ((a + b + c) / 3.0).abs().max_element() <= REACH;
+        let shows = surface.emission == Vec3::ZERO && is_near;
+        let brightness = if shows {
+            (10.0 * luminance(surface.reflectance)).min(1.0)
         } else {
             0.0
         };
-        area(id) * share
+        let area = f64::from(surface.area_vector.length());
+        (longest, area, f64::from(brightness))
     };
-    let counted: Vec<f64> = scene.triangle_ids().map(counted).collect();
+    let count = scene.triangles.len();
+    let faces: Vec<(f64, f64, f64)> = (0..count).into_par_iter().map(of_face).collect();
+    let shown = faces.iter().filter(|(.., brightness)| *brightness > 0.0);
+    let classes = SizeClasses::new(shown.map(|&(longest, area, _)| (longest, area)));
+    if classes.area == 0.0 {
+        return faces.into_iter().map(|(_, area, _)| area).collect();
+    }
+    let counted = faces.into_par_iter();
+    counted
+        .map(|(longest, area, brightness)| area * brightness * classes.share(longest))
+        .collect()
+}
+
+/// Numbered triangles, by area and by the root of the area.
+fn chosen(scene: &Scene) -> Vec<(u32, TriangleId)> {
+    let counted = counted_areas(scene);
     let by_area = stratified(&counted, |area| area);
     let by_root = stratified(&counted, f64::sqrt);
     (0..).zip(by_area.chain(by_root)).collect()

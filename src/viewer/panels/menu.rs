@@ -130,6 +130,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     ui.separator();
     let view = &state.view;
     let has_backs = state.has_backs() && view.mode != ViewMode::FaceOrientation;
+    let has_interior = state.has_interior();
     let toggles = [
         (
             "Element mesh over the light",
@@ -144,6 +145,11 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         ),
         ("Backs of faces", view.backs, Action::ToggleBacks),
         (
+            "See through walls from outside",
+            view.see_through,
+            Action::ToggleSeeThrough,
+        ),
+        (
             "Automatic exposure",
             view.auto_exposure,
             Action::AutoExposure,
@@ -155,7 +161,12 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         ),
     ];
     for (label, is_on, action) in toggles {
-        if has_backs || action != Action::ToggleBacks {
+        let is_offered = match action {
+            Action::ToggleBacks => has_backs,
+            Action::ToggleSeeThrough => has_interior,
+            _ => true,
+        };
+        if is_offered {
             toggle(ui, table, actions, label, is_on, action);
         }
     }
@@ -206,6 +217,13 @@ fn theme_menu(ui: &mut egui::Ui) {
 }
 
 fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
+    item(
+        ui,
+        table,
+        actions,
+        "Back to the first view",
+        Action::FirstLook,
+    );
     item(ui, table, actions, "Show the whole scene", Action::FrameAll);
     item(
         ui,
