@@ -113,7 +113,7 @@ fn a_closed_room_is_seen_from_inside_whatever_its_sides() {
         let look = look(&scene);
         let eye = eye(&scene, &look);
         assert!(is_in_room(eye), "{is_inward} {sides:?}: {eye}");
-        assert!(lit_share(&scene, &look) > 0.95);
+        assert!(look.is_lit && lit_share(&scene, &look) > 0.95);
         assert!(
             look.interior
                 .is_some_and(|room| room.holds(look.camera.eye()))
@@ -125,8 +125,10 @@ fn a_closed_room_is_seen_from_inside_whatever_its_sides() {
 fn a_room_without_a_lamp_is_seen_from_inside() {
     for sides in [Sides::One, Sides::Auto] {
         let scene = finished(room(|_| true, true, false), sides);
-        let eye = eye(&scene, &look(&scene));
+        let look = look(&scene);
+        let eye = eye(&scene, &look);
         assert!(is_in_room(eye), "{sides:?}: {eye}");
+        assert!(!look.is_lit, "no sky reaches it");
     }
 }
 

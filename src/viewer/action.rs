@@ -38,6 +38,10 @@ pub enum Action {
     Options(RunOptions),
     /// Light the scene with other lights and materials.
     Relight(Materials),
+    /// Lights and materials as before the last change.
+    Undo,
+    /// Lights and materials as before that was undone.
+    Redo,
     /// Read the scene again with other sidedness.
     Sides(Sides),
     /// Show something else.

@@ -73,6 +73,8 @@ pub struct LoadedScene {
     pub min: Vec3,
     /// Upper corner of what matters, in frame units.
     pub max: Vec3,
+    /// Whether light reaches what is seen first.
+    pub is_lit: bool,
     /// The room, where it is one.
     pub interior: Option<Interior>,
     /// Triangles that emit.
@@ -246,6 +248,7 @@ fn load(
         source,
         min,
         max,
+        is_lit: look.is_lit,
         interior: look.interior,
         viewpoint: viewpoint.unwrap_or(look.camera),
     })

@@ -9,7 +9,7 @@ use super::{
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
-    materials::Materials,
+    materials::{History, Materials},
     messages::Messages,
     options::CameraRequest,
     panel_state::PanelState,
@@ -58,6 +58,8 @@ pub struct State {
     pub scene_options: SceneOptions,
     /// Its lights and materials, as they were changed.
     pub materials: Materials,
+    /// How they were before and after changes.
+    pub history: History,
     /// How the light is shown.
     pub view: ViewSettings,
     /// The view mode before the key for normals was pressed.

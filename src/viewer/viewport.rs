@@ -167,8 +167,9 @@ impl Viewport {
         let gpu = self.renderer.gpu().clone();
         let is_first = state.exposure.target.is_none();
         // Lights that are dimmed would look as bright as before.
-        let is_due =
-            key.view.mode.is_light() && key.staged.is_lit && !state.materials.are_changed();
+        let is_due = key.view.mode.is_light()
+            && key.staged.is_lit
+            && (is_first || !state.materials.are_changed());
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
             let last = self.metered.as_ref();

@@ -1,5 +1,7 @@
 //! Actions carried out.
 
+use std::time::Instant;
+
 use eframe::egui;
 
 use super::{
@@ -45,7 +47,22 @@ impl App {
                 self.state.options = options.clone();
                 self.worker.change_options(options);
             }
-            Action::Relight(materials) => self.relight(materials),
+            Action::Relight(materials) => {
+                let before = self.state.materials.clone();
+                self.state.history.note(before, Instant::now());
+                self.relight(materials);
+            }
+            Action::Undo | Action::Redo => {
+                let now = self.state.materials.clone();
+                let history = &mut self.state.history;
+                let other = match action {
+                    Action::Undo => history.undo(now),
+                    _ => history.redo(now),
+                };
+                if let Some(materials) = other {
+                    self.relight(materials);
+                }
+            }
             Action::Sides(sides) => {
                 self.state.scene_options.sides = sides;
                 self.reload();
@@ -251,7 +268,7 @@ impl App {
     }
 
     /// Light the scene with other lights and materials. A reference was traced with those before.
-    fn relight(&mut self, materials: Materials) {
+    pub(super) fn relight(&mut self, materials: Materials) {
         let Some(loaded) = &self.state.loaded else {
             return;
         };

@@ -126,6 +126,7 @@ impl App {
             camera: Some(self.state.rig.target),
             view: self.state.view.clone(),
             settings: self.state.settings.clone(),
+            materials: self.state.materials.changes(),
         };
         match session::save(&loaded.source, &saved, &loaded.scene.frame) {
             Ok(path) => self

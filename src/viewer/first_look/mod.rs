@@ -29,6 +29,8 @@ pub struct FirstLook {
     pub camera: Camera,
     /// The room that it shows, where it shows one.
     pub interior: Option<Interior>,
+    /// Whether light reaches anything that it shows.
+    pub is_lit: bool,
     /// Box about what matters, in frame units: lower and upper corner.
     pub bounds: [Vec3; 2],
 }
@@ -84,12 +86,14 @@ pub fn first_look(scene: &Scene, rays: &RayTree) -> FirstLook {
         return FirstLook {
             camera: usual,
             interior: None,
+            is_lit: false,
             bounds,
         };
     };
     FirstLook {
         camera: best.camera,
         interior: judge.interior(best, &places),
+        is_lit: judge.shows_light(&best.camera),
         bounds,
     }
 }
@@ -316,6 +320,12 @@ impl Judge<'_> {
             return 0.0;
         }
         spot.weight * (2.0 * slant).min(1.0)
+    }
+
+    /// Whether a camera sees a spot that is lit.
+    fn shows_light(&self, camera: &Camera) -> bool {
+        let mut lit = self.spots.all.iter().filter(|spot| spot.is_lit);
+        lit.any(|spot| self.view_of(camera, spot) > 0.0)
     }
 
     /// The part of a picture that shows surfaces from their lit side, of what matters and not too near.

@@ -19,6 +19,8 @@ pub(super) struct Spot {
     pub(super) triangle: TriangleId,
     /// How much it counts: all, where light reaches it on every path.
     pub(super) weight: f32,
+    /// Whether light reaches it at all.
+    pub(super) is_lit: bool,
 }
 
 /// Places chosen by area, and as many by its root: large walls and fine details both count.
@@ -50,6 +52,7 @@ impl Spots {
                 lights.reach(scene, rays, spot, &mut random)
             });
             let lit = paths.count() as f32 / PATHS as f32;
+            spot.is_lit = lit > 0.0;
             spot.weight = UNLIT + (1.0 - UNLIT) * (3.0 * lit).min(1.0);
         });
         Self { all }
@@ -137,6 +140,7 @@ fn sides(scene: &Scene, triangle: TriangleId, index: u32) -> impl Iterator<Item 
             normal,
             triangle,
             weight: 1.0,
+            is_lit: false,
         })
 }
 
@@ -196,6 +200,7 @@ impl Lights {
                 },
                 triangle: hit.triangle,
                 weight: 1.0,
+                is_lit: false,
             };
         }
         false
