@@ -103,6 +103,8 @@ pub enum Action {
     MeshDialog,
     /// Write the lit mesh; the ending names the format.
     SaveMesh(PathBuf),
+    /// Write lights and materials as an MTL file beside the scene.
+    SaveMaterials,
     /// Write settings and camera beside the scene.
     SaveSidecar,
     /// Panels on or off.

@@ -350,6 +350,11 @@ impl History {
         self.past.push(before);
     }
 
+    /// Whether there is a change to undo.
+    pub fn can_undo(&self) -> bool {
+        !self.past.is_empty()
+    }
+
     /// The materials before the last change, given those of now.
     pub fn undo(&mut self, now: Materials) -> Option<Materials> {
         let before = self.past.pop()?;

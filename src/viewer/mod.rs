@@ -24,6 +24,7 @@ pub mod light_range;
 mod line_cache;
 pub mod links;
 pub mod loader;
+pub mod material_file;
 pub mod materials;
 pub mod messages;
 pub mod navigation;

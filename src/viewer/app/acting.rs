@@ -96,6 +96,7 @@ impl App {
             } => self.save_picture(path, size, is_transparent),
             Action::MeshDialog => self.ask_for_mesh(),
             Action::SaveMesh(path) => self.save_mesh(path),
+            Action::SaveMaterials => self.save_materials(),
             Action::SaveSidecar => self.save_sidecar(),
             Action::ToggleFullScreen => {
                 let is_full = ctx.input(|input| input.viewport().fullscreen.unwrap_or(false));

@@ -35,6 +35,11 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
         if reset.on_hover_text("All as in the file").clicked() {
             materials.reset();
         }
+        let undo = egui::Button::new("Undo");
+        let undo = ui.add_enabled(state.history.can_undo(), undo);
+        if undo.on_hover_text("As before the last change (Ctrl+Z)").clicked() {
+            actions.push(Action::Undo);
+        }
         if let Some(secs) = state.run.relit_secs {
             ui.weak(format!("Relit in {}", seconds(secs)))
                 .on_hover_text(

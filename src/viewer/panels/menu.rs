@@ -91,6 +91,13 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
         "Save camera and settings",
         Action::SaveSidecar,
     );
+    item(
+        ui,
+        table,
+        actions,
+        "Save material file",
+        Action::SaveMaterials,
+    );
     ui.add_enabled_ui(state.run.snapshot.is_some(), |ui| {
         item(ui, table, actions, "Export lit mesh…", Action::MeshDialog);
     });
