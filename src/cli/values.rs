@@ -59,6 +59,7 @@ values!(Omission {
     Rays = "rays", "Rays where nothing can block them";
     Elements = "elements", "Elements where light varies little and nothing casts a shadow";
     Clusters = "clusters", "Links of clusters where nothing casts a shadow and there are few patches";
+    Outside = "outside", "The sky and the sun where no surface sees them";
 });
 
 /// The name of a value on the command line.

@@ -113,12 +113,19 @@ impl RayTree {
         if self.is_clear() || length <= 2.0 * RAY_OFFSET {
             return false;
         }
-        let ray = Ray::new(
-            from.into(),
-            (separation / length).into(),
-            RAY_OFFSET,
-            length - RAY_OFFSET,
-        );
+        let until = length - RAY_OFFSET;
+        let ray = Ray::new(from.into(), (separation / length).into(), RAY_OFFSET, until);
+        self.is_blocked(ray, ends)
+    }
+
+    /// Whether a ray of unit direction meets nothing but the triangle that it starts on.
+    pub fn leaves(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> bool {
+        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        self.is_clear() || !self.is_blocked(ray, [from, None])
+    }
+
+    /// Whether a ray meets anything but two triangles.
+    fn is_blocked(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> bool {
         let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
         !self.tree.ray_traverse_miss(ray, |ray, primitive| {
             let distance = self.triangles[primitive].intersect(ray);

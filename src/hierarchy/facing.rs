@@ -204,6 +204,14 @@ impl PatchTree {
         !(0..count).into_par_iter().any(blocks)
     }
 
+    /// Whether nothing rises before the plane of any active patch, so that each sees half of the sky. Patches must be
+    /// active on one side of each triangle at least.
+    pub fn is_open(&self, scene: &Scene) -> bool {
+        let patches = &self.patches[self.active_patches()];
+        let is_covered = |patch: &Patch| self.rises(scene, Plane::of(scene, patch));
+        !patches.par_iter().any(is_covered)
+    }
+
     /// Whether any active patch has a part before a plane.
     fn rises(&self, scene: &Scene, plane: Plane) -> bool {
         let mut pending = vec![0usize];

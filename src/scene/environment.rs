@@ -12,6 +12,10 @@ use super::{
     ranges::{MAX_EMISSION, limited_emission},
 };
 
+/// Most parts of a picture of the sky: a pixel is then a third of a degree wide, less than the sun. More take time;
+/// fewer blur the sun of pictures.
+const MOST_SAMPLES: usize = 1 << 20;
+
 /// Light from outside the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Environment {
@@ -56,6 +60,17 @@ pub struct Sun {
     pub irradiance: Vec3,
     /// Angular diameter, radians; above 0 and below π.
     pub diameter: f32,
+}
+
+/// Radiance of a small part of the sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkySample {
+    /// Unit vector towards it.
+    pub direction: Vec3,
+    /// Its mean radiance.
+    pub radiance: Vec3,
+    /// Its size, steradians; those of all parts add to 4π.
+    pub solid_angle: f32,
 }
 
 impl Environment {
@@ -138,6 +153,38 @@ impl SkyPicture {
         let half = 0.5 / self.picture.height as f32;
         let at = Vec2::new(across, 1.0 - down.clamp(half, 1.0 - half));
         self.picture.sample(at) * self.scale
+    }
+
+    /// The sky in parts: one for each pixel, or several if there would be fewer than `least`; large pictures are
+    /// averaged down.
+    pub fn samples(&self, least: usize) -> Vec<SkySample> {
+        let reduced = match self.picture.pixels.len() > MOST_SAMPLES {
+            true => Arc::new((*self.picture).clone().reduced_to(MOST_SAMPLES)),
+            false => self.picture.clone(),
+        };
+        let parts = (least as f64 / reduced.pixels.len() as f64).sqrt().ceil() as u32;
+        let [columns, rows] = [reduced.width, reduced.height].map(|side| side * parts.max(1));
+        let to_scene = self.from_scene.transpose();
+        let mut samples = Vec::with_capacity(columns as usize * rows as usize);
+        for row in 0..rows {
+            let angle = |line: f64| line / f64::from(rows) * std::f64::consts::PI;
+            let [above, middle, below] = [0.0, 0.5, 1.0].map(|part| angle(f64::from(row) + part));
+            let solid_angle = (above.cos() - below.cos()) * std::f64::consts::TAU;
+            for column in 0..columns {
+                let across = (f64::from(column) + 0.5) / f64::from(columns);
+                let (sin, cos) = (across * std::f64::consts::TAU).sin_cos();
+                let direction = [sin * middle.sin(), middle.cos(), -cos * middle.sin()];
+                let half = 0.5 / reduced.height as f64;
+                let down = middle / std::f64::consts::PI;
+                let at = [across, 1.0 - down.clamp(half, 1.0 - half)].map(|x| x as f32);
+                samples.push(SkySample {
+                    direction: to_scene * Vec3::from_array(direction.map(|x| x as f32)),
+                    radiance: reduced.sample(Vec2::from_array(at)) * self.scale,
+                    solid_angle: (solid_angle / f64::from(columns)) as f32,
+                });
+            }
+        }
+        samples
     }
 }
 

@@ -57,7 +57,7 @@ pub use appearance::Appearance;
 pub use builder::{BuildError, Face, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
-pub use environment::{Environment, Sky, SkyPicture, Sun};
+pub use environment::{Environment, Sky, SkyPicture, SkySample, Sun};
 pub use frame::Frame;
 pub use means::TextureMeans;
 pub use obj::{read_obj, read_obj_with_progress};

@@ -3,7 +3,7 @@
 //! It is read before links are made and elements divided, so that the limit is never exceeded and results stay whole.
 
 use super::{
-    direct::{DirectField, Surfaces},
+    direct::Surfaces,
     iteration::{LinkedLight, iteration_bytes},
 };
 use crate::transport::Link;
@@ -34,7 +34,7 @@ impl Budget {
     /// Bytes in use in all.
     pub(super) fn used_bytes(&self, surfaces: Surfaces<'_>, linked: &LinkedLight) -> u64 {
         let own = surfaces.hierarchy.memory_bytes()
-            + surfaces.direct.map_or(0, DirectField::memory_bytes)
+            + surfaces.direct.memory_bytes()
             + linked.memory_bytes();
         self.others + own as u64
     }

@@ -14,11 +14,19 @@ pub enum Omission {
     Elements,
     /// Clusters, where there are few patches and nothing can occlude.
     Clusters,
+    /// The sky and the sun, where no surface sees them.
+    Outside,
 }
 
 impl Omission {
     /// All omissions, in the order of the plan.
-    pub const ALL: [Self; 4] = [Self::Unlit, Self::Rays, Self::Elements, Self::Clusters];
+    pub const ALL: [Self; 5] = [
+        Self::Unlit,
+        Self::Rays,
+        Self::Elements,
+        Self::Clusters,
+        Self::Outside,
+    ];
 
     /// The name in flags and reports.
     pub const fn name(self) -> &'static str {
@@ -27,6 +35,7 @@ impl Omission {
             Self::Rays => "rays",
             Self::Elements => "elements",
             Self::Clusters => "clusters",
+            Self::Outside => "outside",
         }
     }
 }

@@ -10,8 +10,10 @@
 //! | `rays` | the ray tree and all rays | no triangle has parts of the scene on both sides | none: no ray would be occluded |
 //! | `elements` | elements, links | as `rays`: light has no shadows, so its interpolation error is known | within the tolerances |
 //! | `clusters` | links of clusters | as `rays`, and few patches: all pairs of them are exact and cheap | within the tolerances |
+//! | `outside` | the sky and the sun | none of many rays from all surfaces leaves the scene | what comes through a gap that these rays miss |
 //!
-//! The last two apply to the default method and oracle only, since the others are chosen to be studied.
+//! `elements` and `clusters` apply to the default method and oracle only, since the others are chosen to be studied.
+//! Under a sky or a sun all patches count as lit, and what stands before any patch occludes.
 //!
 //! Considered and not omitted, since the gain is small: rays of single pairs whose shaft is empty, clusters of small
 //! scenes with shadows, and
@@ -28,11 +30,18 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::Omitted};
 use crate::{
+    geometry::{Random, RayTree, cosine_direction, triangle_point},
     hierarchy::{Hierarchy, Patch, PatchTree, SheetSides},
     scene::{ActiveMaterials, Scene},
 };
+
+/// Rays that are to find a gap through which a surface sees the sky. Fewer, and the sky is omitted behind small windows;
+/// more take time in closed rooms.
+const OUTSIDE_RAYS: u32 = 65_536;
 
 /// Most patches of a scene that is solved without clusters: their pairs are fewer than the links of usual scenes.
 /// Smaller, and rooms with openings probe their coverage by rays, which at 160 patches takes a sixth more time and has
@@ -61,6 +70,8 @@ pub(super) struct Plan {
     pub(super) follows_light: bool,
     /// Only elements are linked.
     pub(super) is_by_patch: bool,
+    /// The sky or the sun gives light, and some surface sees it.
+    pub(super) sees_outside: bool,
     /// Materials that count as emitting or reflecting, beside those that do.
     active: ActiveMaterials,
     /// The list of omissions.
@@ -83,10 +94,16 @@ impl Plan {
             ..Self::default()
         };
         let mut tree = PatchTree::build(scene, sheets, cancelled)?;
-        if may_omit(Omission::Unlit) {
+        let is_dark_outside = scene.environment.is_dark();
+        if may_omit(Omission::Unlit) && is_dark_outside {
             tree = plan.omit_unlit(scene, sheets, tree, cancelled)?;
         }
-        if may_omit(Omission::Rays) && tree.is_clear(scene) {
+        let is_clear = || {
+            let is_clear_outside =
+                is_dark_outside || tree.is_enclosed(scene) || tree.is_open(scene);
+            is_clear_outside && tree.is_clear(scene)
+        };
+        if may_omit(Omission::Rays) && is_clear() {
             // The paper's methods are chosen to be studied, so nothing of them is omitted.
             let is_exact_wanted =
                 settings.oracle == Oracle::Interval && settings.method == Method::Bounded;
@@ -99,6 +116,43 @@ impl Plan {
         }
         Arc::make_mut(&mut plan.omitted).extend(omitted_by_loading(scene));
         Some((plan, tree))
+    }
+
+    /// Find whether any surface sees the sky or the sun, by rays where there is an occluder. Returns the rays shot.
+    pub(super) fn probe_outside(
+        &mut self,
+        scene: &Scene,
+        hierarchy: &Hierarchy,
+        rays: &RayTree,
+        settings: &SolveSettings,
+    ) -> u64 {
+        if scene.environment.is_dark() {
+            return 0;
+        }
+        if settings.keep.has(Omission::Outside) || hierarchy.active_patches().is_empty() {
+            self.sees_outside = true;
+            return 0;
+        }
+        if self.is_clear {
+            self.sees_outside = !self.is_enclosed;
+        } else {
+            self.sees_outside = sees_outside(scene, hierarchy, rays, settings.seed);
+        }
+        if !self.sees_outside {
+            self.note(
+                Omission::Outside,
+                1,
+                "the sky and the sun".to_owned(),
+                "no ray from any surface leaves the scene",
+                "what comes through a gap that one ray in 65,536 does not find",
+            );
+        }
+        // Where a surface sees the outside, the first rays tell so.
+        if self.is_clear || self.sees_outside {
+            0
+        } else {
+            u64::from(OUTSIDE_RAYS)
+        }
     }
 
     /// Deactivate the patches that no light can reach. Returns the tree without them; `None` when cancelled.
@@ -225,6 +279,31 @@ impl Plan {
             bound,
         });
     }
+}
+
+/// Whether any of many cosine-weighted rays from all surfaces leaves the scene.
+fn sees_outside(scene: &Scene, hierarchy: &Hierarchy, rays: &RayTree, seed: u64) -> bool {
+    // Rays by area: of a patch all that fall between the area before it and after it.
+    let patches = &hierarchy.patches[hierarchy.active_patches()];
+    let mut until = Vec::with_capacity(patches.len());
+    let mut area = 0.0;
+    for patch in patches {
+        area += f64::from(patch.area);
+        until.push(area);
+    }
+    (0..OUTSIDE_RAYS).into_par_iter().any(|ray| {
+        let at = (f64::from(ray) + 0.5) / f64::from(OUTSIDE_RAYS) * area;
+        let patch = until
+            .partition_point(|&until| until <= at)
+            .min(patches.len() - 1);
+        let patch = &patches[patch];
+        let mut random = Random::new(seed, u64::from(ray));
+        let [a, b, c] = scene.corners(patch.triangle);
+        let place = triangle_point(random.uniform_2d());
+        let point = a * place.x + b * place.y + c * place.z;
+        let direction = cosine_direction(patch.normal, random.uniform_2d());
+        rays.leaves(point, direction, Some(patch.triangle))
+    })
 }
 
 /// The parts that loading omitted already.

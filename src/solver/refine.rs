@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{
     Cancel, Oracle, SolveSettings,
     budget::Budget,
-    direct::{DirectField, Surfaces},
+    direct::{DirectFields, Surfaces},
     iteration::LinkedLight,
     limits::Limits,
     plan::Plan,
@@ -77,7 +77,7 @@ impl Refining<'_> {
     pub(super) fn refine(
         &self,
         hierarchy: &mut Hierarchy,
-        direct: &mut Option<DirectField>,
+        direct: &mut DirectFields,
         linked: &mut LinkedLight,
         epsilon: f32,
     ) -> Option<Refined> {
@@ -122,10 +122,7 @@ impl Refining<'_> {
             // Light of the new elements.
             hierarchy.color_new_elements(self.painted.scene, self.painted.appearances);
             linked.extend(hierarchy);
-            if let Some(field) = direct {
-                let (shot, _) = field.sample(self.rays, hierarchy, self.limits, self.cancel)?;
-                refined.ray_count += shot;
-            }
+            refined.ray_count += direct.sample(self.rays, hierarchy, self.limits, self.cancel)?;
             linked.pull(Surfaces::new(hierarchy, direct));
         }
         Some(refined)
@@ -198,10 +195,8 @@ impl Refining<'_> {
         }
         // With direct light and textures.
         let spread = |index: usize| {
-            let direct = surfaces.direct.map_or(0.0, |field| {
-                let corners = elements[index].vertices;
-                range(corners.map(|vertex| luminance(field.corner(vertex))))
-            });
+            let corners = elements[index].vertices;
+            let direct = range(corners.map(|vertex| luminance(surfaces.direct.corner(vertex))));
             let reflectance = luminance(hierarchy.reflectance_of(index).extend(0.0));
             0.5 * reflectance * (gathered[index] + direct)
                 + self.texture_spread(surfaces, linked, index)

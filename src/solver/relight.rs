@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use glam::Vec4;
+
 use super::{
     Cancel, Relit, Solver, StepReport,
     direct::{Shooting, Surfaces},
@@ -36,12 +38,17 @@ impl Solver {
         let appearances = self.scene.allowed(wished);
         let active = self.scene.active_materials(&appearances);
         let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
-        // Store the present light before it changes.
-        let factor =
-            self.relighting
-                .keep_solved(&appearances, &self.hierarchy, &self.linked, &self.leaves);
+        // Store the present light before it changes. Light from outside stays as it is.
+        let has_outside = self.direct.brightest_outside() != Vec4::ZERO;
+        let factor = self.relighting.keep_solved(
+            &appearances,
+            has_outside,
+            &self.hierarchy,
+            &self.linked,
+            &self.leaves,
+        );
         // Direct light, with new rays where they are needed.
-        if let Some(field) = &mut self.direct {
+        if let Some(field) = self.direct.emitters_mut() {
             let shooting = Shooting {
                 scene: &self.scene,
                 hierarchy: &self.hierarchy,

@@ -97,11 +97,12 @@ impl Relighting {
         }
     }
 
-    /// Factor of the solved light for other appearances, if all light changes by one factor. Stores the present light
-    /// if it is solved and not stored yet.
+    /// Factor of the solved light for other appearances, if all light changes by one factor; light from outside, if
+    /// there is some, stays as it is. Stores the present light if it is solved and not stored yet.
     pub(super) fn keep_solved(
         &mut self,
         appearances: &[Appearance],
+        has_outside: bool,
         hierarchy: &Hierarchy,
         linked: &LinkedLight,
         leaves: &[LeafLight],
@@ -114,7 +115,7 @@ impl Relighting {
                 emitted: emitted(hierarchy),
             });
         }
-        factor_between(&self.solved.as_ref()?.appearances, appearances)
+        factor_between(&self.solved.as_ref()?.appearances, appearances, has_outside)
     }
 
     /// Change direct light to other appearances. Returns the rays shot; `None` when cancelled, with the light
@@ -262,7 +263,7 @@ pub(super) fn emitted(hierarchy: &Hierarchy) -> DVec3 {
 }
 
 /// Factor by which all light changes from some appearances to others, if there is one.
-fn factor_between(before: &[Appearance], after: &[Appearance]) -> Option<Vec3> {
+fn factor_between(before: &[Appearance], after: &[Appearance], has_outside: bool) -> Option<Vec3> {
     let reflect_alike = before
         .iter()
         .zip(after)
@@ -270,7 +271,8 @@ fn factor_between(before: &[Appearance], after: &[Appearance]) -> Option<Vec3> {
     let emissions = before
         .iter()
         .zip(after)
-        .map(|(before, after)| (before.emission, after.emission));
+        .map(|(before, after)| (before.emission, after.emission))
+        .chain(has_outside.then_some((Vec3::ONE, Vec3::ONE)));
     if reflect_alike {
         common_ratio(emissions)
     } else {

@@ -8,7 +8,7 @@ use super::{
     Cancel, Direct, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, CoverageMap},
-    direct::{self, DirectField, Lights, Surfaces},
+    direct::{self, DirectFields, Surfaces},
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
     places,
@@ -42,8 +42,8 @@ pub struct Solver {
     pub(super) rays: Arc<RayTree>,
     // The mesh and its light.
     pub(super) hierarchy: Hierarchy,
-    /// `None` where no emitter is sampled.
-    pub(super) direct: Option<DirectField>,
+    /// Light straight from emitters and from outside, as far as it is sampled.
+    pub(super) direct: DirectFields,
     pub(super) linked: LinkedLight,
     /// Coverage of the hemisphere of each cell by lit surfaces.
     pub(super) coverage: CoverageMap,
@@ -92,7 +92,8 @@ impl Solver {
         });
         let sheets = SheetSides::of(&scene, &mut rays);
         cancel.proceed()?;
-        let (plan, tree) = Plan::make(&scene, sheets.as_ref(), &settings, active, &is_cancelled)?;
+        let (mut plan, tree) =
+            Plan::make(&scene, sheets.as_ref(), &settings, active, &is_cancelled)?;
         // Hierarchy and ray tree. Both take about the same time, and neither uses all processors.
         let (hierarchy, rays) = rayon::join(
             || Hierarchy::of_tree(&scene, tree, settings.crease_degrees, &is_cancelled),
@@ -104,15 +105,17 @@ impl Solver {
         );
         let hierarchy = hierarchy?;
         cancel.proceed()?;
+        let ray_count = plan.probe_outside(&scene, &hierarchy, &rays, &settings);
+        cancel.proceed()?;
         let mut solver = Self {
-            direct: None,
+            direct: DirectFields::default(),
             linked: LinkedLight::default(),
             coverage: CoverageMap::default(),
             leaves: Vec::new(),
             vertex_factors: Vec::new(),
             mean_irradiance: 0.0,
             step: 0,
-            ray_count: 0,
+            ray_count,
             is_full: false,
             relighting: Relighting::new(&scene),
             snapshot: Snapshot::default(),
@@ -143,8 +146,8 @@ impl Solver {
         };
         painted.divide(&mut self.hierarchy, limits.min_area, limits.most_elements);
         self.linked.extend(&self.hierarchy);
-        let lights = Lights::new(&self.scene, &self.hierarchy, self.settings.direct);
-        self.direct = (!lights.is_empty()).then(|| DirectField::new(lights));
+        let sees_outside = self.plan.sees_outside;
+        self.direct = DirectFields::new(&self.scene, &self.hierarchy, &self.settings, sees_outside);
         cancel.proceed()?;
         // Divide large elements and contact elements.
         let limits = self.limits(1.0);
@@ -157,10 +160,10 @@ impl Solver {
         self.is_full |= !fits;
         // A few shadow rays from each vertex.
         let count = shadow_samples(&self.settings, true);
-        if let Some(field) = &mut self.direct {
-            self.ray_count +=
-                field.sample_vertices_first(rays, &self.hierarchy, count, limits.seed, cancel)?;
-        }
+        let (hierarchy, seed) = (&self.hierarchy, limits.seed);
+        self.ray_count += self
+            .direct
+            .sample_vertices_first(rays, hierarchy, count, seed, cancel)?;
         self.extend_to_new_elements();
         self.pull();
         Some(())
@@ -283,11 +286,10 @@ impl Solver {
     fn adapt_to_direct(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<()> {
         let limits = self.limits(threshold_scale);
         self.is_full |= !self.divide_coarse(limits);
-        if let Some(field) = &mut self.direct {
-            let (shot, fits) = field.adapt(&self.rays, &mut self.hierarchy, limits, cancel)?;
-            self.ray_count += shot;
-            self.is_full |= !fits;
-        }
+        let (rays, hierarchy) = (&self.rays, &mut self.hierarchy);
+        let (shot, fits) = self.direct.adapt(rays, hierarchy, limits, cancel)?;
+        self.ray_count += shot;
+        self.is_full |= !fits;
         self.probe_contacts(cancel)?;
         self.extend_to_new_elements();
         Some(())
@@ -295,9 +297,8 @@ impl Solver {
 
     /// Divide elements that are too large to be sampled at their corners only. Returns whether memory allowed it.
     fn divide_coarse(&mut self, limits: Limits) -> bool {
-        let lights = self.direct.as_ref().map(|field| &field.lights);
         let is_clear = self.plan.follows_light;
-        direct::divide_coarse(&mut self.hierarchy, lights, is_clear, limits)
+        direct::divide_coarse(&mut self.hierarchy, &self.direct, is_clear, limits)
     }
 
     /// Find which corners and centroids of new elements lie inside solids.

@@ -3,7 +3,7 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::{border::SPREAD_SHARE, field::DirectField, lights::Lights, samples::DirectLight};
+use super::{border::SPREAD_SHARE, field::DirectField, fields::DirectFields, samples::DirectLight};
 use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, longest_edge_squared},
@@ -37,11 +37,11 @@ const INTERPOLATION_SCALE: f32 = 30.0;
 const MOST_ROUNDS: u32 = 8;
 
 /// Divide elements that are too large to be sampled at their corners only. Returns whether memory allowed it. Where
-/// nothing casts a shadow, in all of the scene if `is_clear`, elements are not divided over which the light of `lights`
+/// nothing casts a shadow, in all of the scene if `is_clear`, elements are not divided over which the unoccluded light
 /// has no interpolation error.
 pub(crate) fn divide_coarse(
     hierarchy: &mut Hierarchy,
-    lights: Option<&Lights>,
+    direct: &DirectFields,
     is_clear: bool,
     limits: Limits,
 ) -> bool {
@@ -52,11 +52,10 @@ pub(crate) fn divide_coarse(
             .filter(|&leaf| is_large(hierarchy, leaf, limits))
             .collect();
         // If emission is linked, links divide elements for it, except in clear scenes.
-        let has_error = |leaf: usize| match lights {
-            Some(lights) if is_clear || lights.are_all(hierarchy) => {
-                lights.has_interpolation_error(hierarchy, leaf, limits)
-            }
-            _ => is_clear,
+        let is_known = direct.are_all(hierarchy);
+        let has_error = |leaf: usize| match is_known {
+            true => direct.has_interpolation_error(hierarchy, leaf, limits),
+            false => is_clear,
         };
         let wanted: Vec<u32> = large
             .into_par_iter()
@@ -84,20 +83,21 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
 }
 
 impl DirectField {
-    /// Sample all vertices, then divide elements and sample again until the interpolation error is tolerated. Returns
-    /// the rays shot, and whether memory allowed all divisions; `None` when cancelled.
+    /// Sample all vertices, then divide elements and sample again until the interpolation error is tolerated, relative
+    /// to the mean luminance with that of `others`. Returns the rays shot, and whether memory allowed all divisions; `None` when cancelled.
     pub(crate) fn adapt(
         &mut self,
         rays: &RayTree,
         hierarchy: &mut Hierarchy,
         limits: Limits,
+        others: f32,
         cancel: &Cancel,
     ) -> Option<(u64, bool)> {
         let mut ray_count = 0;
         // First element that was not examined in this step.
         let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
-            let (shot, mean) = self.sample(rays, hierarchy, limits, cancel)?;
+            let (shot, mean) = self.sample(rays, hierarchy, limits, others, cancel)?;
             ray_count += shot;
             if round == MOST_ROUNDS {
                 break;
@@ -115,19 +115,20 @@ impl DirectField {
         Some((ray_count, true))
     }
 
-    /// Sample all vertices until their noise is tolerated. Returns the rays shot and the mean luminance; `None` when
-    /// cancelled.
+    /// Sample all vertices until their noise is tolerated, relative to the mean luminance with that of `others`.
+    /// Returns the rays shot and this mean; `None` when cancelled.
     pub(crate) fn sample(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
         limits: Limits,
+        others: f32,
         cancel: &Cancel,
     ) -> Option<(u64, f32)> {
         let sampled =
             self.sample_vertices(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
         let offset = self.offset_before_walls(rays, hierarchy, limits, cancel)?;
-        let mean = self.mean(hierarchy);
+        let mean = self.mean(hierarchy) + others;
         let denoised = self.reduce_noise(rays, hierarchy, limits, mean, cancel)?;
         Some((sampled + offset + denoised, mean))
     }
@@ -329,7 +330,7 @@ mod tests {
             builtin::plates,
             test_shapes::{builder, one_sided, rectangle},
         },
-        solver::{Direct, SolveSettings},
+        solver::{Direct, SolveSettings, direct::lights::Lights},
     };
 
     /// The hierarchy of a scene with its direct light after adaption, for a tolerance.
@@ -340,9 +341,10 @@ mod tests {
             ..SolveSettings::normal()
         };
         let limits = Limits::new(&settings, &hierarchy, 1.0, u64::MAX);
-        let mut field = DirectField::new(Lights::new(scene, &hierarchy, Direct::Sampled));
+        let mut field =
+            DirectField::new(Lights::of_emitters(scene, &hierarchy, Direct::Sampled).unwrap());
         let cancel = Cancel::default();
-        let found = field.adapt(rays, &mut hierarchy, limits, &cancel);
+        let found = field.adapt(rays, &mut hierarchy, limits, 0.0, &cancel);
         assert!(found.is_some_and(|(_, fits)| fits));
         let mean = field.mean(&hierarchy);
         (hierarchy, field, mean)
@@ -394,7 +396,8 @@ mod tests {
         }
         let elements = 0..hierarchy.mesh.elements.len();
         for rays in [RayTree::clear(), RayTree::new(&scene)] {
-            let mut field = DirectField::new(Lights::new(&scene, &hierarchy, Direct::Sampled));
+            let mut field =
+                DirectField::new(Lights::of_emitters(&scene, &hierarchy, Direct::Sampled).unwrap());
             let cancel = Cancel::default();
             let shot = field.sample_vertices(&rays, &hierarchy, 8, 1, &cancel);
             assert_eq!(shot == Some(0), rays.is_clear());

@@ -27,16 +27,13 @@ const PLACES: [Vec3; 7] = [
 
 impl Lights {
     /// Whether linear interpolation of the unoccluded light between the corners of an element errs by more than the
-    /// tolerance, or the light is unknown because some emitters are not sampled.
+    /// tolerance.
     pub(super) fn has_interpolation_error(
         &self,
         hierarchy: &Hierarchy,
         element: usize,
         limits: Limits,
     ) -> bool {
-        if !self.are_all(hierarchy) {
-            return true;
-        }
         let mut sums = Vec::new();
         let patch = hierarchy.patch_of(element);
         let centroid = hierarchy.mesh.elements[element].centroid;
@@ -75,15 +72,13 @@ mod tests {
             let scene = one_sided(plates(distance));
             let hierarchy = Hierarchy::new(&scene, 30.0);
             let limits = Limits::new(&SolveSettings::normal(), &hierarchy, 1.0, u64::MAX);
-            let lights = Lights::new(&scene, &hierarchy, Direct::Sampled);
+            let lights = Lights::of_emitters(&scene, &hierarchy, Direct::Sampled).unwrap();
             let is_receiver = |patch: &usize| hierarchy.patches[*patch].emission == Vec3::ZERO;
             for patch in (0..hierarchy.patches.len()).filter(is_receiver) {
                 let found = lights.has_interpolation_error(&hierarchy, patch, limits);
                 assert_eq!(found, expected, "{distance}");
             }
-            // Linked light is unknown.
-            let lights = Lights::new(&scene, &hierarchy, Direct::Linked);
-            assert!(lights.has_interpolation_error(&hierarchy, 0, limits));
+            assert!(Lights::of_emitters(&scene, &hierarchy, Direct::Linked).is_none());
         }
     }
 }

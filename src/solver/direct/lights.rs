@@ -1,4 +1,5 @@
-//! Direct light: irradiance from the emitters at points, by exact form factors and shadow rays.
+//! Direct light at points: irradiance from the emitters, from the sky, or from the sun, by exact form factors and shadow
+//! rays.
 //!
 //! The unoccluded irradiance of the emitters is exact, that of many far ones together nearly so (see `light_tree`).
 //! Shadow rays only estimate its visible fraction: they are distributed over the emitters in proportion to that
@@ -6,7 +7,7 @@
 
 use std::{f32::consts::PI, ops::Range};
 
-use glam::{Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
@@ -14,11 +15,13 @@ use super::{
     light_tree::{Arriving, LightTree, Target},
     panel::panels,
     samples::{Bundle, DirectLight, Outcomes},
+    sky::{OutsideRay, SkyTree},
+    sun::SunDisc,
 };
 use crate::{
     geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_1d, low_discrepancy_2d},
-    hierarchy::Hierarchy,
-    scene::{MaterialId, Scene, TriangleId},
+    hierarchy::{Hierarchy, Reading},
+    scene::{MaterialId, Scene, Sky, Sun, TriangleId},
     solver::{Cancel, Direct, places::Receiver},
     transport::luminance,
 };
@@ -27,18 +30,25 @@ use crate::{
 /// rounding changes the streams; smaller, and neighbouring points share them.
 const PLACES: f32 = 16_384.0;
 
-/// The emitters that are sampled.
+/// What gives the light.
+enum Source {
+    Emitters(LightTree),
+    Sky(SkyTree),
+    Sun(SunDisc),
+}
+
+/// The light of one kind that is sampled: that of all emitters, of the sky, or of the sun.
 pub(crate) struct Lights {
-    tree: LightTree,
-    /// Largest radiosity of an emitter by channel: no irradiance can be larger.
+    source: Source,
+    /// Largest radiosity by channel, or largest irradiance from outside: no irradiance can be larger.
     brightest: Vec4,
-    /// By patch.
+    /// Patches whose emission is sampled; empty for light from outside.
     is_sampled: Vec<bool>,
 }
 
 impl Lights {
-    /// The active emitting patches of a hierarchy, or none if emission is linked.
-    pub(crate) fn new(scene: &Scene, hierarchy: &Hierarchy, mode: Direct) -> Self {
+    /// The active emitting patches of a hierarchy; `None` if there are none, or if emission is linked.
+    pub(super) fn of_emitters(scene: &Scene, hierarchy: &Hierarchy, mode: Direct) -> Option<Self> {
         let is_sampled: Vec<bool> = hierarchy
             .patches
             .iter()
@@ -53,23 +63,55 @@ impl Lights {
             .flat_map(|patch| hierarchy.emitting_parts(patch))
             .map(|part| Emitter::new(scene, hierarchy, part))
             .collect();
-        Self::of(&emitters, is_sampled)
+        (!emitters.is_empty()).then(|| Self::of(&emitters, is_sampled))
     }
 
     fn of(emitters: &[Emitter], is_sampled: Vec<bool>) -> Self {
         let (emitters, panels) = panels(emitters);
         Self {
             brightest: brightest(&emitters),
-            tree: LightTree::new(&emitters, &panels),
+            source: Source::Emitters(LightTree::new(&emitters, &panels)),
             is_sampled,
+        }
+    }
+
+    /// The sky; `None` if it is dark. With a reading its unoccluded irradiance is that of a directional table.
+    pub(super) fn of_sky(sky: &Sky, reading: Option<Reading>) -> Option<Self> {
+        let tree = SkyTree::new(sky, reading)?;
+        Some(Self {
+            brightest: tree.brightest(),
+            source: Source::Sky(tree),
+            is_sampled: Vec::new(),
+        })
+    }
+
+    /// The sun; `None` if it is dark. The reading as in [`Self::of_sky`].
+    pub(super) fn of_sun(sun: &Sun, reading: Option<Reading>) -> Option<Self> {
+        let disc = SunDisc::new(sun, reading)?;
+        Some(Self {
+            brightest: disc.brightest(),
+            source: Source::Sun(disc),
+            is_sampled: Vec::new(),
+        })
+    }
+
+    /// Whether it comes from outside the scene.
+    pub(super) fn is_outside(&self) -> bool {
+        !matches!(self.source, Source::Emitters(_))
+    }
+
+    /// The emitters; none for light from outside.
+    fn emitters(&self) -> &[Emitter] {
+        match &self.source {
+            Source::Emitters(tree) => &tree.emitters,
+            Source::Sky(_) | Source::Sun(_) => &[],
         }
     }
 
     /// The emitters for whose materials `emission` gives an emitted radiance, with that radiance times their texture.
     pub(super) fn repainted(&self, emission: impl Fn(MaterialId) -> Option<Vec3>) -> Self {
         let emitters: Vec<Emitter> = self
-            .tree
-            .emitters
+            .emitters()
             .iter()
             .filter_map(|emitter| {
                 let emission = emission(emitter.material)? * emitter.texture;
@@ -94,33 +136,26 @@ impl Lights {
         self.brightest
     }
 
-    /// Whether no emitter is sampled.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.tree.emitters.is_empty()
-    }
-
     /// Whether the emission of a patch is sampled, and so must not be linked.
     pub(crate) fn is_sampled(&self, patch: usize) -> bool {
-        self.is_sampled[patch]
+        self.is_sampled.get(patch) == Some(&true)
     }
 
     /// The triangles of the emitters.
     pub(super) fn triangles(&self) -> impl Iterator<Item = TriangleId> + '_ {
-        self.tree.emitters.iter().map(|emitter| emitter.triangle)
+        self.emitters().iter().map(|emitter| emitter.triangle)
     }
 
-    /// Whether the emission of all active patches is sampled.
-    pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
-        let mut active = hierarchy.active_patches();
-        active
-            .all(|index| hierarchy.patches[index].emission == Vec3::ZERO || self.is_sampled(index))
-    }
-
-    /// Luminance of the power of the emitters per area of the scene, which is the mean irradiance if all of it arrives;
-    /// at most the largest radiosity.
+    /// Luminance of the mean irradiance if all light arrives: the power of the emitters per area of the scene, at most
+    /// the largest radiosity.
     pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
+        let tree = match &self.source {
+            Source::Emitters(tree) => tree,
+            Source::Sky(sky) => return luminance(sky.mean_irradiance()),
+            Source::Sun(sun) => return luminance(sun.mean_irradiance()),
+        };
         let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
-        let sum: f64 = self.tree.emitters.iter().map(power).sum();
+        let sum: f64 = tree.emitters.iter().map(power).sum();
         let mean = (sum / hierarchy.importance.area.max(f64::MIN_POSITIVE)) as f32;
         mean.min(luminance(self.brightest))
     }
@@ -192,59 +227,128 @@ impl Lights {
         strata.clear();
         strata.extend(samples.map(|sample| (low_discrepancy_1d(sample, scramble), sample)));
         strata.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        // Shoot them, each to an emitter of its part of the cut.
-        let (mut target, mut bundle) = (usize::MAX, Bundle::default());
-        let mut outcomes = Outcomes::default();
-        for &(at, sample) in &*strata {
+        // Shoot them, each into its part of the cut.
+        let shots = strata.iter().map(|&(at, sample)| {
             let at = at * total;
             let chosen = cut.partition_point(|part| part.until <= at);
             let chosen = chosen.min(cut.len() - 1);
-            if chosen != target {
-                light.count(&bundle);
-                (target, bundle) = (chosen, self.bundle(receiver, cut[chosen].target));
-            }
             let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
-            let place = (at - before) / (cut[chosen].until - before);
-            let (emitter, per_chance) = self.tree.pick(cut[chosen].target, receiver, place);
-            let emitter = &self.tree.emitters[emitter];
-            bundle.rays += 1;
-            let square = low_discrepancy_2d(sample, shift);
-            let (point, weight) = emitter.aim(receiver, bundle.seen.as_ref(), square);
-            let weight = weight * per_chance;
-            if !(weight.is_finite() && weight > 0.0) {
-                continue;
+            let share = cut[chosen].until - before;
+            Ray {
+                part: chosen,
+                target: cut[chosen].target,
+                share,
+                place: (at - before) / share,
+                square: low_discrepancy_2d(sample, shift),
             }
-            let ends = [Some(receiver.triangle), Some(emitter.triangle)];
-            let color = emitter.radiosity / luminance(emitter.radiosity);
-            let is_visible = !rays.occluded(receiver.point, point, ends);
-            outcomes.count(is_visible);
-            bundle.count(weight, color, is_visible);
+        });
+        match &self.source {
+            Source::Emitters(tree) => shoot_at_emitters(tree, rays, receiver, shots, light),
+            Source::Sky(sky) => {
+                let aim = |ray: Ray| match ray.target {
+                    Target::Node(node) => {
+                        let (index, normal) = (node as usize, receiver.normal);
+                        sky.aim(index, ray.share, normal, ray.place, ray.square)
+                    }
+                    Target::Emitter(_) => None,
+                };
+                shoot_outside(rays, receiver, shots.map(aim), light);
+            }
+            Source::Sun(sun) => {
+                let aim = |ray: Ray| sun.aim(receiver.normal, ray.square);
+                shoot_outside(rays, receiver, shots.map(aim), light);
+            }
         }
-        light.count(&bundle);
-        light.changes += outcomes.changes();
     }
 
-    /// An empty bundle of rays to a target.
-    fn bundle(&self, receiver: &Receiver, target: Target) -> Bundle {
-        let seen = match target {
-            Target::Emitter(emitter) => {
-                let corners = self.tree.emitters[emitter as usize].corners;
-                SphericalTriangle::new(receiver.point, corners)
-            }
-            Target::Node(_) => None,
-        };
-        Bundle::towards(seen)
-    }
-
-    /// As [`LightTree::unoccluded`].
+    /// Unoccluded irradiance at a receiver, W/m²; the other arguments as in [`LightTree::unoccluded`].
     pub(super) fn unoccluded(
         &self,
         receiver: &Receiver,
         scale: Option<f32>,
         cut: &mut Vec<Arriving>,
     ) -> Vec4 {
-        self.tree.unoccluded(receiver, scale, cut)
+        match &self.source {
+            Source::Emitters(tree) => tree.unoccluded(receiver, scale, cut),
+            Source::Sky(sky) => sky.unoccluded(receiver.normal, cut),
+            Source::Sun(sun) => sun.unoccluded(receiver.normal, cut),
+        }
     }
+}
+
+/// Random numbers of a shadow ray.
+struct Ray {
+    /// The part of the cut, its target and the luminance of its irradiance.
+    part: usize,
+    target: Target,
+    share: f32,
+    /// Place in the part, 0…1.
+    place: f32,
+    square: Vec2,
+}
+
+/// Shoot shadow rays from a receiver to emitters.
+fn shoot_at_emitters(
+    tree: &LightTree,
+    rays: &RayTree,
+    receiver: &Receiver,
+    shots: impl Iterator<Item = Ray>,
+    light: &mut DirectLight,
+) {
+    let (mut part, mut bundle) = (usize::MAX, Bundle::default());
+    let mut outcomes = Outcomes::default();
+    for ray in shots {
+        if ray.part != part {
+            light.count(&bundle);
+            (part, bundle) = (ray.part, bundle_towards(tree, receiver, ray.target));
+        }
+        let (emitter, per_chance) = tree.pick(ray.target, receiver, ray.place);
+        let emitter = &tree.emitters[emitter];
+        bundle.rays += 1;
+        let (point, weight) = emitter.aim(receiver, bundle.seen.as_ref(), ray.square);
+        let weight = weight * per_chance;
+        if !(weight.is_finite() && weight > 0.0) {
+            continue;
+        }
+        let ends = [Some(receiver.triangle), Some(emitter.triangle)];
+        let color = emitter.radiosity / luminance(emitter.radiosity);
+        let is_visible = !rays.occluded(receiver.point, point, ends);
+        outcomes.count(is_visible);
+        bundle.count(weight, color, is_visible);
+    }
+    light.count(&bundle);
+    light.changes += outcomes.changes();
+}
+
+/// An empty bundle of rays to a target.
+fn bundle_towards(tree: &LightTree, receiver: &Receiver, target: Target) -> Bundle {
+    let seen = match target {
+        Target::Emitter(emitter) => {
+            let corners = tree.emitters[emitter as usize].corners;
+            SphericalTriangle::new(receiver.point, corners)
+        }
+        Target::Node(_) => None,
+    };
+    Bundle::towards(seen)
+}
+
+/// Shoot shadow rays from a receiver out of the scene.
+fn shoot_outside(
+    rays: &RayTree,
+    receiver: &Receiver,
+    shots: impl Iterator<Item = Option<OutsideRay>>,
+    light: &mut DirectLight,
+) {
+    let (mut bundle, mut outcomes) = (Bundle::default(), Outcomes::default());
+    for ray in shots {
+        bundle.rays += 1;
+        let Some(ray) = ray else { continue };
+        let is_visible = rays.leaves(receiver.point, ray.direction, Some(receiver.triangle));
+        outcomes.count(is_visible);
+        bundle.count(ray.weight, ray.color, is_visible);
+    }
+    light.count(&bundle);
+    light.changes += outcomes.changes();
 }
 
 /// Scratch space for the shadow rays of one point.

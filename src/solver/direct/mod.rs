@@ -1,10 +1,11 @@
-//! Direct light: irradiance straight from emitters.
+//! Direct light: irradiance straight from emitters, from the sky and from the sun.
 
 mod adapt;
 mod before_walls;
 mod border;
 mod emitter;
 mod field;
+mod fields;
 mod interpolation;
 mod light_parts;
 mod light_tree;
@@ -13,13 +14,15 @@ mod multipole;
 mod noise;
 mod panel;
 mod samples;
+mod sky;
 mod smooth;
+mod sun;
 mod surfaces;
 mod vertex_samples;
 
 pub(crate) use adapt::divide_coarse;
 pub(crate) use border::SPREAD_SHARE;
 pub(crate) use field::DirectField;
+pub(crate) use fields::DirectFields;
 pub(crate) use light_parts::{LightParts, Shooting, common_ratio};
-pub(crate) use lights::Lights;
 pub(crate) use surfaces::Surfaces;

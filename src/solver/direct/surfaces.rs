@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::field::DirectField;
+use super::fields::DirectFields;
 use crate::{
     hierarchy::{Channels as _, Hierarchy},
     solver::sums::ordered_sum,
@@ -16,23 +16,19 @@ use crate::{
 pub(crate) struct Surfaces<'a> {
     /// The elements, with their reflectance and emission.
     pub(crate) hierarchy: &'a Hierarchy,
-    /// `None` if no emitter is sampled.
-    pub(crate) direct: Option<&'a DirectField>,
+    /// Light that is sampled.
+    pub(crate) direct: &'a DirectFields,
 }
 
 impl<'a> Surfaces<'a> {
-    /// The elements of a hierarchy with a field of direct light, if there is one.
-    pub(crate) fn new(hierarchy: &'a Hierarchy, direct: &'a Option<DirectField>) -> Self {
-        Self {
-            hierarchy,
-            direct: direct.as_ref(),
-        }
+    /// The elements of a hierarchy with their direct light.
+    pub(crate) fn new(hierarchy: &'a Hierarchy, direct: &'a DirectFields) -> Self {
+        Self { hierarchy, direct }
     }
 
-    /// Direct irradiance of a leaf, W/m²; 0 without a field.
+    /// Direct irradiance of a leaf, W/m².
     pub(crate) fn direct(&self, element: usize) -> Vec4 {
-        self.direct
-            .map_or(Vec4::ZERO, |field| field.element(self.hierarchy, element))
+        self.direct.element(self.hierarchy, element)
     }
 
     /// The same by element; 0 for elements that are not leaves.
@@ -52,8 +48,7 @@ impl<'a> Surfaces<'a> {
     /// Whether the emission of an element is sampled, and so not sent over links.
     pub(crate) fn is_sampled(&self, element: usize) -> bool {
         let patch = self.hierarchy.mesh.elements[element].patch as usize;
-        self.direct
-            .is_some_and(|field| field.lights.is_sampled(patch))
+        self.direct.is_sampled(patch)
     }
 
     /// Radiosity of a leaf under this irradiance, without sampled emission, W/m², with an active share of 1; all 0
@@ -71,20 +66,18 @@ impl<'a> Surfaces<'a> {
         (reflected + emitted).extend(1.0)
     }
 
-    /// Power of the sampled emitters, summed over the colours.
+    /// Power of the sampled emitters, and the power that arrives from outside, summed over the colours.
     pub(crate) fn sampled_power(&self) -> f64 {
-        let Some(field) = self.direct else {
-            return 0.0;
-        };
         let of_patch = |index: usize| {
             let patch = &self.hierarchy.patches[index];
             f64::from((patch.emission * PI).element_sum()) * f64::from(patch.area)
         };
-        field.lights.sampled_patches().map(of_patch).sum()
+        let emitted: f64 = self.direct.sampled_patches().map(of_patch).sum();
+        emitted + self.direct.outside_power(self.hierarchy)
     }
 
-    /// Upper bound of the total power, summed over the colours: the emitted power, if all surfaces reflected as the
-    /// brightest one does.
+    /// Upper bound of the total power, summed over the colours: the emitted power and that from outside, if all surfaces
+    /// reflected as the brightest one does.
     pub(crate) fn most_power(&self) -> f64 {
         let patches = &self.hierarchy.patches;
         let brightest = self.hierarchy.largest_reflectance();
@@ -93,7 +86,8 @@ impl<'a> Surfaces<'a> {
         });
         let absorbed = 1.0 - f64::from(brightest);
         if absorbed > 0.0 {
-            f64::from(PI) * emitted.element_sum() / absorbed
+            let outside = self.direct.outside_power(self.hierarchy);
+            (f64::from(PI) * emitted.element_sum() + outside) / absorbed
         } else {
             f64::INFINITY
         }

@@ -160,13 +160,22 @@ fn converge(
     let weights = leaf_areas(hierarchy);
     let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let direct = surfaces.direct_of_leaves();
-    let ceiling = CEILING_SLACK * surfaces.most_power();
+    let (sampled, ceiling) = (
+        surfaces.sampled_power(),
+        CEILING_SLACK * surfaces.most_power(),
+    );
     let mut acceleration = Anderson::new(DEPTH);
     let mut growing = 0;
     for _ in 0..MOST_SWEEPS {
         // Gather, and find the accelerated light.
         cancel.proceed()?;
-        let sweep = sweep(linked, iteration, &linked_clusters, &direct, bounds_rows)?;
+        let sweep = sweep(
+            linked,
+            iteration,
+            &linked_clusters,
+            (&direct, sampled),
+            bounds_rows,
+        )?;
         convergence.sweeps += 1;
         cancel.proceed()?;
         let next = acceleration.next(&weights, &linked.irradiance, &sweep.image);
@@ -202,12 +211,13 @@ fn converge(
     Some(Ending::NotConverged)
 }
 
-/// Gather once, and measure the result together with the direct light of the leaves; `None` when cancelled.
+/// Gather once, and measure the result together with the direct light of the leaves and the power that is sampled;
+/// `None` when cancelled.
 fn sweep(
     linked: &LinkedLight,
     iteration: Iteration<'_>,
     linked_clusters: &LinkedClusters,
-    direct: &[Vec4],
+    (direct, sampled): (&[Vec4], f64),
     bounds_rows: bool,
 ) -> Option<Sweep> {
     let Iteration {
@@ -235,8 +245,7 @@ fn sweep(
     coverage.scale(hierarchy, &linked.power, &mut image, bounds_rows);
     cancel.proceed()?;
     Some(Sweep {
-        sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf))
-            + surfaces.sampled_power(),
+        sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf)) + sampled,
         returned: returned(&image),
         returned_unscaled,
         arrived: area_total(hierarchy, |leaf| image[leaf] + direct[leaf]),

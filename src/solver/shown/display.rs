@@ -74,7 +74,7 @@ impl View<'_> {
                     || VertexMeans::new(hierarchy, self.leaves, self.factors),
                 )
             },
-            || self.surfaces.direct.map(|field| field.shown(hierarchy)),
+            || self.surfaces.direct.shown(hierarchy),
         );
         let mesh = mesh?;
         cancel.proceed()?;
@@ -158,7 +158,7 @@ impl View<'_> {
         if place.is_finite() { place } else { uv[0] }
     }
 
-    /// Largest radiosity by channel: no irradiance can be larger.
+    /// Largest radiosity by channel, with the light from outside: no irradiance can be larger.
     fn brightest(&self) -> Vec4 {
         let (surfaces, hierarchy) = (self.surfaces, self.surfaces.hierarchy);
         let sampled = |leaf: usize| match surfaces.is_sampled(leaf) {
@@ -169,6 +169,7 @@ impl View<'_> {
         leaves
             .map(|leaf| self.linked.radiosity(surfaces, leaf) + sampled(leaf))
             .fold(Vec4::ZERO, Vec4::max)
+            + surfaces.direct.brightest_outside()
     }
 
     /// Light at the vertices: from links as means of the leaves about them, and straight from emitters.
@@ -226,8 +227,7 @@ impl View<'_> {
     /// Add the power of sampled emitters, which the tables do not contain.
     fn add_sampled_emission(&self, boxes: &mut [ClusterBox]) {
         let Surfaces { hierarchy, direct } = self.surfaces;
-        let Some(field) = direct else { return };
-        for index in field.lights.sampled_patches() {
+        for index in direct.sampled_patches() {
             let patch = &hierarchy.patches[index];
             let radiosity = luminance((patch.emission * PI).extend(0.0));
             let vector = patch.area_vector * radiosity;

@@ -36,14 +36,15 @@ pub(crate) fn note_full(report: &mut StepReport) {
     report.notes.push(Note::MemoryLimit);
 }
 
-/// Power that arrives at all leaves relative to the emitted and reflected power.
+/// Power that arrives at all leaves relative to the emitted and reflected power and that from outside.
 fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let hierarchy = surfaces.hierarchy;
     let arrived = area_total(hierarchy, |leaf| linked.total(surfaces, leaf));
     let sent = area_total(hierarchy, |leaf| {
         let reflectance = hierarchy.reflectance_of(leaf).extend(0.0);
         let emitted = (hierarchy.emission_of(leaf) * PI).extend(0.0);
-        reflectance * linked.total(surfaces, leaf) + emitted
+        let outside = surfaces.direct.from_outside(hierarchy, leaf);
+        reflectance * linked.total(surfaces, leaf) + emitted + outside
     });
     if sent > 0.0 { arrived / sent } else { 1.0 }
 }

@@ -23,10 +23,7 @@ use crate::{
         direct::Surfaces,
         iteration::Anderson,
         limits::Limits,
-        places::{
-            LEAST_PART, OffsetPlaces, Receiver, carry_over, emitted_as_irradiance,
-            vertex_share_roots,
-        },
+        places::{LEAST_PART, Receiver, carry_over, emitted_as_irradiance, vertex_share_roots},
     },
     transport::luminance,
 };
@@ -159,12 +156,8 @@ impl FinalGather<'_> {
         let hierarchy = self.surfaces.hierarchy;
         // Light at vertices from links and from shadow rays.
         let linked = VertexMeans::new(hierarchy, self.leaves, &[]).irradiance;
-        let direct: Vec<Vec4> = match self.surfaces.direct {
-            Some(field) => field
-                .shown(hierarchy)
-                .into_iter()
-                .map(|(light, _)| light)
-                .collect(),
+        let direct: Vec<Vec4> = match self.surfaces.direct.shown(hierarchy) {
+            Some(shown) => shown.into_iter().map(|(light, _)| light).collect(),
             None => vec![Vec4::ZERO; linked.len()],
         };
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
@@ -244,11 +237,7 @@ impl FinalGather<'_> {
         let squares = VertexMeans::new(hierarchy, self.squares, &[]).irradiance;
         let probe = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
-            let direct = match direct {
-                Some(field) => field.corner(vertex),
-                None => Vec4::ZERO,
-            };
-            let all = luminance(linked + direct);
+            let all = luminance(linked + direct.corner(vertex));
             let leaving = all + emitted[vertex as usize];
             let square = luminance(squares[vertex as usize]);
             (luminance(linked) > LEAST_PART * leaving).then(|| VertexProbe {
@@ -264,9 +253,7 @@ impl FinalGather<'_> {
         };
         let all = vec![true; mesh.vertices.len()];
         let elements = 0..mesh.elements.len();
-        let none = OffsetPlaces::default();
-        let offsets = direct.map_or(&none, |field| &field.offsets);
-        let places = offsets.vertex_places(hierarchy, elements, &all);
+        let places = direct.offsets().vertex_places(hierarchy, elements, &all);
         places.into_iter().filter_map(probe).collect()
     }
 

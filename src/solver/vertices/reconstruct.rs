@@ -53,8 +53,7 @@ pub(crate) fn gather_leaves(
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
     let hierarchy = kernel.hierarchy;
-    let none = OffsetPlaces::default();
-    let offsets = surfaces.direct.map_or(&none, |field| &field.offsets);
+    let offsets = surfaces.direct.offsets();
     let found: Vec<Vec<LeafLight>> = hierarchy
         .groups(hierarchy.task_patches(TASK_PATCHES))
         .into_par_iter()

@@ -1,0 +1,243 @@
+//! Direct light of all kinds that is sampled: one field each for the emitters, the sky and the sun.
+//!
+//! Direct light is linear in its sources. Each kind has shadow rays, noise and shadow borders of its own, so that a sky
+//! or a sun that most places do not see takes no rays from the lamps of a room.
+
+use glam::Vec4;
+
+use super::{field::DirectField, lights::Lights};
+use crate::{
+    geometry::RayTree,
+    hierarchy::{Channels as _, Hierarchy},
+    scene::Scene,
+    solver::{
+        Cancel, Direct, SolveSettings, limits::Limits, places::OffsetPlaces, sums::area_total,
+    },
+};
+
+/// The fields of direct light of a scene; none if nothing is sampled.
+#[derive(Default)]
+pub(crate) struct DirectFields {
+    fields: Vec<DirectField>,
+    /// Stands for the offset places where nothing is sampled.
+    no_offsets: OffsetPlaces,
+}
+
+impl DirectFields {
+    /// The fields before any sample. Emission that is linked has none; the sky and the sun are then read from
+    /// directional tables, as the clusters are. Without `sees_outside` they have none either.
+    pub(crate) fn new(
+        scene: &Scene,
+        hierarchy: &Hierarchy,
+        settings: &SolveSettings,
+        sees_outside: bool,
+    ) -> Self {
+        let reading = match settings.direct {
+            Direct::Linked => settings.method.reading(),
+            Direct::Sampled => None,
+        };
+        let emitters = Lights::of_emitters(scene, hierarchy, settings.direct);
+        let environment = &scene.environment;
+        let outside = sees_outside.then(|| {
+            let sun = environment.sun.as_ref();
+            let sun = sun.and_then(|sun| Lights::of_sun(sun, reading));
+            [Lights::of_sky(&environment.sky, reading), sun]
+        });
+        let outside = outside.into_iter().flatten().flatten();
+        Self {
+            fields: emitters
+                .into_iter()
+                .chain(outside)
+                .map(DirectField::new)
+                .collect(),
+            no_offsets: OffsetPlaces::default(),
+        }
+    }
+
+    /// Whether nothing is sampled.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.fields.is_empty()
+    }
+
+    /// The field of the emitters.
+    pub(crate) fn emitters(&self) -> Option<&DirectField> {
+        self.fields.iter().find(|field| !field.lights.is_outside())
+    }
+
+    /// The same, to be recoloured.
+    pub(crate) fn emitters_mut(&mut self) -> Option<&mut DirectField> {
+        self.fields
+            .iter_mut()
+            .find(|field| !field.lights.is_outside())
+    }
+
+    /// Direct irradiance of a leaf, W/m².
+    pub(crate) fn element(&self, hierarchy: &Hierarchy, leaf: usize) -> Vec4 {
+        self.sum(|field| field.element(hierarchy, leaf))
+    }
+
+    /// Direct irradiance at a vertex, W/m²; 0 if it was not sampled.
+    pub(crate) fn corner(&self, vertex: u32) -> Vec4 {
+        self.sum(|field| field.corner(vertex))
+    }
+
+    /// The sum over the fields; exactly the value of a single one.
+    fn sum(&self, of: impl Fn(&DirectField) -> Vec4) -> Vec4 {
+        self.fields
+            .iter()
+            .map(of)
+            .reduce(|a, b| a + b)
+            .unwrap_or_default()
+    }
+
+    /// As [`DirectField::shown`]; `None` if nothing is sampled.
+    pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Option<Vec<(Vec4, f32)>> {
+        let all = self.fields.iter().map(|field| field.shown(hierarchy));
+        all.reduce(|mut sum, other| {
+            for (sum, (light, error)) in sum.iter_mut().zip(other) {
+                *sum = (sum.0 + light, sum.1.hypot(error));
+            }
+            sum
+        })
+    }
+
+    /// Largest irradiance from outside by channel, W/m²: light of surfaces is bounded by their radiosity.
+    pub(crate) fn brightest_outside(&self) -> Vec4 {
+        self.outside().map(|field| field.lights.brightest()).sum()
+    }
+
+    fn outside(&self) -> impl Iterator<Item = &DirectField> {
+        self.fields.iter().filter(|field| field.lights.is_outside())
+    }
+
+    /// Power that arrives from outside, summed over the colours.
+    pub(crate) fn outside_power(&self, hierarchy: &Hierarchy) -> f64 {
+        let power =
+            |field: &DirectField| area_total(hierarchy, |leaf| field.element(hierarchy, leaf));
+        self.outside().map(power).sum()
+    }
+
+    /// Irradiance from outside of a leaf, W/m².
+    pub(crate) fn from_outside(&self, hierarchy: &Hierarchy, leaf: usize) -> Vec4 {
+        self.outside()
+            .map(|field| field.element(hierarchy, leaf))
+            .sum::<Vec4>()
+            .color()
+            .extend(0.0)
+    }
+
+    /// Whether the emission of a patch is sampled, and so not sent over links.
+    pub(crate) fn is_sampled(&self, patch: usize) -> bool {
+        self.emitters()
+            .is_some_and(|field| field.lights.is_sampled(patch))
+    }
+
+    /// The patches whose emission is sampled.
+    pub(crate) fn sampled_patches(&self) -> impl Iterator<Item = usize> + '_ {
+        self.emitters()
+            .into_iter()
+            .flat_map(|field| field.lights.sampled_patches())
+    }
+
+    /// Whether all light straight from emitters and from outside is sampled, and there is some.
+    pub(super) fn are_all(&self, hierarchy: &Hierarchy) -> bool {
+        let mut active = hierarchy.active_patches();
+        let is_known = |index: usize| {
+            hierarchy.patches[index].emission == glam::Vec3::ZERO || self.is_sampled(index)
+        };
+        !self.is_empty() && active.all(is_known)
+    }
+
+    /// Whether linear interpolation of the unoccluded light between the corners of an element errs by more than the
+    /// tolerance.
+    pub(super) fn has_interpolation_error(
+        &self,
+        hierarchy: &Hierarchy,
+        element: usize,
+        limits: Limits,
+    ) -> bool {
+        let errs = |field: &DirectField| {
+            field
+                .lights
+                .has_interpolation_error(hierarchy, element, limits)
+        };
+        self.fields.iter().any(errs)
+    }
+
+    /// Offset places of vertices behind walls: those of the first field, since no light reaches such vertices.
+    pub(crate) fn offsets(&self) -> &OffsetPlaces {
+        self.fields
+            .first()
+            .map_or(&self.no_offsets, |field| &field.offsets)
+    }
+
+    /// As [`DirectField::sample_vertices_first`].
+    pub(crate) fn sample_vertices_first(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        samples: u32,
+        seed: u64,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let mut shot = 0;
+        for field in &mut self.fields {
+            shot += field.sample_vertices_first(rays, hierarchy, samples, seed, cancel)?;
+        }
+        Some(shot)
+    }
+
+    /// As [`DirectField::adapt`]. Errors are relative to the mean of all light.
+    pub(crate) fn adapt(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &mut Hierarchy,
+        limits: Limits,
+        cancel: &Cancel,
+    ) -> Option<(u64, bool)> {
+        let (mut shot, mut fits) = (0, true);
+        for index in 0..self.fields.len() {
+            let others = self.mean_of_others(hierarchy, index);
+            let found = self.fields[index].adapt(rays, hierarchy, limits, others, cancel)?;
+            (shot, fits) = (shot + found.0, fits && found.1);
+        }
+        // The elements that later fields divided.
+        if self.fields.len() > 1 {
+            shot += self.sample(rays, hierarchy, limits, cancel)?;
+        }
+        Some((shot, fits))
+    }
+
+    /// Sample all vertices until their noise is tolerated. Returns the rays shot; `None` when cancelled.
+    pub(crate) fn sample(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        limits: Limits,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let mut shot = 0;
+        for index in 0..self.fields.len() {
+            let others = self.mean_of_others(hierarchy, index);
+            shot += self.fields[index]
+                .sample(rays, hierarchy, limits, others, cancel)?
+                .0;
+        }
+        Some(shot)
+    }
+
+    /// Mean luminance of all fields but one, as far as they are sampled.
+    fn mean_of_others(&self, hierarchy: &Hierarchy, index: usize) -> f32 {
+        let others = self
+            .fields
+            .iter()
+            .enumerate()
+            .filter(|&(other, _)| other != index);
+        others.map(|(_, field)| field.mean(hierarchy)).sum()
+    }
+
+    /// Memory in bytes.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        self.fields.iter().map(DirectField::memory_bytes).sum()
+    }
+}

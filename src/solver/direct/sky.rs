@@ -1,0 +1,568 @@
+//! The sky as an emitter: a tree over directions, by which its unoccluded irradiance is exact and its rays are
+//! distributed by radiance times projected solid angle.
+//!
+//! The sphere of directions is an octahedron whose triangles are halved, in the order of the Sierpiński curve, so that
+//! successive leaves share an edge: rays that are stratified along the curve are stratified over the sphere. A leaf has
+//! one radiance. Where a node lies above the horizon of a surface as a whole, its irradiance is the product of its
+//! vector irradiance with the normal; only leaves across the horizon are clipped (Lambert's formula).
+
+use std::{cmp::Ordering, collections::BinaryHeap, f32::consts::PI, ops::Range};
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::light_tree::{Arriving, Target};
+use crate::{
+    geometry::{irradiance_vector, point_irradiance, triangle_point},
+    hierarchy::{Moments, Reading},
+    scene::{Sky, SkySample},
+    transport::luminance,
+};
+
+/// Halvings of each octant at least: 512 leaves of 11°. Fewer, and rays are stratified less; more, and horizons have
+/// more leaves.
+const LEAST_HALVINGS: u32 = 6;
+
+/// Power that a leaf of one radiance may misplace, as a share of the sky's. Smaller makes more leaves; larger blurs the
+/// shadows of bright spots.
+const MISPLACED_SHARE: f32 = 5e-5;
+
+/// Most leaves. More take time at every horizon; fewer blur the shadows of rich skies.
+const MOST_LEAVES: usize = 16_384;
+
+/// Fewest samples of a picture by which its radiance is distributed over leaves. Fewer make even skies uneven; more
+/// take time before the first picture.
+const LEAST_SAMPLES: usize = 1 << 18;
+
+/// A node: a spherical triangle.
+#[derive(Clone, Debug)]
+struct Node {
+    /// Directions of the corners: the first and the last are where the curve enters and leaves.
+    path: [Vec3; 3],
+    /// Vector irradiance, W/m², by axis.
+    vector: [Vec4; 3],
+    /// Index of the first of two children; 0 for a leaf.
+    first_child: u32,
+    /// Radiosity of a surface of the radiance of a leaf, W/m².
+    radiosity: Vec4,
+}
+
+/// The sky as an emitter.
+#[derive(Clone, Debug)]
+pub(crate) struct SkyTree {
+    /// The octants, then pairs of children.
+    nodes: Vec<Node>,
+    /// If its light is to be that of a link: its moments as those of a cluster around the scene whose surfaces face
+    /// inwards, and how they are read.
+    table: Option<(Moments<Vec4>, Reading)>,
+}
+
+/// A ray to the sky or to the sun.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OutsideRay {
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Its irradiance over its probability density, up to a factor that is the same for all rays from a point.
+    pub weight: f32,
+    /// Colour of luminance 1.
+    pub color: Vec4,
+}
+
+/// A leaf that may be halved.
+struct Candidate {
+    node: usize,
+    samples: Range<usize>,
+    halvings: u32,
+    /// Power that it misplaces; infinite where it is too large.
+    misplaced: f32,
+}
+
+impl Node {
+    fn leaf(path: [Vec3; 3], radiosity: Vec4) -> Self {
+        let vector = irradiance_vector(Vec3::ZERO, facing(path));
+        Self {
+            path,
+            vector: vector.to_array().map(|component| radiosity * component),
+            first_child: 0,
+            radiosity,
+        }
+    }
+
+    /// Where it lies relative to a horizon: wholly above, wholly below, or across.
+    fn side_of(&self, normal: Vec3) -> Option<bool> {
+        let heights = self.path.map(|corner| corner.dot(normal));
+        if heights.iter().all(|&height| height >= 0.0) {
+            Some(true)
+        } else if heights.iter().all(|&height| height <= 0.0) {
+            Some(false)
+        } else {
+            None
+        }
+    }
+
+    /// Irradiance of a node that lies above the horizon.
+    fn whole(&self, normal: Vec3) -> Vec4 {
+        let [x, y, z] = self.vector;
+        (x * normal.x + y * normal.y + z * normal.z).max(Vec4::ZERO)
+    }
+}
+
+impl SkyTree {
+    /// The tree over a sky; `None` if it is dark. With a reading its unoccluded irradiance is that of the directional
+    /// table of a cluster around the scene.
+    pub(super) fn new(sky: &Sky, reading: Option<Reading>) -> Option<Self> {
+        if sky.is_dark() {
+            return None;
+        }
+        let mut tree = match sky {
+            Sky::Dark => return None,
+            Sky::Uniform(radiance) => {
+                let radiosity = (*radiance * PI).extend(0.0);
+                Self::grown(&mut [], |_, _| radiosity)
+            }
+            Sky::Picture(picture) => {
+                let mut samples = picture.samples(LEAST_SAMPLES);
+                Self::grown(&mut samples, |path, samples| {
+                    let power = samples
+                        .iter()
+                        .map(|sample| sample.radiance * sample.solid_angle);
+                    (power.sum::<Vec3>() * (PI / solid_angle(path))).extend(0.0)
+                })
+            }
+        };
+        tree.carry_up();
+        tree.table = reading.map(|reading| (tree.moments(), reading));
+        Some(tree)
+    }
+
+    /// Halve the octants until each leaf is small enough and its samples are alike. `radiosity` gives that of a leaf
+    /// with some samples.
+    fn grown(
+        samples: &mut [SkySample],
+        radiosity: impl Fn([Vec3; 3], &[SkySample]) -> Vec4,
+    ) -> Self {
+        let power =
+            |sample: &SkySample| luminance(sample.radiance.extend(0.0)) * sample.solid_angle;
+        let tolerated = MISPLACED_SHARE * samples.iter().map(power).sum::<f32>();
+        let mut tree = Self {
+            nodes: Vec::new(),
+            table: None,
+        };
+        let mut pending = BinaryHeap::new();
+        let candidate = |node: usize, samples: &[SkySample], from: Range<usize>, halvings: u32| {
+            let solid_angle: f32 = samples.iter().map(|sample| sample.solid_angle).sum();
+            let mean = samples.iter().map(power).sum::<f32>() / solid_angle.max(f32::MIN_POSITIVE);
+            let misplaced = samples
+                .iter()
+                .map(|sample| (power(sample) - mean * sample.solid_angle).abs())
+                .sum();
+            let is_large = halvings < LEAST_HALVINGS;
+            Candidate {
+                node,
+                samples: from,
+                halvings,
+                misplaced: if is_large { f32::INFINITY } else { misplaced },
+            }
+        };
+        // The octants, along the curve around one pole and then around the other.
+        let mut start = 0;
+        for octant in octants() {
+            let count = part(&mut samples[start..], |sample| {
+                octant
+                    .iter()
+                    .all(|corner| corner.dot(sample.direction) >= 0.0)
+            });
+            let range = start..start + count;
+            start = range.end;
+            let own = &samples[range.clone()];
+            pending.push(candidate(tree.nodes.len(), own, range, 0));
+            tree.nodes.push(Node::leaf(octant, radiosity(octant, own)));
+        }
+        // Halves, the worst leaf first.
+        while let Some(Candidate {
+            node,
+            samples: range,
+            halvings,
+            misplaced,
+        }) = pending.pop()
+        {
+            if misplaced <= tolerated || tree.nodes.len() >= 2 * MOST_LEAVES {
+                break;
+            }
+            let [left, apex, right] = tree.nodes[node].path;
+            let middle = (left + right).normalize_or(apex);
+            let plane = apex.cross(middle);
+            let is_left = plane.dot(left) >= 0.0;
+            let own = &mut samples[range.clone()];
+            let count = part(own, |sample| {
+                (plane.dot(sample.direction) >= 0.0) == is_left
+            });
+            let first = tree.nodes.len();
+            tree.nodes[node].first_child = first as u32;
+            let (one, other) = (
+                range.start..range.start + count,
+                range.start + count..range.end,
+            );
+            for (path, range) in [([left, middle, apex], one), ([apex, middle, right], other)] {
+                let own = &samples[range.clone()];
+                // A single sample cannot be told further.
+                let child = candidate(tree.nodes.len(), own, range, halvings + 1);
+                tree.nodes.push(Node::leaf(path, radiosity(path, own)));
+                pending.push(child);
+            }
+        }
+        tree
+    }
+
+    /// Compute the vector irradiances of parents, children before parents.
+    fn carry_up(&mut self) {
+        for index in (0..self.nodes.len()).rev() {
+            if let Some([first, second]) = self.children(index) {
+                let pairs = self.nodes[first]
+                    .vector
+                    .into_iter()
+                    .zip(self.nodes[second].vector);
+                let sums: Vec<Vec4> = pairs.map(|(a, b)| a + b).collect();
+                self.nodes[index].vector.copy_from_slice(&sums);
+            }
+        }
+    }
+
+    fn children(&self, node: usize) -> Option<[usize; 2]> {
+        let first = self.nodes[node].first_child as usize;
+        (first != 0).then_some([first, first + 1])
+    }
+
+    fn leaves(&self) -> impl Iterator<Item = &Node> {
+        self.nodes.iter().filter(|node| node.first_child == 0)
+    }
+
+    /// Moments of the sky as a cluster of surfaces that face inwards.
+    fn moments(&self) -> Moments<Vec4> {
+        let mut moments = Moments::default();
+        for leaf in self.leaves() {
+            moments.add(
+                -irradiance_vector(Vec3::ZERO, facing(leaf.path)),
+                leaf.radiosity,
+            );
+        }
+        moments
+    }
+
+    /// Upper bound of the irradiance by channel, W/m².
+    pub(super) fn brightest(&self) -> Vec4 {
+        let even = self
+            .leaves()
+            .map(|leaf| leaf.radiosity)
+            .fold(Vec4::ZERO, Vec4::max);
+        let all = self
+            .leaves()
+            .map(|leaf| leaf.radiosity * solid_angle(leaf.path));
+        even.min(all.sum::<Vec4>() / PI)
+    }
+
+    /// Mean of the unoccluded irradiance over all normals, W/m².
+    pub(super) fn mean_irradiance(&self) -> Vec4 {
+        let all = self
+            .leaves()
+            .map(|leaf| leaf.radiosity * solid_angle(leaf.path));
+        all.sum::<Vec4>() / (4.0 * PI)
+    }
+
+    /// Unoccluded irradiance of a surface with this unit normal, W/m²; `cut` is set to its parts along the curve.
+    pub(super) fn unoccluded(&self, normal: Vec3, cut: &mut Vec<Arriving>) -> Vec4 {
+        cut.clear();
+        let mut sums = (Vec4::ZERO, 0.0);
+        for octant in 0..OCTANTS {
+            self.add_to_cut(octant, normal, cut, &mut sums);
+        }
+        match &self.table {
+            Some((moments, reading)) => moments.project(-normal, *reading).max(Vec4::ZERO),
+            None => sums.0,
+        }
+    }
+
+    /// Add a node to a cut, with the sums so far of irradiance and of its luminance.
+    fn add_to_cut(
+        &self,
+        index: usize,
+        normal: Vec3,
+        cut: &mut Vec<Arriving>,
+        sums: &mut (Vec4, f32),
+    ) {
+        let node = &self.nodes[index];
+        let irradiance = match (node.side_of(normal), self.children(index)) {
+            (Some(false), _) => return,
+            (Some(true), _) => node.whole(normal),
+            (None, Some(children)) => {
+                for child in children {
+                    self.add_to_cut(child, normal, cut, sums);
+                }
+                return;
+            }
+            (None, None) => {
+                node.radiosity * point_irradiance(Vec3::ZERO, normal, facing(node.path))
+            }
+        };
+        sums.0 += irradiance;
+        sums.1 += luminance(irradiance);
+        let target = Target::Node(index as u32);
+        cut.push(Arriving {
+            until: sums.1,
+            target,
+        });
+    }
+
+    /// A ray into a node of a cut, for a uniform number `place` in 0…1 and a point of the unit square; `share` is the
+    /// luminance of the node's irradiance. `None` below the horizon.
+    pub(super) fn aim(
+        &self,
+        index: usize,
+        share: f32,
+        normal: Vec3,
+        mut place: f32,
+        square: Vec2,
+    ) -> Option<OutsideRay> {
+        // A leaf of the node, with the probability of its irradiance.
+        let (mut index, mut chance) = (index, share);
+        while let Some([first, second]) = self.children(index) {
+            let [a, b] = [first, second].map(|child| luminance(self.nodes[child].whole(normal)));
+            let of_first = match a / (a + b) {
+                share if share.is_finite() => share,
+                _ => 0.5,
+            };
+            (index, chance, place) = if place < of_first {
+                (first, chance * of_first, place / of_first)
+            } else {
+                let rest = 1.0 - of_first;
+                (second, chance * rest, (place - of_first) / rest)
+            };
+        }
+        // A point of its flat triangle.
+        let node = &self.nodes[index];
+        let [a, b, c] = facing(node.path);
+        let at = triangle_point(square);
+        let point = a * at.x + b * at.y + c * at.z;
+        let inwards = (b - a).cross(c - a) * 0.5;
+        let squared = point.length_squared();
+        let cosines = -point.dot(inwards) * point.dot(normal);
+        let brightness = luminance(node.radiosity);
+        let weight = brightness * cosines / (PI * squared * squared * chance);
+        (weight.is_finite() && weight > 0.0).then(|| OutsideRay {
+            direction: point / squared.sqrt(),
+            weight,
+            color: node.radiosity / brightness,
+        })
+    }
+}
+
+const OCTANTS: usize = 8;
+
+/// The octants of the sphere, in the order of the curve.
+fn octants() -> impl Iterator<Item = [Vec3; 3]> {
+    const AROUND: [Vec3; 4] = [Vec3::X, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Z];
+    [Vec3::Y, Vec3::NEG_Y]
+        .into_iter()
+        .flat_map(|pole| (0..4).map(move |side| [AROUND[side], pole, AROUND[(side + 1) % 4]]))
+}
+
+/// Move the samples for which a condition holds to the front. Returns their number.
+fn part(samples: &mut [SkySample], is_first: impl Fn(&SkySample) -> bool) -> usize {
+    let mut count = 0;
+    for index in 0..samples.len() {
+        if is_first(&samples[index]) {
+            samples.swap(index, count);
+            count += 1;
+        }
+    }
+    count
+}
+
+/// The same triangle, wound so that its front faces the centre of the sphere.
+fn facing([a, b, c]: [Vec3; 3]) -> [Vec3; 3] {
+    if a.dot(b.cross(c)) > 0.0 {
+        [a, c, b]
+    } else {
+        [a, b, c]
+    }
+}
+
+/// Solid angle of a spherical triangle of unit vectors, steradians (Van Oosterom and Strackee, 1983).
+fn solid_angle([a, b, c]: [Vec3; 3]) -> f32 {
+    let volume = a.dot(b.cross(c)).abs();
+    2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let by_power = self.misplaced.total_cmp(&other.misplaced);
+        by_power.then(other.node.cmp(&self.node))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        geometry::{Random, cosine_direction},
+        scene::{SkyPicture, Texture, UpAxis},
+    };
+
+    fn random_normal(random: &mut Random) -> Vec3 {
+        let unit = Vec3::from_array([(); 3].map(|()| 2.0 * random.uniform() - 1.0));
+        unit.try_normalize().unwrap_or(Vec3::Y)
+    }
+
+    /// A picture that is bright in a few pixels, and varies elsewhere.
+    fn picture() -> Sky {
+        let (width, height) = (64, 32);
+        let pixel = |index: u32| match index {
+            700 | 701 => Vec3::new(300.0, 200.0, 100.0),
+            _ => Vec3::new(index as f32 / 2048.0, 0.5, (index % 64) as f32 / 64.0),
+        };
+        let texture = Texture {
+            name: String::new(),
+            width,
+            height,
+            pixels: (0..width * height).map(pixel).collect(),
+        };
+        Sky::Picture(SkyPicture::new(
+            Arc::new(texture),
+            Vec3::ONE,
+            UpAxis::Y,
+            0.0,
+        ))
+    }
+
+    #[test]
+    fn a_uniform_sky_gives_every_surface_the_same_irradiance() {
+        let sky = Sky::Uniform(Vec3::new(1.0, 2.0, 0.0));
+        let tree = SkyTree::new(&sky, None).unwrap();
+        let (mut random, mut cut) = (Random::new(1, 0), Vec::new());
+        for normal in Vec3::AXES
+            .into_iter()
+            .chain((0..500).map(|_| random_normal(&mut random)))
+        {
+            let found = tree.unoccluded(normal, &mut cut) / PI;
+            let error = (found - Vec4::new(1.0, 2.0, 0.0, 0.0)).abs().max_element();
+            assert!(error < 1e-4, "{found} for {normal}");
+        }
+        let brightest = tree.brightest() / PI;
+        assert!((brightest.y - 2.0).abs() < 1e-4);
+        assert!((tree.mean_irradiance().x / PI - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_picture_gives_the_irradiance_of_its_radiance() {
+        let sky = picture();
+        let tree = SkyTree::new(&sky, None).unwrap();
+        let (mut random, mut cut) = (Random::new(2, 0), Vec::new());
+        let all = sky_samples(&sky);
+        for _ in 0..20 {
+            let normal = random_normal(&mut random);
+            let expected: Vec3 = all
+                .iter()
+                .map(|s| s.radiance * s.solid_angle * s.direction.dot(normal).max(0.0))
+                .sum();
+            let found = tree.unoccluded(normal, &mut cut);
+            let error = (found.truncate() - expected).abs().max_element();
+            assert!(
+                error < 4e-3 * expected.max_element(),
+                "{found} for {expected}"
+            );
+        }
+    }
+
+    fn sky_samples(sky: &Sky) -> Vec<SkySample> {
+        match sky {
+            Sky::Picture(picture) => picture.samples(LEAST_SAMPLES),
+            _ => Vec::new(),
+        }
+    }
+
+    #[test]
+    fn rays_are_distributed_by_radiance_and_have_even_weights() {
+        let tree = SkyTree::new(&picture(), None).unwrap();
+        let (mut random, mut cut) = (Random::new(3, 0), Vec::new());
+        for _ in 0..10 {
+            let normal = random_normal(&mut random);
+            let whole = luminance(tree.unoccluded(normal, &mut cut));
+            let total = cut.last().unwrap().until;
+            assert!((total / whole - 1.0).abs() < 1e-4);
+            // The mean of the weights is 1, and so is that over a part of the sky relative to its share.
+            let axis = random_normal(&mut random);
+            let (mut sum, mut squares, mut part, count) = (0.0, 0.0, 0.0, 4000);
+            for ray in 0..count {
+                let at = (ray as f32 + random.uniform()) / count as f32 * total;
+                let chosen = cut
+                    .partition_point(|part| part.until <= at)
+                    .min(cut.len() - 1);
+                let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
+                let share = cut[chosen].until - before;
+                let Target::Node(node) = cut[chosen].target else {
+                    unreachable!()
+                };
+                let place = (at - before) / share;
+                let square = random.uniform_2d();
+                let Some(ray) = tree.aim(node as usize, share, normal, place, square) else {
+                    continue;
+                };
+                assert!(ray.direction.dot(normal) >= 0.0);
+                sum += ray.weight;
+                squares += ray.weight * ray.weight;
+                part += if ray.direction.dot(axis) > 0.0 {
+                    ray.weight
+                } else {
+                    0.0
+                };
+            }
+            let (mean, squares) = (sum / count as f32, squares / count as f32);
+            assert!((mean - 1.0).abs() < 0.02, "{mean}");
+            assert!(squares < 1.2, "{squares}");
+            let expected: f32 = sky_samples(&picture())
+                .iter()
+                .filter(|s| s.direction.dot(axis) > 0.0)
+                .map(|s| {
+                    let radiance = luminance(s.radiance.extend(0.0));
+                    radiance * s.solid_angle * s.direction.dot(normal).max(0.0)
+                })
+                .sum();
+            let (found, expected) = (part / count as f32, expected / whole);
+            assert!((found - expected).abs() < 0.03, "{found} for {expected}");
+        }
+    }
+
+    #[test]
+    fn a_table_reads_a_uniform_sky_as_a_cluster_around_the_scene() {
+        let sky = Sky::Uniform(Vec3::ONE);
+        let (mut random, mut cut) = (Random::new(4, 0), Vec::new());
+        for _ in 0..50 {
+            let normal = cosine_direction(Vec3::Y, random.uniform_2d());
+            let read = |reading| {
+                let tree = SkyTree::new(&sky, Some(reading)).unwrap();
+                tree.unoccluded(normal, &mut Vec::new()).x / PI
+            };
+            // The faces of the paper add up on slanted surfaces.
+            let faces = normal.abs().element_sum();
+            assert!((read(Reading::SixFace) - faces).abs() < 7e-3);
+            assert!((read(Reading::Bounded) - 1.0).abs() < 7e-3);
+            let exact = SkyTree::new(&sky, None).unwrap();
+            assert!((exact.unoccluded(normal, &mut cut).x / PI - 1.0).abs() < 1e-4);
+        }
+    }
+}
