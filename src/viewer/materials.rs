@@ -456,7 +456,7 @@ mod tests {
             "delighted",
             "clamped",
             "",
-            "slight_x2lamb",
+            "x2lamb",
         ] {
             assert!(!is_named_like_lamp(name), "{name}");
         }
