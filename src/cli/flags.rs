@@ -4,10 +4,13 @@ use std::{fmt::Display, str::FromStr, time::Duration};
 
 use clap::{Args, ValueEnum};
 
-use super::values::name_of;
+use super::{
+    light_flags::LightFlags,
+    values::{at_least_zero, name_of, number},
+};
 use crate::{
     export::{ColorOptions, MeshOptions, ToneMap},
-    scene::{SceneOptions, Sides, UpAxis},
+    scene::{Lighting, SceneOptions, Sides, UpAxis},
     solver::{Direct, Keep, Method, Omission, Oracle, SolveSettings},
     worker::RunOptions,
 };
@@ -24,7 +27,7 @@ pub enum Preset {
     Final,
 }
 
-/// Flags of [`SceneOptions`].
+/// Flags of [`SceneOptions`] and of [`Lighting`].
 #[derive(Clone, Debug, Args)]
 pub struct SceneFlags {
     /// Which sides of faces reflect and emit
@@ -54,9 +57,20 @@ pub struct SceneFlags {
         help_heading = "Scene"
     )]
     pub up: UpFlag,
+    /// Light
+    #[command(flatten)]
+    pub light: LightFlags,
 }
 
 impl SceneFlags {
+    /// The light that the flags ask for.
+    ///
+    /// # Errors
+    /// As [`LightFlags::lighting`].
+    pub fn lighting(&self) -> anyhow::Result<Lighting> {
+        self.light.lighting()
+    }
+
     /// The options that the flags ask for.
     pub fn options(&self) -> SceneOptions {
         let default = SceneOptions::default();
@@ -368,21 +382,6 @@ pub enum MtlColorFlag {
     Linear,
     /// Decoded from sRGB
     Srgb,
-}
-
-fn number(text: &str) -> Result<f32, String> {
-    text.parse()
-        .ok()
-        .filter(|number: &f32| number.is_finite())
-        .ok_or_else(|| "not a number".to_owned())
-}
-
-/// A finite number that is not negative.
-pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
-    number(text).and_then(|value| match value >= 0.0 {
-        true => Ok(value),
-        false => Err("must be at least 0".to_owned()),
-    })
 }
 
 fn fraction(text: &str) -> Result<f32, String> {

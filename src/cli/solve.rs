@@ -18,8 +18,8 @@ use super::{
     output::{self, Destination},
     progress::Progress,
     report::{
-        Machine, ReferenceFacts, SceneFacts, SolveReport, StepFacts, Totals, WarningFacts,
-        core_count,
+        LightFacts, Machine, ReferenceFacts, SceneFacts, SolveReport, StepFacts, Totals,
+        WarningFacts, core_count,
     },
     truth::{self, Errors, Truth},
 };
@@ -108,10 +108,12 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     let begin = Instant::now();
     let options = arguments.scene_flags.options();
     interruption.ends_at_once(true);
+    let lighting = arguments.scene_flags.lighting()?;
     let scene = Arc::new(load(
         arguments.path.as_deref(),
         arguments.scene.as_deref(),
         &options,
+        &lighting,
     )?);
     interruption.ends_at_once(false);
     let interrupted = interruption.flag;
@@ -410,6 +412,7 @@ fn report(
     SolveReport {
         version: env!("CARGO_PKG_VERSION"),
         scene: SceneFacts::of(scene),
+        lights: LightFacts::of(scene),
         settings: arguments.setting_flags.settings(),
         color: arguments
             .run_flags

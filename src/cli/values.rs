@@ -62,6 +62,22 @@ values!(Omission {
     Outside = "outside", "The sky and the sun where no surface sees them";
 });
 
+/// A finite number.
+pub(super) fn number(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|number: &f32| number.is_finite())
+        .ok_or_else(|| "not a number".to_owned())
+}
+
+/// A finite number that is not negative.
+pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
+    number(text).and_then(|value| match value >= 0.0 {
+        true => Ok(value),
+        false => Err("must be at least 0".to_owned()),
+    })
+}
+
 /// The name of a value on the command line.
 pub(super) fn name_of(value: &impl ValueEnum) -> String {
     let value = value.to_possible_value();

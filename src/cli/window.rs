@@ -60,6 +60,7 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
     viewer::run(viewer::Options {
         source: Some(source),
         scene_options: flags.scene_flags.options(),
+        lighting: flags.scene_flags.lighting()?,
         settings: flags.setting_flags.settings(),
         settings_are_asked_for: flags.setting_flags.are_given(),
         run: flags.run_flags.options(),

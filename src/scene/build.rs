@@ -83,15 +83,7 @@ impl SceneBuilder {
         if options.up.is_none() {
             scene.find_up(told);
         }
-        if !scene.has_emitter() {
-            scene.warnings.push(Warning {
-                kind: WarningKind::NoEmitter,
-                message: "nothing emits light, so the result is black; give a material Ke above 0"
-                    .to_owned(),
-                count: 1,
-                place: None,
-            });
-        }
+        scene.warn_of_darkness();
         cut_crossings(&mut scene);
         Ok(scene)
     }

@@ -106,6 +106,7 @@ impl App {
                 ..options.run.clone()
             },
             scene_options: options.scene_options,
+            lighting: options.lighting.clone(),
             view: options.view.apply(&preferences.view()),
             panels: preferences.panels(),
             recent,

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    scene::{self, ReadProgress, Scene, SceneOptions, builtin},
+    scene::{self, Lighting, ReadProgress, Scene, SceneOptions, builtin},
     worker::Wake,
 };
 
@@ -168,7 +168,12 @@ impl Loader {
     ///
     /// # Errors
     /// When the system refuses a thread.
-    pub fn start(source: SceneSource, options: SceneOptions, wake: Wake) -> std::io::Result<Self> {
+    pub fn start(
+        source: SceneSource,
+        options: SceneOptions,
+        lighting: Lighting,
+        wake: Wake,
+    ) -> std::io::Result<Self> {
         let (sender, receiver) = mpsc::channel();
         let tracker = Tracker::default();
         let (wanted, tracked) = (source.clone(), tracker.clone());
@@ -176,7 +181,7 @@ impl Loader {
             .name("loader".to_owned())
             .spawn(move || {
                 // Nobody listens when another scene was asked for meanwhile.
-                let _ = sender.send(load(wanted, &options, &tracked));
+                let _ = sender.send(load(wanted, &options, &lighting, &tracked));
                 wake();
             })?;
         Ok(Self {
@@ -217,6 +222,7 @@ impl Loader {
 fn load(
     source: SceneSource,
     options: &SceneOptions,
+    lighting: &Lighting,
     tracker: &Tracker,
 ) -> Result<LoadedScene, String> {
     tracker.enter(Phase::Reading);
@@ -233,6 +239,7 @@ fn load(
             (scene, Some(viewpoint))
         }
     };
+    let scene = lighting.apply(scene);
     tracker.enter(Phase::BuildingRayTree);
     let rays = RayTree::new(&scene);
     tracker.enter(Phase::ChoosingView);
@@ -259,6 +266,7 @@ fn is_grey(scene: &Scene) -> bool {
     let is_grey = |color: Vec3| color.min_element() == color.max_element();
     let mut surfaces = scene.surfaces.iter();
     scene.textures.is_empty()
+        && scene.environment.is_grey()
         && surfaces.all(|surface| is_grey(surface.reflectance) && is_grey(surface.emission))
 }
 

@@ -450,14 +450,7 @@ mod tests {
         for name in lamps {
             assert!(is_named_like_lamp(name), "{name}");
         }
-        for name in [
-            "lightgrey",
-            "wall",
-            "delighted",
-            "clamped",
-            "",
-            "x2lamb",
-        ] {
+        for name in ["lightgrey", "wall", "delighted", "clamped", "", "x2lamb"] {
             assert!(!is_named_like_lamp(name), "{name}");
         }
     }

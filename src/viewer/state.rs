@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     hierarchy::NodeId,
-    scene::{Scene, SceneOptions},
+    scene::{Lighting, Scene, SceneOptions},
     solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
@@ -56,6 +56,8 @@ pub struct State {
     pub options: RunOptions,
     /// How scenes are read.
     pub scene_options: SceneOptions,
+    /// The light that they have beside their own.
+    pub lighting: Lighting,
     /// Its lights and materials, as they were changed.
     pub materials: Materials,
     /// How they were before and after changes.

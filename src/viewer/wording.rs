@@ -1,7 +1,7 @@
 //! Sentences of other rooms as the window says them: they name controls where the command line names flags.
 
 /// Flags by the name of their control in the window.
-const CONTROLS: [(&str, &str); 13] = [
+const CONTROLS: [(&str, &str); 14] = [
     ("--sides", "Sides"),
     ("--up", "Camera"),
     ("--epsilon", "Link threshold ε"),
@@ -15,10 +15,11 @@ const CONTROLS: [(&str, &str); 13] = [
     ("--samples", "Samples p"),
     ("--method", "Clusters"),
     ("--reference", "Trace reference"),
+    ("--sky", "Sky"),
 ];
 
 /// Values of flags by their label in the window.
-const VALUES: [(&str, &str); 8] = [
+const VALUES: [(&str, &str); 9] = [
     ("auto", "Automatic"),
     ("+Y", "Y is up"),
     ("one", "One-sided"),
@@ -27,6 +28,7 @@ const VALUES: [(&str, &str); 8] = [
     ("linked", "Links"),
     ("interval", "Interval bounds"),
     ("samples", "p samples"),
+    ("none", "None"),
 ];
 
 /// A sentence without flags: `--sides two` becomes “Sides: Two-sided”. A flag without a control keeps its words.

@@ -100,13 +100,14 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
 ];
 
 /// Words that only some rooms may say.
-const CONFINED: [(&str, &[&str]); 7] = [
+const CONFINED: [(&str, &[&str]); 8] = [
     ("egui", &["viewer"]),
     ("eframe", &["viewer"]),
     ("rfd", &["viewer"]),
     ("wgpu", &["viewer"]),
     ("obvhs", &["geometry"]),
     ("tobj", &["scene"]),
+    ("hw_skymodel", &["scene"]),
     ("clap", &["cli"]),
 ];
 

@@ -1,5 +1,7 @@
 //! Small scenes with known light, made in the tests that need them.
 
+#![allow(dead_code, reason = "each test uses some of it")]
+
 use glam::{DVec3, Vec3};
 use vecrad::scene::{Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides};
 

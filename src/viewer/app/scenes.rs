@@ -26,7 +26,8 @@ impl App {
 
     fn start_loader(&mut self, source: SceneSource) {
         self.state.messages.open_scene();
-        match Loader::start(source, self.state.scene_options, self.wake.clone()) {
+        let (options, lighting) = (self.state.scene_options, self.state.lighting.clone());
+        match Loader::start(source, options, lighting, self.wake.clone()) {
             Ok(loader) => self.state.loading = Some(loader),
             Err(error) => self
                 .state
