@@ -11,8 +11,9 @@ use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use glam::{Vec2, Vec3};
 use vecrad::{
+    scene::{Lighting, Sky, SkySource, SunSource},
     solver::SolveSettings,
-    viewer::{Options, action::Action, app::App, loader::SceneSource, session},
+    viewer::{Options, action::Action, app::App, loader::SceneSource, run::RunStatus, session},
 };
 use windows::{one_triangle, perform, plates, wait_for, window};
 
@@ -79,6 +80,36 @@ fn a_lamp_is_made_undone_and_made_again() {
     assert!(!is_lamp(&harness));
     press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     assert!(is_lamp(&harness));
+}
+
+#[test]
+fn sky_and_sun_are_changed_and_undone() {
+    let mut harness = plates();
+    let sky = SkySource::Uniform(Vec3::new(0.5, 0.75, 1.0));
+    let lighting = Lighting {
+        sky: Some(sky),
+        sun: Some(SunSource::Disc {
+            azimuth: 90.0,
+            elevation: 30.0,
+            irradiance: Vec3::splat(10.0),
+            diameter: 0.53,
+        }),
+        ..Lighting::default()
+    };
+    perform(&mut harness, Action::Light(lighting));
+    let environment = |harness: &Harness<'static, App>| {
+        let loaded = harness.state().state.loaded.as_ref().unwrap();
+        loaded.scene.environment.clone()
+    };
+    let shown = environment(&harness);
+    assert_eq!(shown.sky, Sky::Uniform(Vec3::new(0.5, 0.75, 1.0)));
+    assert!(shown.sun.is_some_and(|sun| sun.direction.x > 0.8));
+    assert!(!harness.state().state.is_grey());
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert!(environment(&harness).is_dark());
 }
 
 #[test]

@@ -118,7 +118,7 @@ impl Lighting {
     }
 
     /// The environment of a scene in W·sr⁻¹·m⁻²: its own with what is asked for in its place.
-    fn environment(&self, scene: &Scene) -> Environment {
+    pub fn environment(&self, scene: &Scene) -> Environment {
         let own = (*scene.environment).clone().scaled(scene.radiance_unit);
         let own_sky = if own.is_default { Sky::Dark } else { own.sky };
         let environment = Environment {

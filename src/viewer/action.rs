@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::{camera::AxisView, loader::SceneSource, materials::Materials, view::ViewMode};
 use crate::{
-    scene::{Sides, UpAxis},
+    scene::{Lighting, Sides, UpAxis},
     solver::SolveSettings,
     worker::RunOptions,
 };
@@ -38,6 +38,8 @@ pub enum Action {
     Options(RunOptions),
     /// Light the scene with other lights and materials.
     Relight(Materials),
+    /// Light the scene from another sky and sun.
+    Light(Lighting),
     /// Lights and materials as before the last change.
     Undo,
     /// Lights and materials as before that was undone.

@@ -62,6 +62,7 @@ impl SceneSource {
 }
 
 /// A scene with what the window needs to show it.
+#[derive(Clone)]
 pub struct LoadedScene {
     /// Where it came from.
     pub source: SceneSource,
@@ -85,6 +86,18 @@ pub struct LoadedScene {
     pub is_grey: bool,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
+}
+
+impl LoadedScene {
+    /// The same under another sky and sun.
+    pub fn under(&self, lighting: &Lighting) -> Self {
+        let scene = Scene::clone(&self.scene).in_environment(lighting.environment(&self.scene));
+        Self {
+            is_grey: is_grey(&scene),
+            scene: Arc::new(scene),
+            ..self.clone()
+        }
+    }
 }
 
 /// Stages of loading a scene, in order.

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{Appearance, Material, Scene, Surface, TriangleId};
+use crate::scene::{Appearance, Lighting, Material, Scene, Surface, TriangleId};
 
 /// A light as its controls show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -323,11 +323,20 @@ fn is_named_like_lamp(name: &str) -> bool {
         })
 }
 
-/// Materials before and after changes, to go back and forth between.
+/// All that can be changed about the light of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lights {
+    /// Its lamps and materials.
+    pub materials: Materials,
+    /// Sky and sun.
+    pub lighting: Lighting,
+}
+
+/// Lights and materials before and after changes, to go back and forth between.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    past: Vec<Materials>,
-    future: Vec<Materials>,
+    past: Vec<Lights>,
+    future: Vec<Lights>,
     changed: Option<Instant>,
 }
 
@@ -337,8 +346,8 @@ impl History {
     /// Changes that follow each other sooner belong together, as those of one drag do.
     const TOGETHER: Duration = Duration::from_millis(700);
 
-    /// Remember the materials before a change that is made at this time.
-    pub fn note(&mut self, before: Materials, now: Instant) {
+    /// Remember lights and materials before a change that is made at this time.
+    pub fn note(&mut self, before: Lights, now: Instant) {
         let last = self.changed.replace(now);
         self.future.clear();
         if last.is_some_and(|last| now.duration_since(last) < Self::TOGETHER) {
@@ -355,16 +364,16 @@ impl History {
         !self.past.is_empty()
     }
 
-    /// The materials before the last change, given those of now.
-    pub fn undo(&mut self, now: Materials) -> Option<Materials> {
+    /// Lights and materials before the last change, given those of now.
+    pub fn undo(&mut self, now: Lights) -> Option<Lights> {
         let before = self.past.pop()?;
         self.future.push(now);
         self.changed = None;
         Some(before)
     }
 
-    /// The materials after the change that was undone last, given those of now.
-    pub fn redo(&mut self, now: Materials) -> Option<Materials> {
+    /// Lights and materials after the change that was undone last, given those of now.
+    pub fn redo(&mut self, now: Lights) -> Option<Lights> {
         let after = self.future.pop()?;
         self.past.push(now);
         self.changed = None;
@@ -478,9 +487,12 @@ mod tests {
 
     #[test]
     fn changes_are_undone_and_made_again() {
-        let first = Materials::of(&cornell());
+        let first = Lights {
+            materials: Materials::of(&cornell()),
+            lighting: Lighting::default(),
+        };
         let mut second = first.clone();
-        second.make_lamp(0);
+        second.materials.make_lamp(0);
         let (mut history, start) = (History::default(), Instant::now());
         history.note(first.clone(), start);
         // Still the same drag.

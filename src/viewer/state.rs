@@ -9,7 +9,7 @@ use super::{
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
-    materials::{History, Materials},
+    materials::{History, Lights, Materials},
     messages::Messages,
     options::CameraRequest,
     panel_state::PanelState,
@@ -108,6 +108,14 @@ impl State {
         let aspect = self.aspect();
         if let Some(loaded) = &self.loaded {
             self.rig.target.frame_box(loaded.min, loaded.max, aspect);
+        }
+    }
+
+    /// Lights and materials as they are now.
+    pub fn lights(&self) -> Lights {
+        Lights {
+            materials: self.materials.clone(),
+            lighting: self.lighting.clone(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Actions carried out.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use eframe::egui;
 
@@ -8,7 +8,7 @@ use super::{
     super::{
         action::{Action, Scale},
         bindings, clusters, focus,
-        materials::Materials,
+        materials::{Lights, Materials},
         messages::Severity,
         navigation::Picked,
         panel_state::PanelState,
@@ -21,7 +21,7 @@ use super::{
     },
     App,
 };
-use crate::worker::Effect;
+use crate::{scene::Lighting, worker::Effect};
 
 impl App {
     /// Carry out what was asked for.
@@ -48,19 +48,31 @@ impl App {
                 self.worker.change_options(options);
             }
             Action::Relight(materials) => {
-                let before = self.state.materials.clone();
-                self.state.history.note(before, Instant::now());
+                self.remember_lights();
                 self.relight(materials);
             }
+            Action::Light(lighting) => {
+                self.remember_lights();
+                self.light(lighting);
+            }
             Action::Undo | Action::Redo => {
-                let now = self.state.materials.clone();
+                let now = self.state.lights();
                 let history = &mut self.state.history;
                 let other = match action {
                     Action::Undo => history.undo(now),
                     _ => history.redo(now),
                 };
-                if let Some(materials) = other {
-                    self.relight(materials);
+                if let Some(Lights {
+                    materials,
+                    lighting,
+                }) = other
+                {
+                    if lighting != self.state.lighting {
+                        self.light(lighting);
+                    }
+                    if materials != self.state.materials {
+                        self.relight(materials);
+                    }
                 }
             }
             Action::Sides(sides) => {
@@ -266,6 +278,39 @@ impl App {
             self.state.run.last_change = None;
             self.worker.reset();
         }
+    }
+
+    /// Remember lights and materials before a change.
+    fn remember_lights(&mut self) {
+        let before = self.state.lights();
+        self.state.history.note(before, Instant::now());
+    }
+
+    /// Light the scene from another sky and sun: from the beginning, with the same geometry and the same rays.
+    fn light(&mut self, lighting: Lighting) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let loaded = loaded.under(&lighting);
+        self.state.lighting = lighting;
+        self.state.inspections.close();
+        self.state.run.last_change = None;
+        self.worker.watch(None);
+        self.state.truth.forget_reference();
+        if self.state.view.mode == ViewMode::Error {
+            self.state.view.mode = ViewMode::default();
+        }
+        self.worker.start_with_rays(
+            loaded.scene.clone(),
+            loaded.rays.clone(),
+            self.state.settings.clone(),
+            self.state.options.clone(),
+        );
+        if self.state.materials.are_changed() {
+            let appearances = self.state.materials.appearances(&loaded.scene);
+            self.worker.relight(appearances.into());
+        }
+        self.state.loaded = Some(Arc::new(loaded));
     }
 
     /// Light the scene with other lights and materials. A reference was traced with those before.

@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use super::{
     color::color_button,
+    outside,
     row::{self, slider},
 };
 use crate::viewer::{
@@ -24,6 +25,8 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
     let Some(loaded) = &state.loaded else {
         return;
     };
+    outside::outside_ui(ui, state, actions);
+    ui.separator();
     let mut materials = state.materials.clone();
     lights_ui(ui, &mut materials);
     row::section(ui, "Materials", false, |ui| {
