@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    scene::{self, Lighting, ReadProgress, Scene, SceneOptions, builtin},
+    scene::{self, Environment, Lighting, ReadProgress, Scene, SceneOptions, builtin},
     worker::Wake,
 };
 
@@ -68,6 +68,8 @@ pub struct LoadedScene {
     pub source: SceneSource,
     /// The scene.
     pub scene: Arc<Scene>,
+    /// Sky and sun that it brings along, in its own units.
+    own_environment: Arc<Environment>,
     /// For picking, and for the reference.
     pub rays: Arc<RayTree>,
     /// Lower corner of what matters, in frame units.
@@ -91,7 +93,10 @@ pub struct LoadedScene {
 impl LoadedScene {
     /// The same under another sky and sun.
     pub fn under(&self, lighting: &Lighting) -> Self {
-        let scene = Scene::clone(&self.scene).in_environment(lighting.environment(&self.scene));
+        let mut scene = Scene::clone(&self.scene);
+        scene.environment = self.own_environment.clone();
+        let environment = lighting.environment(&scene);
+        let scene = scene.in_environment(environment);
         Self {
             is_grey: is_grey(&scene),
             scene: Arc::new(scene),
@@ -252,6 +257,7 @@ fn load(
             (scene, Some(viewpoint))
         }
     };
+    let own_environment = scene.environment.clone();
     let scene = lighting.apply(scene);
     tracker.enter(Phase::BuildingRayTree);
     let rays = RayTree::new(&scene);
@@ -260,6 +266,7 @@ fn load(
     let [min, max] = look.bounds;
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
+        own_environment,
         emitter_count: scene.surfaces.iter().filter(emits).count(),
         has_backs: scene.triangles.iter().any(|triangle| !triangle.two_sided),
         is_grey: is_grey(&scene),

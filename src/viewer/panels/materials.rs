@@ -25,8 +25,6 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
     let Some(loaded) = &state.loaded else {
         return;
     };
-    outside::outside_ui(ui, state, actions);
-    ui.separator();
     let mut materials = state.materials.clone();
     lights_ui(ui, &mut materials);
     row::section(ui, "Materials", false, |ui| {
@@ -53,6 +51,8 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
     if materials != state.materials {
         actions.push(Action::Relight(materials));
     }
+    ui.separator();
+    outside::outside_ui(ui, state, actions);
 }
 
 fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
