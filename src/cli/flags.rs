@@ -59,11 +59,11 @@ pub struct SceneFlags {
     #[arg(
         long,
         value_enum,
-        default_value = "+Y",
+        default_value = "auto",
         allow_hyphen_values = true,
         help_heading = "Scene"
     )]
-    pub up: UpAxis,
+    pub up: UpFlag,
     /// Light
     #[command(flatten)]
     pub light: LightFlags,
@@ -75,7 +75,7 @@ impl SceneFlags {
     /// # Errors
     /// As [`LightFlags::lighting`].
     pub fn lighting(&self) -> anyhow::Result<Lighting> {
-        self.light.lighting(self.up)
+        self.light.lighting()
     }
 
     /// The options that the flags ask for.
@@ -86,6 +86,7 @@ impl SceneFlags {
             max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
             mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
             is_opaque: self.opaque,
+            up: self.up.axis(),
         }
     }
 }
@@ -355,6 +356,30 @@ impl FromStr for Reference {
             _ => return Err("expected paths, paths=SAMPLES or matrix".to_owned()),
         };
         Ok(Self::Paths(samples))
+    }
+}
+
+/// `--up`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum UpFlag {
+    /// +Z where the floor or a comment of the exporter shows it, else +Y
+    Auto,
+    /// +Y
+    #[value(name = "+Y")]
+    Y,
+    /// +Z
+    #[value(name = "+Z")]
+    Z,
+}
+
+impl UpFlag {
+    /// The axis that is asked for.
+    fn axis(self) -> Option<UpAxis> {
+        match self {
+            Self::Auto => None,
+            Self::Y => Some(UpAxis::Y),
+            Self::Z => Some(UpAxis::Z),
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     LoadError, UsageError,
     values::{at_least_zero, number},
 };
-use crate::scene::{HosekSky, Lamp, Lighting, SkySource, Sun, SunSource, UpAxis, read_sky};
+use crate::scene::{HosekSky, Lamp, Lighting, SkySource, Sun, SunSource, read_sky};
 
 /// Flags of [`Lighting`].
 #[derive(Clone, Debug, Args)]
@@ -104,9 +104,8 @@ impl LightFlags {
     ///
     /// # Errors
     /// When the picture of the sky cannot be read, or the flags do not go together.
-    pub fn lighting(&self, up: UpAxis) -> Result<Lighting> {
+    pub fn lighting(&self) -> Result<Lighting> {
         let mut lighting = Lighting {
-            up,
             lamps: self.emit.iter().map(|lamp| lamp.0.clone()).collect(),
             ..Lighting::default()
         };
@@ -307,9 +306,7 @@ mod tests {
     fn lighting(arguments: &[&str]) -> Result<Lighting, String> {
         let line = Line::try_parse_from([&["test"], arguments].concat());
         let line = line.map_err(|error| error.to_string())?;
-        line.light
-            .lighting(UpAxis::Y)
-            .map_err(|error| error.to_string())
+        line.light.lighting().map_err(|error| error.to_string())
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::{
     export::ColorOptions,
     metrics::ErrorMeasures,
     reference::SampledSurfaces,
-    scene::{Frame, Scene, Sky, UpAxis, Warning},
+    scene::{Frame, Scene, Sky, Warning},
     solver::{Omitted, SolveSettings, StepReport},
     worker::StopReason,
 };
@@ -43,6 +43,7 @@ pub(super) struct SceneFacts {
     materials: usize,
     textures: usize,
     emitters: usize,
+    up: &'static str,
     bounds: Bounds,
 }
 
@@ -64,6 +65,7 @@ impl SceneFacts {
             materials: scene.materials.len(),
             textures: scene.textures.len(),
             emitters: scene.surfaces.iter().filter(emits).count(),
+            up: scene.up.name(),
             bounds: bounds(scene, &scene.frame),
         }
     }
@@ -113,8 +115,8 @@ struct SunFacts {
 }
 
 impl LightFacts {
-    /// The light of a scene in which this axis points up.
-    pub(super) fn of(scene: &Scene, up: UpAxis) -> Self {
+    /// The light of a scene.
+    pub(super) fn of(scene: &Scene) -> Self {
         let unit = scene.radiance_unit;
         let environment = &scene.environment;
         let surfaces = scene.surfaces.iter();
@@ -133,7 +135,7 @@ impl LightFacts {
         };
         let sun = environment.sun.filter(|sun| sun.irradiance != Vec3::ZERO);
         let sun = sun.map(|sun| {
-            let [azimuth, elevation] = sun.place(up);
+            let [azimuth, elevation] = sun.place(scene.up);
             SunFacts {
                 azimuth,
                 elevation,

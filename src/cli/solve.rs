@@ -122,6 +122,9 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     for warning in &scene.warnings {
         output::say(format_args!("warning: {warning}"));
     }
+    if let Some(sentence) = scene.up_sentence() {
+        output::say(format_args!("note: {sentence}"));
+    }
     let errors = Errors::default();
     let traced = Instant::now();
     let (mut worker, reference) = worker(arguments, &scene, &interrupted, &errors)?;
@@ -153,7 +156,6 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &run.snapshot,
         errors_of(arguments, &scene, &run, &measured.errors, &interrupted).as_ref(),
         &arguments.run_flags,
-        arguments.scene_flags.up,
     );
     export?;
     report?;
@@ -359,8 +361,7 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
     let Some(path) = &arguments.export else {
         return Ok(());
     };
-    let up = arguments.scene_flags.up;
-    let export = arguments.run_flags.export(up, scene.radiance_unit);
+    let export = arguments.run_flags.export(scene.up, scene.radiance_unit);
     let format = MeshFormat::of(path)?;
     output::write_whole(path, |out| {
         format.write(out, &run.snapshot, &scene.frame, &export)
@@ -411,11 +412,11 @@ fn report(
     SolveReport {
         version: env!("CARGO_PKG_VERSION"),
         scene: SceneFacts::of(scene),
-        lights: LightFacts::of(scene, arguments.scene_flags.up),
+        lights: LightFacts::of(scene),
         settings: arguments.setting_flags.settings(),
         color: arguments
             .run_flags
-            .export(arguments.scene_flags.up, scene.radiance_unit)
+            .export(scene.up, scene.radiance_unit)
             .color,
         left_out: run.snapshot.omitted.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),

@@ -4,7 +4,7 @@ use clap::{ValueEnum, builder::PossibleValue};
 
 use crate::{
     export::ToneMap,
-    scene::{Sides, UpAxis},
+    scene::Sides,
     solver::{Direct, Method, Omission, Oracle},
 };
 
@@ -29,11 +29,6 @@ values!(Sides {
     Auto = "auto", "Closed shells one-sided, sheets two-sided";
     One = "one", "Counter-clockwise is the front";
     Two = "two", "Both sides";
-});
-
-values!(UpAxis {
-    Y = "+Y", "+Y";
-    Z = "+Z", "+Z";
 });
 
 values!(ToneMap {
@@ -97,9 +92,6 @@ mod tests {
     fn values_are_named_as_in_reports() {
         for omission in Omission::ALL {
             assert_eq!(name_of(&omission), omission.name());
-        }
-        for up in [UpAxis::Y, UpAxis::Z] {
-            assert_eq!(name_of(&up), up.name());
         }
         assert_eq!(Direct::from_str("auto", false), Ok(Direct::Sampled));
     }

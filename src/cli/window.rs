@@ -65,7 +65,7 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
         settings_are_asked_for: flags.setting_flags.are_given(),
         run: flags.run_flags.options(),
         view: flags.view.request(&flags.run_flags),
-        camera: flags.view.camera(flags.scene_flags.up),
+        camera: flags.view.camera(),
     })?;
     Ok(Outcome::Done)
 }

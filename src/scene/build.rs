@@ -56,6 +56,7 @@ impl SceneBuilder {
         );
         let averages = TextureAverages::new(self.pictures(), &self.materials);
         let surfaces = self.surfaces(&frame, &averages, options);
+        let told = self.source.up;
         let mut scene = Scene {
             name: self.source.name,
             files: self.source.files,
@@ -75,9 +76,14 @@ impl SceneBuilder {
             doubled_faces: self.doubled_faces,
             max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
+            up: options.up.unwrap_or_default(),
+            up_evidence: None,
             environment: Arc::default(),
             radiance_unit,
         };
+        if options.up.is_none() {
+            scene.find_up(told);
+        }
         scene.warn_of_darkness();
         cut_crossings(&mut scene);
         Ok(scene)

@@ -9,11 +9,9 @@ use super::{
     suggestion::closest,
 };
 
-/// Light that is asked for. What is not asked for is as the scene has it.
+/// Light that is asked for. What is not asked for is as the scene has it. Sky and sun stand by the scene's up axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lighting {
-    /// The axis that points up, by which sky and sun stand.
-    pub up: UpAxis,
     /// The sky. Where none is asked for, and neither a surface nor the scene's own sky gives light, it is the default
     /// one.
     pub sky: Option<SkySource>,
@@ -79,7 +77,7 @@ impl Lighting {
         scene.files.extend(self.files.iter().cloned());
         scene.warnings.extend(self.warnings.iter().cloned());
         let environment = self.environment(&scene);
-        let sun = environment.sun.map(|sun| sun.place(self.up));
+        let sun = environment.sun.map(|sun| sun.place(scene.up));
         if let Some([_, elevation]) = sun
             && elevation < 0.0
         {
@@ -120,12 +118,12 @@ impl Lighting {
     }
 
     /// The environment of a scene in W·sr⁻¹·m⁻²: its own with what is asked for in its place.
-    fn environment(&self, scene: &Scene) -> Environment {
+    pub fn environment(&self, scene: &Scene) -> Environment {
         let own = (*scene.environment).clone().scaled(scene.radiance_unit);
         let own_sky = if own.is_default { Sky::Dark } else { own.sky };
         let environment = Environment {
-            sky: self.sky.as_ref().map_or(own_sky, |sky| sky.sky(self.up)),
-            sun: self.sun.map_or(own.sun, |sun| sun.sun(self.up)),
+            sky: self.sky.as_ref().map_or(own_sky, |sky| sky.sky(scene.up)),
+            sun: self.sun.map_or(own.sun, |sun| sun.sun(scene.up)),
             is_default: false,
         };
         let needs_sky = self.sky.is_none() && environment.sky.is_dark() && !scene.has_emitter();

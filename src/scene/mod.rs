@@ -52,6 +52,7 @@ mod texture;
 mod texture_statement;
 mod triangulate;
 mod up_axis;
+mod upright;
 mod usable;
 mod warning;
 mod whole;
@@ -77,6 +78,7 @@ pub use sky_file::{SkyError, SkyFile, read_sky};
 pub use suggestion::closest;
 pub use texture::{OmittedTextures, Texture};
 pub use up_axis::UpAxis;
+pub use upright::UpEvidence;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
@@ -238,6 +240,10 @@ pub struct Scene {
     pub cutouts: Vec<Cutout>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
+    /// Which axis points up: what the options say, else what is plain, else +Y.
+    pub up: UpAxis,
+    /// What shows that this axis points up; nothing where it was asked for or is the usual one.
+    pub up_evidence: Option<UpEvidence>,
     /// Light from outside; dark as a scene is read.
     pub environment: Arc<Environment>,
     /// Warnings: what was skipped, corrected or clamped.

@@ -134,9 +134,6 @@ impl App {
             had_focus: false,
             size: egui::Vec2::ZERO,
         };
-        if let Some(up) = options.camera.up {
-            app.state.rig.target.up = up;
-        }
         if let Some(source) = options.source.clone() {
             app.load(source);
             app.first = Some(options);

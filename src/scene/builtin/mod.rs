@@ -23,7 +23,7 @@ pub use room::room_of;
 
 use glam::DVec3;
 
-use super::{BuildError, Environment, Scene, SceneBuilder, SceneOptions};
+use super::{BuildError, Environment, Scene, SceneBuilder, SceneOptions, UpAxis};
 
 /// Where to look at a scene from, in world units, with y up and a vertical field of view of about 45°.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +52,7 @@ impl Builtin {
     pub fn builder(&self) -> SceneBuilder {
         let mut builder = (self.faces)();
         builder.source.name = self.name.to_owned();
+        builder.source.up = Some(UpAxis::Y);
         builder
     }
 
