@@ -140,7 +140,8 @@ impl RayTree {
         self.passing(ray, ends)
     }
 
-    /// What passes along a ray of unit direction out of the scene; see [`Self::transmittance`].
+    /// What passes along a ray of unit direction out of the scene, by channel, 0…1: the product over all triangles that it
+    /// meets but the one that it starts on.
     pub fn transmittance_outward(
         &self,
         origin: Vec3,
@@ -159,7 +160,7 @@ impl RayTree {
         self.transmittance_outward(origin, direction, from) != Vec3::ZERO
     }
 
-    /// What passes along a ray by all triangles but two.
+    /// What passes through all triangles on a ray but two.
     fn passing(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> Vec3 {
         let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
         let mut passing = Vec3::ONE;

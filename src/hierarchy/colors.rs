@@ -230,9 +230,10 @@ impl Hierarchy {
             return;
         };
         varied.shown = shown(scene, appearances, triangle, varied.means);
-        let shown = varied.shown;
+        let (shown, opacity) = (varied.shown, varied.means.opacity);
         if let Some(patch) = self.patches.get_mut(element) {
             (patch.reflectance, patch.emission) = (shown.reflectance, shown.emission);
+            patch.opacity = opacity;
         }
     }
 }

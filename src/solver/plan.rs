@@ -30,6 +30,7 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{Cancel, Method, Omission, Oracle, SolveSettings, output::Omitted};
@@ -170,7 +171,7 @@ impl Plan {
         }
         let dark: Vec<bool> = lit.into_iter().map(|is_lit| !is_lit).collect();
         let patches = || tree.patches.iter().zip(&dark).filter(|(_, dark)| **dark);
-        let emits = |patch: &Patch| patch.emission != glam::Vec3::ZERO;
+        let emits = |patch: &Patch| patch.emission != Vec3::ZERO;
         let unseen = patches().filter(|(patch, _)| emits(patch)).count();
         self.note(
             Omission::Unlit,
@@ -302,7 +303,7 @@ fn sees_outside(scene: &Scene, hierarchy: &Hierarchy, rays: &RayTree, seed: u64)
         let place = triangle_point(random.uniform_2d());
         let point = a * place.x + b * place.y + c * place.z;
         let direction = cosine_direction(patch.normal, random.uniform_2d());
-        rays.leaves(point, direction, Some(patch.triangle))
+        rays.transmittance_outward(point, direction, Some(patch.triangle)) != Vec3::ZERO
     })
 }
 
