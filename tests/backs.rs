@@ -89,6 +89,7 @@ fn draw(
         scene,
         snapshot,
         errors: None,
+        interior: None,
     };
     let camera = Camera::looking(Vec3::new(20.0, 10.0, from_z), Vec3::ZERO, Vec3::Y);
     let view = ViewSettings {

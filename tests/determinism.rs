@@ -6,14 +6,20 @@ use std::{path::Path, sync::Arc, time::Duration};
 
 use vecrad::{
     cli,
-    scene::SceneOptions,
+    scene::{Lighting, SceneOptions},
     solver::{Snapshot, SolveSettings},
     worker::{Event, RunOptions, WorkerHandle},
 };
 
 fn light(threads: usize) -> Arc<Snapshot> {
     let none: Option<&Path> = None;
-    let scene = cli::load(none, Some("room-1022"), &SceneOptions::default()).unwrap();
+    let scene = cli::load(
+        none,
+        Some("room-1022"),
+        &SceneOptions::default(),
+        &Lighting::default(),
+    )
+    .unwrap();
     let mut worker = WorkerHandle::spawn(Arc::new(|| {})).unwrap();
     let options = RunOptions {
         threads,

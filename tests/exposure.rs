@@ -88,6 +88,7 @@ fn draw(squares: &(Arc<Scene>, Snapshot), camera: &Camera, mode: ViewMode) -> Op
         scene: &squares.0,
         snapshot: &squares.1,
         errors: None,
+        interior: None,
     };
     let view = ViewSettings {
         mode,

@@ -336,6 +336,7 @@ mod sidecar {
                 ..ViewSettings::default()
             },
             settings: SolveSettings::finest(),
+            materials: Vec::new(),
         };
         let text = to_toml(&session, &frame).unwrap();
         let (mut used, count) = (0, case_count(4000));

@@ -102,6 +102,7 @@ fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<
         scene,
         snapshot,
         errors: None,
+        interior: None,
     };
     unless_no_adapter(headless::picture(subject, &camera(), view, SIZE))
 }
@@ -332,6 +333,7 @@ fn the_selected_cluster_is_outlined() {
         view: &view,
         is_unlit: false,
         range: [0.0, 1.0],
+        interior: None,
         overlay: &overlay,
         background: Vec3::ZERO,
         pixels_per_point: 1.0,
@@ -381,6 +383,7 @@ fn draw_with(
         view: &plain(mode),
         is_unlit: false,
         range: [0.0, 100.0],
+        interior: None,
         overlay: &Overlay::default(),
         background: Vec3::ZERO,
         pixels_per_point: 1.0,
@@ -477,10 +480,46 @@ fn a_picture_that_is_too_large_is_one_sentence() {
         scene: &scene,
         snapshot: &snapshot,
         errors: None,
+        interior: None,
     };
     match headless::picture(subject, &camera(), &view, [1_000_000, 2]) {
         Err(HeadlessError::NoAdapter(_)) => {}
         Err(error) => assert!(error.to_string().contains("too large"), "{error}"),
         Ok(_) => panic!("no adapter takes a million pixels on a side"),
+    }
+}
+
+#[test]
+fn edges_of_lamps_are_smooth() {
+    // A lamp far brighter than white beside a dark wall: pixels on its slanted edge are as bright as the part of them that it
+    // covers.
+    let mut builder = SceneBuilder::default();
+    let lamp = builder.push_material(Material::plain("lamp", Vec3::ZERO, Vec3::splat(50.0)));
+    let corners = [(-1.0, -1.0), (0.3, -1.0), (-0.1, 1.0), (-1.0, 1.0)]
+        .map(|(x, y)| builder.push_position(DVec3::new(x, y, 0.0)));
+    let [a, b, c, d] = corners;
+    builder.push_triangle([a, b, c], lamp);
+    builder.push_triangle([a, c, d], lamp);
+    let options = SceneOptions::with_sides(Sides::One);
+    let scene = Arc::new(builder.finish(&options).expect("a lamp"));
+    let snapshot = snapshot(&scene, Vec3::ZERO);
+    for tone_map in [ToneMap::None, ToneMap::Neutral] {
+        let view = ViewSettings {
+            tone_map,
+            ..plain(ViewMode::Radiance)
+        };
+        let Some(picture) = draw(&snapshot, &scene, &view) else {
+            return;
+        };
+        let between = picture.display.rows().filter(|row| {
+            let row: Vec<u8> = row.clone().map(|pixel| pixel.0[0]).collect();
+            let (most, least) = (row.iter().max(), row.iter().min());
+            row.iter().any(|shown| {
+                let is_above = least.is_some_and(|least| *shown > least + 30);
+                is_above && most.is_some_and(|most| *shown + 15 < *most)
+            })
+        });
+        let rows = between.count();
+        assert!(rows > 40, "{tone_map:?}: {rows} rows have a pixel between");
     }
 }

@@ -4,10 +4,13 @@ use std::{fmt::Display, str::FromStr, time::Duration};
 
 use clap::{Args, ValueEnum};
 
-use super::values::name_of;
+use super::{
+    light_flags::LightFlags,
+    values::{at_least_zero, name_of, number},
+};
 use crate::{
     export::{ColorOptions, MeshOptions, ToneMap},
-    scene::{SceneOptions, Sides, UpAxis},
+    scene::{Lighting, SceneOptions, Sides, UpAxis},
     solver::{Direct, Keep, Method, Omission, Oracle, SolveSettings},
     worker::RunOptions,
 };
@@ -24,7 +27,7 @@ pub enum Preset {
     Final,
 }
 
-/// Flags of [`SceneOptions`].
+/// Flags of [`SceneOptions`] and of [`Lighting`].
 #[derive(Clone, Debug, Args)]
 pub struct SceneFlags {
     /// Which sides of faces reflect and emit
@@ -56,14 +59,25 @@ pub struct SceneFlags {
     #[arg(
         long,
         value_enum,
-        default_value = "+Y",
+        default_value = "auto",
         allow_hyphen_values = true,
         help_heading = "Scene"
     )]
-    pub up: UpAxis,
+    pub up: UpFlag,
+    /// Light
+    #[command(flatten)]
+    pub light: LightFlags,
 }
 
 impl SceneFlags {
+    /// The light that the flags ask for.
+    ///
+    /// # Errors
+    /// As [`LightFlags::lighting`].
+    pub fn lighting(&self) -> anyhow::Result<Lighting> {
+        self.light.lighting()
+    }
+
     /// The options that the flags ask for.
     pub fn options(&self) -> SceneOptions {
         let default = SceneOptions::default();
@@ -72,6 +86,7 @@ impl SceneFlags {
             max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
             mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
             is_opaque: self.opaque,
+            up: self.up.axis(),
         }
     }
 }
@@ -344,6 +359,30 @@ impl FromStr for Reference {
     }
 }
 
+/// `--up`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum UpFlag {
+    /// +Z where the floor or a comment of the exporter shows it, else +Y
+    Auto,
+    /// +Y
+    #[value(name = "+Y")]
+    Y,
+    /// +Z
+    #[value(name = "+Z")]
+    Z,
+}
+
+impl UpFlag {
+    /// The axis that is asked for.
+    fn axis(self) -> Option<UpAxis> {
+        match self {
+            Self::Auto => None,
+            Self::Y => Some(UpAxis::Y),
+            Self::Z => Some(UpAxis::Z),
+        }
+    }
+}
+
 /// `--mtl-color`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MtlColorFlag {
@@ -351,21 +390,6 @@ pub enum MtlColorFlag {
     Linear,
     /// Decoded from sRGB
     Srgb,
-}
-
-fn number(text: &str) -> Result<f32, String> {
-    text.parse()
-        .ok()
-        .filter(|number: &f32| number.is_finite())
-        .ok_or_else(|| "not a number".to_owned())
-}
-
-/// A finite number that is not negative.
-pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
-    number(text).and_then(|value| match value >= 0.0 {
-        true => Ok(value),
-        false => Err("must be at least 0".to_owned()),
-    })
 }
 
 fn fraction(text: &str) -> Result<f32, String> {

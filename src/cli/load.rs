@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::{self, BuildError, ReadError, Scene, SceneOptions, builtin};
+use crate::scene::{self, BuildError, Lighting, ReadError, Scene, SceneOptions, SkyError, builtin};
 
 /// Why there is no scene.
 #[derive(Debug, thiserror::Error)]
@@ -19,27 +19,47 @@ pub enum LoadError {
     /// Neither a file nor a built-in scene is named.
     #[error("no scene is named")]
     Nothing,
+    /// The picture of the sky cannot be read.
+    #[error(transparent)]
+    Sky(#[from] SkyError),
+    /// No material has the name of a lamp; a sentence.
+    #[error("{0}")]
+    Lamp(String),
     /// Nothing in it can be lit.
     #[error(transparent)]
     Build(#[from] BuildError),
 }
 
-/// Read a file, or make the built-in scene of this name.
+/// Read a file, or make the built-in scene of this name, and light it.
 ///
 /// # Errors
-/// When there is no scene to light.
+/// When there is no scene to light, or no material for a lamp.
 pub fn load(
     path: Option<&Path>,
     name: Option<&str>,
     options: &SceneOptions,
+    lighting: &Lighting,
 ) -> Result<Scene, LoadError> {
-    if let Some(name) = name {
+    let scene = if let Some(name) = name {
         let made = builtin::builtin(name, options);
-        return Ok(made.ok_or_else(|| LoadError::Unknown(name.to_owned()))??);
+        made.ok_or_else(|| LoadError::Unknown(name.to_owned()))??
+    } else {
+        let path = path.ok_or(LoadError::Nothing)?;
+        check_is_file(path)?;
+        scene::read_obj(path, options)?
+    };
+    light(scene, lighting)
+}
+
+/// Light a scene as it is asked for.
+///
+/// # Errors
+/// [`LoadError::Lamp`]
+pub(super) fn light(scene: Scene, lighting: &Lighting) -> Result<Scene, LoadError> {
+    match lighting.misnamed(&scene) {
+        Some(sentence) => Err(LoadError::Lamp(sentence)),
+        None => Ok(lighting.apply(scene)),
     }
-    let path = path.ok_or(LoadError::Nothing)?;
-    check_is_file(path)?;
-    Ok(scene::read_obj(path, options)?)
 }
 
 /// Refuse the name of a built-in scene that stands for a file and is none.
@@ -53,19 +73,11 @@ pub(super) fn check_is_file(path: &Path) -> Result<(), LoadError> {
     }
 }
 
-/// Names that are less alike than this are not suggested: it is what clap takes for flags. Lower, and names are suggested
-/// that have nothing in common; higher, and two swapped letters of a short name are not forgiven.
-const ALIKE: f64 = 0.7;
-
 /// What to do about an unknown name.
 fn hint(name: &str) -> String {
-    let name = name.to_lowercase();
-    let closest = builtin::builtin_names()
-        .map(|known| (strsim::jaro(&name, known), known))
-        .max_by(|(one, _), (other, _)| one.total_cmp(other));
-    match closest {
-        Some((likeness, known)) if likeness > ALIKE => format!("did you mean '{known}'?"),
-        _ => "'vecrad scenes' lists them".to_owned(),
+    match scene::closest(name, builtin::builtin_names()) {
+        Some(known) => format!("did you mean '{known}'?"),
+        None => "'vecrad scenes' lists them".to_owned(),
     }
 }
 
@@ -100,10 +112,10 @@ mod tests {
 
     #[test]
     fn a_built_in_scene_in_the_place_of_a_file_is_recognised() {
-        let options = SceneOptions::default();
-        let error = load(Some(Path::new("cornell")), None, &options).unwrap_err();
+        let (options, lighting) = (SceneOptions::default(), Lighting::default());
+        let error = load(Some(Path::new("cornell")), None, &options, &lighting).unwrap_err();
         assert!(error.to_string().ends_with("--scene cornell"), "{error}");
-        let error = load(Some(Path::new("missing.obj")), None, &options).unwrap_err();
+        let error = load(Some(Path::new("missing.obj")), None, &options, &lighting).unwrap_err();
         assert!(matches!(error, LoadError::Read(ReadError::NotFound { .. })));
     }
 }

@@ -4,6 +4,7 @@
 //! adapter, 1 anything else.
 
 mod flags;
+mod light_flags;
 mod load;
 mod observed;
 mod output;
@@ -24,6 +25,7 @@ use std::{io, path::PathBuf, process::ExitCode};
 use clap::{Parser, Subcommand};
 
 pub use flags::{Preset, Reference, RunFlags, SceneFlags, SettingFlags};
+pub use light_flags::{LampFlag, LightFlags, SkyFlag, SunFlag};
 pub use load::{LoadError, load};
 
 /// Light an OBJ scene by extended vector-based radiosity.

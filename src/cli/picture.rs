@@ -9,12 +9,13 @@ use glam::{DVec3, Vec3};
 use super::{RunFlags, UsageError, output};
 use crate::{
     geometry::RayTree,
-    scene::{Scene, UpAxis, builtin},
+    scene::{Scene, builtin},
     solver::Snapshot,
     viewer::{
         CameraRequest,
+        first_look::first_look,
         headless::{self, Subject},
-        loader, opening,
+        loader,
         stderr::StderrCapture,
         view::{ClusterOverlay, ClusterRequest, ViewMode, ViewRequest, ViewSettings},
     },
@@ -93,15 +94,12 @@ impl ViewFlags {
     }
 
     /// From where.
-    pub fn camera(&self, up: UpAxis) -> CameraRequest {
+    pub fn camera(&self) -> CameraRequest {
         CameraRequest {
             position: self.camera_position.map(|point| point.0),
             focal_point: self.camera_focal_point.map(|point| point.0),
             view_angle_degrees: self.camera_view_angle,
-            up: Some(
-                self.camera_view_up
-                    .map_or(up.vector(), |direction| direction.0),
-            ),
+            up: self.camera_view_up.map(|direction| direction.0),
         }
     }
 }
@@ -168,20 +166,17 @@ impl PictureFlags {
         snapshot: &Snapshot,
         errors: Option<&Arc<Vec<f32>>>,
         run_flags: &RunFlags,
-        up: UpAxis,
     ) -> Result<()> {
         let Some(path) = &self.screenshot else {
             return Ok(());
         };
         let Size(size) = self.size;
+        let look = first_look(scene, &RayTree::new(scene));
         let opening = match builtin_name.and_then(builtin::find_builtin) {
             Some(found) => loader::builtin_camera(found, scene),
-            None => {
-                let (min, max) = loader::bounds(scene);
-                opening::deepest_view(scene, &RayTree::new(scene), min, max)
-            }
+            None => look.camera,
         };
-        let camera = self.view.camera(up).apply(opening, &scene.frame);
+        let camera = self.view.camera().apply(opening, &scene.frame);
         let view = self.view.request(run_flags).apply(&ViewSettings::default());
         if !camera.is_valid() {
             bail!(UsageError(
@@ -193,6 +188,7 @@ impl PictureFlags {
             scene,
             snapshot,
             errors,
+            interior: look.interior,
         };
         let encoded = {
             let _capture = StderrCapture::begin();

@@ -1,12 +1,13 @@
 //! The JSON report of `solve`.
 
+use glam::Vec3;
 use serde::Serialize;
 
 use crate::{
     export::ColorOptions,
     metrics::ErrorMeasures,
     reference::SampledSurfaces,
-    scene::{Frame, Scene, Warning},
+    scene::{Frame, Scene, Sky, Warning},
     solver::{Omitted, SolveSettings, StepReport},
     worker::StopReason,
 };
@@ -16,6 +17,7 @@ use crate::{
 pub(super) struct SolveReport {
     pub(super) version: &'static str,
     pub(super) scene: SceneFacts,
+    pub(super) lights: LightFacts,
     pub(super) settings: SolveSettings,
     pub(super) color: ColorOptions,
     /// Omissions, since this scene does not need the omitted parts, with their reasons.
@@ -41,6 +43,7 @@ pub(super) struct SceneFacts {
     materials: usize,
     textures: usize,
     emitters: usize,
+    up: &'static str,
     bounds: Bounds,
 }
 
@@ -62,6 +65,7 @@ impl SceneFacts {
             materials: scene.materials.len(),
             textures: scene.textures.len(),
             emitters: scene.surfaces.iter().filter(emits).count(),
+            up: scene.up.name(),
             bounds: bounds(scene, &scene.frame),
         }
     }
@@ -77,6 +81,87 @@ fn bounds(scene: &Scene, frame: &Frame) -> Bounds {
     Bounds {
         min: min.to_array(),
         max: max.to_array(),
+    }
+}
+
+/// What gives light.
+#[derive(Debug, Serialize)]
+pub(super) struct LightFacts {
+    /// Of "surfaces", "default sky" or "sky", and "sun", those that give light.
+    sources: Vec<&'static str>,
+    /// Triangles that emit.
+    emitting_triangles: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sky: Option<SkyFacts>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sun: Option<SunFacts>,
+}
+
+/// Radiance in W·sr⁻¹·m⁻², linear RGB.
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum SkyFacts {
+    Uniform { radiance: [f32; 3] },
+    Picture { name: String, scale: [f32; 3] },
+}
+
+/// Angles in degrees, azimuth clockwise from north; irradiance of a surface that faces it in W/m², linear RGB.
+#[derive(Debug, Serialize)]
+struct SunFacts {
+    azimuth: f32,
+    elevation: f32,
+    diameter: f32,
+    irradiance: [f32; 3],
+}
+
+impl LightFacts {
+    /// The light of a scene.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let unit = scene.radiance_unit;
+        let environment = &scene.environment;
+        let surfaces = scene.surfaces.iter();
+        let emitting = surfaces.filter(|surface| surface.emission.max_element() > 0.0);
+        let emitting_triangles = emitting.count();
+        let sky = match &environment.sky {
+            sky if sky.is_dark() => None,
+            Sky::Dark => None,
+            Sky::Uniform(radiance) => Some(SkyFacts::Uniform {
+                radiance: (*radiance * unit).to_array(),
+            }),
+            Sky::Picture(sky) => Some(SkyFacts::Picture {
+                name: sky.picture.name.clone(),
+                scale: (sky.scale * unit).to_array(),
+            }),
+        };
+        let sun = environment.sun.filter(|sun| sun.irradiance != Vec3::ZERO);
+        let sun = sun.map(|sun| {
+            let [azimuth, elevation] = sun.place(scene.up);
+            SunFacts {
+                azimuth,
+                elevation,
+                diameter: sun.diameter.to_degrees(),
+                irradiance: (sun.irradiance * unit).to_array(),
+            }
+        });
+        let of_sky = if environment.is_default {
+            "default sky"
+        } else {
+            "sky"
+        };
+        let sources = [
+            (emitting_triangles > 0, "surfaces"),
+            (sky.is_some(), of_sky),
+            (sun.is_some(), "sun"),
+        ];
+        Self {
+            sources: sources
+                .into_iter()
+                .filter_map(|(shines, name)| shines.then_some(name))
+                .collect(),
+            emitting_triangles,
+            sky,
+            sun,
+        }
     }
 }
 

@@ -18,8 +18,8 @@ use super::{
     output::{self, Destination},
     progress::Progress,
     report::{
-        Machine, ReferenceFacts, SceneFacts, SolveReport, StepFacts, Totals, WarningFacts,
-        core_count,
+        LightFacts, Machine, ReferenceFacts, SceneFacts, SolveReport, StepFacts, Totals,
+        WarningFacts, core_count,
     },
     truth::{self, Errors, Truth},
 };
@@ -108,10 +108,12 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     let begin = Instant::now();
     let options = arguments.scene_flags.options();
     interruption.ends_at_once(true);
+    let lighting = arguments.scene_flags.lighting()?;
     let scene = Arc::new(load(
         arguments.path.as_deref(),
         arguments.scene.as_deref(),
         &options,
+        &lighting,
     )?);
     interruption.ends_at_once(false);
     let interrupted = interruption.flag;
@@ -119,6 +121,9 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     output::check_inputs_kept(&destinations, &scene.files)?;
     for warning in &scene.warnings {
         output::say(format_args!("warning: {warning}"));
+    }
+    if let Some(sentence) = scene.up_sentence() {
+        output::say(format_args!("note: {sentence}"));
     }
     let errors = Errors::default();
     let traced = Instant::now();
@@ -151,7 +156,6 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &run.snapshot,
         errors_of(arguments, &scene, &run, &measured.errors, &interrupted).as_ref(),
         &arguments.run_flags,
-        arguments.scene_flags.up,
     );
     export?;
     report?;
@@ -357,8 +361,7 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
     let Some(path) = &arguments.export else {
         return Ok(());
     };
-    let up = arguments.scene_flags.up;
-    let export = arguments.run_flags.export(up, scene.radiance_unit);
+    let export = arguments.run_flags.export(scene.up, scene.radiance_unit);
     let format = MeshFormat::of(path)?;
     output::write_whole(path, |out| {
         format.write(out, &run.snapshot, &scene.frame, &export)
@@ -409,10 +412,11 @@ fn report(
     SolveReport {
         version: env!("CARGO_PKG_VERSION"),
         scene: SceneFacts::of(scene),
+        lights: LightFacts::of(scene),
         settings: arguments.setting_flags.settings(),
         color: arguments
             .run_flags
-            .export(arguments.scene_flags.up, scene.radiance_unit)
+            .export(scene.up, scene.radiance_unit)
             .color,
         left_out: run.snapshot.omitted.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),

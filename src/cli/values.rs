@@ -4,7 +4,7 @@ use clap::{ValueEnum, builder::PossibleValue};
 
 use crate::{
     export::ToneMap,
-    scene::{Sides, UpAxis},
+    scene::Sides,
     solver::{Direct, Method, Omission, Oracle},
 };
 
@@ -29,11 +29,6 @@ values!(Sides {
     Auto = "auto", "Closed shells one-sided, sheets two-sided";
     One = "one", "Counter-clockwise is the front";
     Two = "two", "Both sides";
-});
-
-values!(UpAxis {
-    Y = "+Y", "+Y";
-    Z = "+Z", "+Z";
 });
 
 values!(ToneMap {
@@ -67,6 +62,22 @@ values!(Omission {
     Outside = "outside", "The sky and the sun where no surface sees them";
 });
 
+/// A finite number.
+pub(super) fn number(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|number: &f32| number.is_finite())
+        .ok_or_else(|| "not a number".to_owned())
+}
+
+/// A finite number that is not negative.
+pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
+    number(text).and_then(|value| match value >= 0.0 {
+        true => Ok(value),
+        false => Err("must be at least 0".to_owned()),
+    })
+}
+
 /// The name of a value on the command line.
 pub(super) fn name_of(value: &impl ValueEnum) -> String {
     let value = value.to_possible_value();
@@ -81,9 +92,6 @@ mod tests {
     fn values_are_named_as_in_reports() {
         for omission in Omission::ALL {
             assert_eq!(name_of(&omission), omission.name());
-        }
-        for up in [UpAxis::Y, UpAxis::Z] {
-            assert_eq!(name_of(&up), up.name());
         }
         assert_eq!(Direct::from_str("auto", false), Ok(Direct::Sampled));
     }

@@ -60,11 +60,12 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
     viewer::run(viewer::Options {
         source: Some(source),
         scene_options: flags.scene_flags.options(),
+        lighting: flags.scene_flags.lighting()?,
         settings: flags.setting_flags.settings(),
         settings_are_asked_for: flags.setting_flags.are_given(),
         run: flags.run_flags.options(),
         view: flags.view.request(&flags.run_flags),
-        camera: flags.view.camera(flags.scene_flags.up),
+        camera: flags.view.camera(),
     })?;
     Ok(Outcome::Done)
 }

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::{
     emitters::Emitters,
-    estimator::{Bounce, Estimator, PathPoint},
+    estimator::{Bounce, Estimator},
+    outside::{Outside, Place},
 };
 use crate::{
     geometry::{Random, RayTree, centroid, low_discrepancy_2d},
@@ -39,7 +40,8 @@ pub struct VertexBake<'a> {
     scene: &'a Scene,
     rays: &'a RayTree,
     emitters: Emitters,
-    starts: Vec<PathPoint>,
+    outside: Outside,
+    starts: Vec<Place>,
     /// Sums over the samples; in f64, since thousands of terms are added.
     sums: Vec<DVec3>,
     samples: u32,
@@ -54,6 +56,7 @@ impl<'a> VertexBake<'a> {
             scene,
             rays,
             emitters: Emitters::new(scene),
+            outside: Outside::new(scene),
             starts: points.iter().map(|point| inset(scene, point)).collect(),
             sums: vec![DVec3::ZERO; points.len()],
             samples: 0,
@@ -111,29 +114,27 @@ impl<'a> VertexBake<'a> {
     }
 
     /// Sum of these samples at a point, and the rays that they took.
-    fn sample(
-        &self,
-        index: usize,
-        start: PathPoint,
-        samples: std::ops::Range<u32>,
-    ) -> (DVec3, u64) {
-        if self.emitters.is_empty() {
-            return (DVec3::ZERO, 0);
-        }
+    fn sample(&self, index: usize, start: Place, samples: std::ops::Range<u32>) -> (DVec3, u64) {
         let estimator = Estimator {
             scene: self.scene,
             rays: self.rays,
             emitters: &self.emitters,
+            outside: &self.outside,
         };
+        if estimator.is_dark() {
+            return (DVec3::ZERO, 0);
+        }
         let mut shifts = Random::new(self.seed, (index as u64) << 32 | u64::from(u32::MAX));
         let (direction_shift, emitter_shift) = (shifts.uniform_2d(), shifts.uniform_2d());
         let choice_shift = f64::from(shifts.next_u32()) / 4_294_967_296.0;
+        let outside_shift = self.outside.squares(|| shifts.uniform_2d());
         let (mut sum, mut ray_count) = (DVec3::ZERO, 0);
         for sample in samples {
             let first = Bounce {
                 direction: low_discrepancy_2d(sample, direction_shift),
                 choice: (f64::from(sample) * CHOICE_STEP + choice_shift).fract(),
                 emitter: low_discrepancy_2d(sample, emitter_shift),
+                outside: outside_shift.moved(sample),
             };
             let mut random = Random::new(self.seed, (index as u64) << 32 | u64::from(sample));
             let (irradiance, rays) = estimator.irradiance(start, first, &mut random);
@@ -159,10 +160,10 @@ pub fn bake(
 }
 
 /// Where the paths of a baked vertex start: a little inside its triangle.
-fn inset(scene: &Scene, point: &BakePoint) -> PathPoint {
+fn inset(scene: &Scene, point: &BakePoint) -> Place {
     let inward = centroid(scene.corners(point.triangle)) - point.position;
     let distance = BAKE_INSET.min(inward.length() / 3.0);
-    PathPoint {
+    Place {
         position: point.position + inward.normalize_or_zero() * distance,
         normal: point.normal,
         triangle: point.triangle,

@@ -2,13 +2,17 @@
 //!
 //! `E(x) = D(x) + ρ(y) E(y)` with y met by a cosine-weighted ray from x. The light D that comes straight from
 //! emitters is sampled twice, by points of emitters and by that same ray, and both are weighted by the balance
-//! heuristic (Veach & Guibas 1995), so that neither a near nor a small emitter leaves spikes.
+//! heuristic (Veach & Guibas 1995), so that neither a near nor a small emitter leaves spikes. Light from outside likewise:
+//! see [`Outside`].
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::{Vec2, Vec3};
 
-use super::emitters::Emitters;
+use super::{
+    emitters::Emitters,
+    outside::{Outside, OutsideSquares, Place},
+};
 use crate::{
     geometry::{Hit, Random, RayTree, barycentric, cosine_direction},
     scene::{Scene, TriangleId},
@@ -21,17 +25,6 @@ const SURE_BOUNCES: u32 = 3;
 /// the paths of a closed scene whose clamp was raised to 1.
 const MAX_BOUNCES: u32 = 4096;
 
-/// Where a path starts or goes on.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PathPoint {
-    /// Position in frame units.
-    pub(super) position: Vec3,
-    /// Unit normal towards the side that receives.
-    pub(super) normal: Vec3,
-    /// The triangle it lies on, which its own rays do not meet.
-    pub(super) triangle: TriangleId,
-}
-
 /// The random numbers of one bounce.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounce {
@@ -41,15 +34,18 @@ pub(super) struct Bounce {
     pub(super) choice: f64,
     /// For the point of the emitter.
     pub(super) emitter: Vec2,
+    /// For sky and sun.
+    pub(super) outside: OutsideSquares,
 }
 
 impl Bounce {
     /// Independent random numbers.
-    fn random(random: &mut Random) -> Self {
+    fn random(random: &mut Random, outside: &Outside) -> Self {
         Self {
             direction: random.uniform_2d(),
             choice: f64::from(random.next_u32()) / 4_294_967_296.0,
             emitter: random.uniform_2d(),
+            outside: outside.squares(|| random.uniform_2d()),
         }
     }
 }
@@ -62,34 +58,46 @@ pub(super) struct Estimator<'a> {
     pub(super) rays: &'a RayTree,
     /// Its emitters.
     pub(super) emitters: &'a Emitters,
+    /// Its sky and sun.
+    pub(super) outside: &'a Outside,
 }
 
 /// A hit on a side that reflects.
 struct Arrival {
-    point: PathPoint,
+    point: Place,
     reflectance: Vec3,
     /// Emitted radiance, weighted by the balance heuristic.
     emission: Vec3,
 }
 
 impl Estimator<'_> {
+    /// Whether there is no light.
+    pub(super) fn is_dark(&self) -> bool {
+        self.emitters.is_empty() && self.outside.is_dark()
+    }
+
     /// Irradiance at `start` by one path, and the rays that it took. `first` steers the first bounce.
     pub(super) fn irradiance(
         &self,
-        start: PathPoint,
+        start: Place,
         first: Bounce,
         random: &mut Random,
     ) -> (Vec3, u32) {
         let (mut sum, mut throughput, mut ray_count) = (Vec3::ZERO, Vec3::ONE, 0);
         let (mut at, mut bounce) = (start, first);
         for depth in 0..MAX_BOUNCES {
-            ray_count += 2;
+            ray_count += 1 + u32::from(!self.emitters.is_empty()) + self.outside.ray_count();
             sum += throughput * self.emitter_share(at, bounce);
+            sum += throughput * self.outside.share(self.rays, at, bounce.outside);
             let direction = cosine_direction(at.normal, bounce.direction);
             let start = Some(at.triangle);
             let hit = self.rays.closest(at.position, direction, start);
             throughput *= self.rays.tint(at.position, direction, start, hit);
-            let Some(arrival) = hit.and_then(|hit| self.arrive(at, direction, hit)) else {
+            let Some(hit) = hit else {
+                sum += throughput * self.outside.by_ray(at.normal, direction);
+                break;
+            };
+            let Some(arrival) = self.arrive(at, direction, hit) else {
                 break;
             };
             sum += throughput * arrival.emission * PI;
@@ -104,13 +112,13 @@ impl Estimator<'_> {
                 break;
             }
             at = arrival.point;
-            bounce = Bounce::random(random);
+            bounce = Bounce::random(random, self.outside);
         }
         (sum, ray_count)
     }
 
     /// The weighted share of direct light by a point of an emitter.
-    fn emitter_share(&self, at: PathPoint, bounce: Bounce) -> Vec3 {
+    fn emitter_share(&self, at: Place, bounce: Bounce) -> Vec3 {
         let sample = self
             .emitters
             .sample(self.scene, bounce.choice, bounce.emitter);
@@ -137,7 +145,7 @@ impl Estimator<'_> {
     }
 
     /// The surface at a hit, if that side reflects or emits.
-    fn arrive(&self, from: PathPoint, direction: Vec3, hit: Hit) -> Option<Arrival> {
+    fn arrive(&self, from: Place, direction: Vec3, hit: Hit) -> Option<Arrival> {
         let source_cosine = self.lit_cosine(hit.triangle, direction);
         if source_cosine <= 0.0 {
             return None;
@@ -158,7 +166,7 @@ impl Estimator<'_> {
             };
         }
         Some(Arrival {
-            point: PathPoint {
+            point: Place {
                 position,
                 normal: if front.dot(direction) < 0.0 {
                     front

@@ -1,6 +1,7 @@
 //! Stochastic Jacobi radiosity: power is shot over the whole scene by rays, from elements chosen by what they have yet
 //! to send (Neumann 1995; Bekaert, "Hierarchical and Stochastic Algorithms for Radiosity", 1999, §6.3).
 //!
+//! Light from outside is gathered by rays from every element.
 //! A pass is a complete solution: rays of equal power carry the emitted light, then what each bounce reflected, until
 //! chance leaves nothing to send. Every pass is unbiased, so passes are averaged, each by its number of rays. An
 //! element's rays follow one four-dimensional low-discrepancy sequence over all passes.
@@ -11,7 +12,11 @@ use std::sync::Arc;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{ReferencePoint, jacobi_mesh::ElementMesh};
+use super::{
+    ReferencePoint,
+    jacobi_mesh::ElementMesh,
+    outside::{Outside, Place},
+};
 use crate::{
     geometry::{Random, RayTree, barycentric, cosine_direction, triangle_point},
     scene::Scene,
@@ -47,6 +52,9 @@ pub struct StochasticJacobi {
     scene: Arc<Scene>,
     rays: Arc<RayTree>,
     mesh: ElementMesh,
+    outside: Outside,
+    /// Samples of the light from outside at each element so far.
+    gathered: u32,
     /// Rays that each element has sent so far.
     sent: Vec<u32>,
     /// Power that arrived at each element, summed over passes, each times its weight; W in frame units.
@@ -87,6 +95,8 @@ impl StochasticJacobi {
             ray_count: 0,
             passes: 0,
             seed: settings.seed,
+            outside: Outside::new(&scene),
+            gathered: 0,
             scene,
             rays,
             mesh,
@@ -94,16 +104,24 @@ impl StochasticJacobi {
     }
 
     /// One more solution, with `emitted_rays` rays for the light of the emitters and as many for the same power later.
+    /// Light from outside is gathered by about as many samples, spread evenly over the elements, and its reflection is sent
+    /// with the light of the emitters.
     /// `false` when `cancel` came true on the way; the pass then leaves no trace.
     pub fn pass(&mut self, emitted_rays: u32, cancel: &(dyn Fn() -> bool + Sync)) -> bool {
         let emitted_rays = emitted_rays.max(1);
         let mut unsent = self.emitted_power();
+        let samples = emitted_rays.div_ceil(self.mesh.len().max(1) as u32);
+        let Some(mut arrived) = self.gather_outside(samples, cancel) else {
+            return false;
+        };
+        for (element, (unsent, power)) in unsent.iter_mut().zip(&arrived).enumerate() {
+            *unsent += *power * self.reflectance(element);
+        }
         let quantum =
             unsent.iter().map(|power| importance(*power)).sum::<f64>() / f64::from(emitted_rays);
         let mut random = Random::new(self.seed, self.passes ^ (1 << 63));
-        let mut arrived = vec![DVec3::ZERO; self.mesh.len()];
         let mut sent = self.sent.clone();
-        let mut ray_count = 0;
+        let mut ray_count = self.outside_rays(samples);
         for _ in 0..MOST_BOUNCES {
             let shots = choose(&unsent, quantum, random.uniform(), &mut sent);
             if shots.is_empty() {
@@ -119,6 +137,7 @@ impl StochasticJacobi {
             }
         }
         self.passes += 1;
+        self.gathered = self.gathered.wrapping_add(samples);
         self.sent = sent;
         self.ray_count += ray_count;
         self.weight += f64::from(emitted_rays);
@@ -221,6 +240,55 @@ impl StochasticJacobi {
                 emission * (std::f64::consts::PI * self.element_area(element))
             })
             .collect()
+    }
+
+    /// Power that arrives at each element straight from outside, by so many samples each; nothing when cancelled.
+    fn gather_outside(
+        &self,
+        samples: u32,
+        cancel: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<DVec3>> {
+        if self.outside.is_dark() {
+            return Some(vec![DVec3::ZERO; self.mesh.len()]);
+        }
+        let at_element = |element: usize| {
+            if cancel() {
+                return None;
+            }
+            let mut sum = DVec3::ZERO;
+            for number in self.gathered..self.gathered.wrapping_add(samples) {
+                let shot = Shot {
+                    element: element as u32,
+                    number,
+                    power: Vec3::ZERO,
+                };
+                let (on, toward) = quasi_random(!self.seed, shot);
+                let mut random = Random::new(!self.seed, u64::from(shot.element) | 1 << 62);
+                let shift = self.outside.squares(|| random.uniform_2d());
+                let at = Place {
+                    position: self.mesh.point(&self.scene, element, triangle_point(on)),
+                    normal: self.mesh.normal(element),
+                    triangle: self.mesh.side_of_element(element).0,
+                };
+                let squares = shift.moved(number);
+                let found = self.outside.irradiance(&self.rays, at, toward, squares);
+                sum += found.as_dvec3();
+            }
+            Some(sum * (self.met_area(element) / f64::from(samples)))
+        };
+        (0..self.mesh.len())
+            .into_par_iter()
+            .map(at_element)
+            .collect()
+    }
+
+    /// Rays that [`Self::gather_outside`] shoots.
+    fn outside_rays(&self, samples: u32) -> u64 {
+        if self.outside.is_dark() {
+            return 0;
+        }
+        let per_sample = u64::from(1 + self.outside.ray_count());
+        self.mesh.len() as u64 * u64::from(samples) * per_sample
     }
 
     /// Reflectance of what rays meet of an element.

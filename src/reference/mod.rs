@@ -12,6 +12,7 @@ mod form_factor;
 mod jacobi;
 mod jacobi_mesh;
 mod matrix;
+mod outside;
 mod path_trace;
 mod point;
 mod points;

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 
 use super::{
     emitters::Emitters,
-    estimator::{Bounce, Estimator, PathPoint},
+    estimator::{Bounce, Estimator},
+    outside::{Outside, Place},
     point::ReferencePoint,
     points::{SampledSurfaces, sample_points},
 };
@@ -71,6 +72,7 @@ pub struct PathTracer {
     scene: Arc<Scene>,
     rays: Arc<RayTree>,
     emitters: Emitters,
+    outside: Outside,
     settings: PathSettings,
     points: Vec<ReferencePoint>,
     surfaces: SampledSurfaces,
@@ -85,6 +87,7 @@ impl PathTracer {
         let (points, surfaces) = sample_points(&scene, &rays, settings.point_count, settings.seed);
         Self {
             emitters: Emitters::new(&scene),
+            outside: Outside::new(&scene),
             sums: vec![Sums::default(); points.len()],
             scene,
             rays,
@@ -104,6 +107,7 @@ impl PathTracer {
             scene: &self.scene,
             rays: &self.rays,
             emitters: &self.emitters,
+            outside: &self.outside,
         };
         let seed = self.settings.seed;
         let added: Option<Vec<(Sums, u64)>> = (&self.points, &self.sums)
@@ -179,7 +183,7 @@ fn add_groups(
     seed: u64,
     (index, groups): (usize, std::ops::Range<u32>),
 ) -> (Sums, u64) {
-    let start = PathPoint {
+    let start = Place {
         position: point.position,
         normal: point.normal,
         triangle: point.triangle,
@@ -195,18 +199,20 @@ fn add_groups(
 }
 
 /// Mean of a group of samples whose first bounces are spread evenly, and the rays that it took.
-fn estimate_group(estimator: &Estimator<'_>, start: PathPoint, random: &mut Random) -> (Vec3, u64) {
-    if estimator.emitters.is_empty() {
+fn estimate_group(estimator: &Estimator<'_>, start: Place, random: &mut Random) -> (Vec3, u64) {
+    if estimator.is_dark() {
         return (Vec3::ZERO, 0);
     }
     let (direction_shift, emitter_shift) = (random.uniform_2d(), random.uniform_2d());
     let choice_shift = f64::from(random.next_u32()) / 4_294_967_296.0;
+    let outside_shift = estimator.outside.squares(|| random.uniform_2d());
     let (mut sum, mut ray_count) = (Vec3::ZERO, 0);
     for sample in 0..GROUP {
         let first = Bounce {
             direction: low_discrepancy_2d(sample, direction_shift),
             choice: (f64::from(sample) + choice_shift) / f64::from(GROUP),
             emitter: low_discrepancy_2d(sample, emitter_shift),
+            outside: outside_shift.moved(sample),
         };
         let (irradiance, rays) = estimator.irradiance(start, first, random);
         sum += irradiance;

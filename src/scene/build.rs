@@ -56,6 +56,7 @@ impl SceneBuilder {
         );
         let averages = TextureAverages::new(self.pictures(), &self.materials);
         let surfaces = self.surfaces(&frame, &averages, options);
+        let told = self.source.up;
         let mut scene = Scene {
             name: self.source.name,
             files: self.source.files,
@@ -75,18 +76,15 @@ impl SceneBuilder {
             doubled_faces: self.doubled_faces,
             max_reflectance: options.reflectance_limit(),
             averages: Arc::new(averages),
+            up: options.up.unwrap_or_default(),
+            up_evidence: None,
             environment: Arc::default(),
             radiance_unit,
         };
-        if !scene.has_emitter() {
-            scene.warnings.push(Warning {
-                kind: WarningKind::NoEmitter,
-                message: "nothing emits light, so the result is black; give a material Ke above 0"
-                    .to_owned(),
-                count: 1,
-                place: None,
-            });
+        if options.up.is_none() {
+            scene.find_up(told);
         }
+        scene.warn_of_darkness();
         cut_crossings(&mut scene);
         Ok(scene)
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{
-    Cutout, Material, MaterialId, Texture, Warning, WarningKind, texture::OmittedTextures,
+    Cutout, Material, MaterialId, Texture, UpAxis, Warning, WarningKind, texture::OmittedTextures,
 };
 
 /// A triangle on its way in.
@@ -45,6 +45,8 @@ pub struct Source {
     pub file: String,
     /// See [`super::Scene::files`].
     pub files: Vec<PathBuf>,
+    /// The axis that points up in what its program writes, where that is known.
+    pub up: Option<UpAxis>,
 }
 
 /// Collects faces in world coordinates and turns them into a [`super::Scene`].

@@ -11,6 +11,8 @@ use std::io::BufRead;
 use std::sync::Arc;
 
 use super::lines::{LogicalLines, Notation, Number, decode, label, split_keyword, words};
+use super::up_axis::UpAxis;
+use super::upright::told_by;
 use super::warning::{WarningKind, WarningLog};
 
 /// Faces that share an object name and a material.
@@ -72,6 +74,8 @@ pub(super) struct Notes {
     pub(super) any_text: bool,
     /// The error that ended reading.
     pub(super) failure: Option<String>,
+    /// The axis that points up, as a comment before the first statement tells.
+    pub(super) up: Option<UpAxis>,
     /// Corrections and omissions.
     pub(super) log: WarningLog,
 }
@@ -177,6 +181,10 @@ impl<R: BufRead> ObjCleaner<R> {
             }
             b"usemtl" => self.material_statement(rest, line),
             b"mtllib" => self.library_statement(rest, line),
+            [b'#', ..] if self.notes.statements == 0 => {
+                self.notes.up = self.notes.up.or_else(|| told_by(text));
+                return;
+            }
             _ => return self.other_statement(keyword, line),
         }
         self.notes.statements += 1;

@@ -8,7 +8,7 @@ use std::{f32::consts::PI, sync::Arc};
 use glam::{Mat3, Vec2, Vec3};
 
 use super::{
-    Scene, Texture, UpAxis,
+    Scene, Texture, UpAxis, Warning, WarningKind,
     ranges::{MAX_EMISSION, limited_emission},
 };
 
@@ -83,18 +83,49 @@ impl Environment {
         }
     }
 
+    /// The uniform sky in place of a dark one.
+    pub(super) fn with_default_sky(self) -> Self {
+        Self {
+            sun: self.sun,
+            ..Self::default_sky()
+        }
+    }
+
     /// Whether no light comes from outside.
     pub fn is_dark(&self) -> bool {
         self.sky.is_dark() && self.sun.is_none_or(|sun| sun.irradiance == Vec3::ZERO)
     }
 
+    /// Whether all of its light is white.
+    pub fn is_grey(&self) -> bool {
+        let is_grey = |color: Vec3| color.min_element() == color.max_element();
+        let sky = match &self.sky {
+            Sky::Dark => true,
+            Sky::Uniform(radiance) => is_grey(*radiance),
+            Sky::Picture(sky) => {
+                is_grey(sky.scale) && sky.picture.pixels.iter().all(|&pixel| is_grey(pixel))
+            }
+        };
+        sky && self.sun.is_none_or(|sun| is_grey(sun.irradiance))
+    }
+
     /// The same with all radiance times a factor, within the range of emission.
-    fn scaled(mut self, factor: f32) -> Self {
+    pub(super) fn scaled(mut self, factor: f32) -> Self {
         let scale = |radiance: Vec3| limited_emission(radiance * factor);
         match &mut self.sky {
             Sky::Dark => {}
             Sky::Uniform(radiance) => *radiance = scale(*radiance),
-            Sky::Picture(picture) => picture.scale = scale(picture.scale),
+            Sky::Picture(sky) => {
+                let brightest = sky
+                    .picture
+                    .pixels
+                    .iter()
+                    .copied()
+                    .fold(Vec3::ZERO, Vec3::max);
+                let scale = scale(sky.scale);
+                let excess = (scale * brightest).max_element() / MAX_EMISSION;
+                sky.scale = scale / excess.max(1.0);
+            }
         }
         if let Some(sun) = &mut self.sun {
             // Of the disc, too, the radiance must be in range.
@@ -142,6 +173,23 @@ impl SkyPicture {
             scale,
             from_scene: Mat3::from_rotation_y(rotation.to_radians()) * upright,
         }
+    }
+
+    /// The place of the direction of a unit vector, across from the left and down from the top, each 0 to 1.
+    pub fn place(&self, direction: Vec3) -> Vec2 {
+        let direction = self.from_scene * direction;
+        let across = direction.x.atan2(-direction.z) / (2.0 * PI);
+        Vec2::new(
+            across.rem_euclid(1.0),
+            direction.y.clamp(-1.0, 1.0).acos() / PI,
+        )
+    }
+
+    /// The unit vector to a place.
+    pub fn direction(&self, place: Vec2) -> Vec3 {
+        let (sin, cos) = (place.x * 2.0 * PI).sin_cos();
+        let (along, height) = (place.y * PI).sin_cos();
+        self.from_scene.transpose() * Vec3::new(sin * along, height, -cos * along)
     }
 
     /// Radiance from the direction of a unit vector, bilinear between pixels.
@@ -204,6 +252,17 @@ impl Sun {
         }
     }
 
+    /// Azimuth, -180 to 180, and elevation of its centre, degrees, as in [`Self::towards`].
+    pub fn place(&self, up: UpAxis) -> [f32; 2] {
+        let Vec3 { x: east, y, z } = self.direction;
+        let [north, height] = match up {
+            UpAxis::Y => [-z, y],
+            UpAxis::Z => [y, z],
+        };
+        let azimuth = east.atan2(north).to_degrees();
+        [azimuth, height.clamp(-1.0, 1.0).asin().to_degrees()]
+    }
+
     /// Radiance of the disc.
     pub fn radiance(&self) -> Vec3 {
         self.irradiance / self.projected_solid_angle()
@@ -221,18 +280,38 @@ impl Sun {
 }
 
 impl Scene {
-    /// The scene in an environment whose radiance is given in W·sr⁻¹·m⁻².
+    /// The scene in an environment whose radiance is given in W·sr⁻¹·m⁻², with a warning where it stays dark.
     pub fn in_environment(mut self, environment: Environment) -> Self {
         self.environment = Arc::new(environment.scaled(1.0 / self.radiance_unit));
+        self.warn_of_darkness();
         self
     }
 
-    /// The scene with the default sky if neither a surface nor the environment gives light.
+    /// The scene with the default sky, and a word about it, if neither a surface nor the environment gives light.
     pub fn lit_by_default(self) -> Self {
         if self.has_light() {
             return self;
         }
         self.in_environment(Environment::default_sky())
+    }
+
+    /// Put the warning that fits in place of an earlier one about the lack of emitters.
+    pub(super) fn warn_of_darkness(&mut self) {
+        self.warnings
+            .retain(|warning| warning.kind != WarningKind::NoEmitter);
+        let message = if self.environment.is_default {
+            "nothing emits light, so a uniform sky of radiance 1 lights the scene; --sky none turns it off"
+        } else if !self.has_light() {
+            "nothing emits light, so the result is black; give a material Ke above 0, or the scene a sky"
+        } else {
+            return;
+        };
+        self.warnings.push(Warning {
+            kind: WarningKind::NoEmitter,
+            message: message.to_owned(),
+            count: 1,
+            place: None,
+        });
     }
 
     /// Whether a surface or the environment gives light.
@@ -278,6 +357,15 @@ mod tests {
             near(Sun::towards(azimuth, elevation, UpAxis::Y), y_up);
             let z_up = Vec3::new(y_up.x, -y_up.z, y_up.y);
             near(Sun::towards(azimuth, elevation, UpAxis::Z), z_up);
+            for up in [UpAxis::Y, UpAxis::Z] {
+                let sun = Sun {
+                    direction: Sun::towards(azimuth, elevation, up),
+                    irradiance: Vec3::ONE,
+                    diameter: 0.01,
+                };
+                let [place, height] = sun.place(up);
+                near(Sun::towards(place, height, up), sun.direction);
+            }
         }
     }
 

@@ -22,7 +22,9 @@ mod encoding;
 mod environment;
 mod fit;
 mod frame;
+mod hosek;
 mod library;
+mod lighting;
 mod limited;
 mod lines;
 mod locate;
@@ -41,13 +43,16 @@ mod relight;
 mod shells;
 mod sidedness;
 mod size_classes;
+mod sky_file;
 mod source;
+mod suggestion;
 #[cfg(test)]
 pub(crate) mod test_shapes;
 mod texture;
 mod texture_statement;
 mod triangulate;
 mod up_axis;
+mod upright;
 mod usable;
 mod warning;
 mod whole;
@@ -60,6 +65,8 @@ pub use cutout::{Cutout, SeeThrough};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use environment::{Environment, Sky, SkyPicture, SkySample, Sun};
 pub use frame::Frame;
+pub use hosek::HosekSky;
+pub use lighting::{Lamp, Lighting, SkySource, SunSource};
 pub use means::TextureMeans;
 pub use obj::{read_obj, read_obj_with_progress};
 pub use options::{SceneOptions, Sides};
@@ -67,8 +74,11 @@ pub use progress::ReadProgress;
 pub use read_error::ReadError;
 pub use relight::ActiveMaterials;
 pub use size_classes::SizeClasses;
+pub use sky_file::{SkyError, SkyFile, read_sky};
+pub use suggestion::closest;
 pub use texture::{OmittedTextures, Texture};
 pub use up_axis::UpAxis;
+pub use upright::UpEvidence;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
 pub use write::{write_builtin, write_obj};
@@ -230,6 +240,10 @@ pub struct Scene {
     pub cutouts: Vec<Cutout>,
     /// Named runs of triangles, in order, covering all of them.
     pub objects: Vec<Object>,
+    /// Which axis points up: what the options say, else what is plain, else +Y.
+    pub up: UpAxis,
+    /// What shows that this axis points up; nothing where it was asked for or is the usual one.
+    pub up_evidence: Option<UpEvidence>,
     /// Light from outside; dark as a scene is read.
     pub environment: Arc<Environment>,
     /// Warnings: what was skipped, corrected or clamped.

@@ -67,6 +67,7 @@ pub fn read_obj_with_progress(
                 name: stem.to_string_lossy().into_owned(),
                 file,
                 files: vec![path.to_owned()],
+                up: notes.up,
             },
             ..SceneBuilder::default()
         },

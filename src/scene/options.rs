@@ -1,6 +1,6 @@
 //! How a scene is read.
 
-use super::ranges::DEFAULT_MAX_REFLECTANCE;
+use super::{UpAxis, ranges::DEFAULT_MAX_REFLECTANCE};
 
 /// Which sides of a triangle reflect and emit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -25,6 +25,8 @@ pub struct SceneOptions {
     pub mtl_color_is_srgb: bool,
     /// Whether nothing lets light pass, whatever the materials say.
     pub is_opaque: bool,
+    /// The axis that points up; `None` recognises it.
+    pub up: Option<UpAxis>,
 }
 
 impl Default for SceneOptions {
@@ -34,6 +36,7 @@ impl Default for SceneOptions {
             max_reflectance: DEFAULT_MAX_REFLECTANCE,
             mtl_color_is_srgb: false,
             is_opaque: false,
+            up: None,
         }
     }
 }

@@ -9,7 +9,7 @@ use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Luma, Pixel, Primiti
 use super::Cutout;
 use super::color::linear_from_srgb;
 use super::cutout::LEAST_ALPHA;
-use super::ranges::finite_non_negative;
+use super::ranges::{MAX_EMISSION, finite_non_negative};
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -80,6 +80,32 @@ impl Texture {
             Ok(Err(error)) => Err(error.to_string()),
             Err(_) => Err("its decoder failed".to_owned()),
         }
+    }
+
+    /// Read a picture file of floats as radiance, whatever its alpha.
+    ///
+    /// # Errors
+    /// Where it cannot be decoded, or has bytes.
+    pub(super) fn read_radiance(path: &Path, name: &str) -> Result<RadiancePicture, RadianceError> {
+        let decoded = std::panic::catch_unwind(|| decode(path));
+        let pixels = match decoded {
+            Ok(Ok(DynamicImage::ImageRgb32F(pixels))) => pixels,
+            Ok(Ok(picture @ DynamicImage::ImageRgba32F(_))) => picture.into_rgb32f(),
+            Ok(Ok(_)) => return Err(RadianceError::NotLinear),
+            Ok(Err(error)) => return Err(RadianceError::Unreadable(error.to_string())),
+            Err(_) => return Err(RadianceError::Unreadable("its decoder failed".to_owned())),
+        };
+        if pixels.is_empty() {
+            return Err(RadianceError::Unreadable("it has no pixels".to_owned()));
+        }
+        let is_bad = |channel: &f32| !(0.0..f32::INFINITY).contains(channel);
+        let corrected = pixels.pixels().filter(|pixel| pixel.0.iter().any(is_bad));
+        let radiance = |channel| finite_non_negative(channel).min(MAX_EMISSION);
+        Ok(RadiancePicture {
+            corrected: corrected.count(),
+            size: [pixels.width(), pixels.height()],
+            texture: averaged(&pixels, |pixel| color_of(pixel.0, radiance)).into_texture(name),
+        })
     }
 
     /// Linear pixels of a picture, averaged down on the way where it is large: a picture of a few hundred kilobytes
@@ -207,6 +233,24 @@ pub(super) struct Picture {
     pub(super) is_transparent: bool,
     /// What is there of it; nothing where all is.
     pub(super) cutout: Option<Cutout>,
+}
+
+/// A picture of radiance as it is read.
+pub(super) struct RadiancePicture {
+    /// Its pixels, finite and within the range of emission.
+    pub(super) texture: Texture,
+    /// Pixels that were negative or not finite in a channel.
+    pub(super) corrected: usize,
+    /// Width and height in the file, pixels.
+    pub(super) size: [u32; 2],
+}
+
+/// Why there is no picture of radiance.
+pub(super) enum RadianceError {
+    /// It cannot be decoded; a clause with the reason.
+    Unreadable(String),
+    /// It has bytes, not floats.
+    NotLinear,
 }
 
 /// Values of pixels or of blocks of them, row by row.

@@ -23,6 +23,8 @@ pub enum WarningKind {
     SeeThrough,
     /// Nothing in the scene emits light.
     NoEmitter,
+    /// Light that was asked for and may not be as meant.
+    Light,
     /// The file changed while it was read.
     FileChanged,
     /// Something about orientation or sidedness that deserves a look.

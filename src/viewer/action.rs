@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::{camera::AxisView, loader::SceneSource, materials::Materials, view::ViewMode};
 use crate::{
-    scene::{Sides, UpAxis},
+    scene::{Lighting, Sides, UpAxis},
     solver::SolveSettings,
     worker::RunOptions,
 };
@@ -38,6 +38,12 @@ pub enum Action {
     Options(RunOptions),
     /// Light the scene with other lights and materials.
     Relight(Materials),
+    /// Light the scene from another sky and sun.
+    Light(Lighting),
+    /// Lights and materials as before the last change.
+    Undo,
+    /// Lights and materials as before that was undone.
+    Redo,
     /// Read the scene again with other sidedness.
     Sides(Sides),
     /// Show something else.
@@ -62,6 +68,10 @@ pub enum Action {
     ClusterLevelBy(i32),
     /// Backs of one-sided faces on or off.
     ToggleBacks,
+    /// Walls before the inside of a room drawn, or not.
+    ToggleSeeThrough,
+    /// The view that the scene opened with.
+    FirstLook,
     /// Show the whole scene.
     FrameAll,
     /// Show the selected object or cluster.
@@ -95,6 +105,8 @@ pub enum Action {
     MeshDialog,
     /// Write the lit mesh; the ending names the format.
     SaveMesh(PathBuf),
+    /// Write lights and materials as an MTL file beside the scene.
+    SaveMaterials,
     /// Write settings and camera beside the scene.
     SaveSidecar,
     /// Panels on or off.

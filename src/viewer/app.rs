@@ -106,6 +106,7 @@ impl App {
                 ..options.run.clone()
             },
             scene_options: options.scene_options,
+            lighting: options.lighting.clone(),
             view: options.view.apply(&preferences.view()),
             panels: preferences.panels(),
             recent,
@@ -133,9 +134,6 @@ impl App {
             had_focus: false,
             size: egui::Vec2::ZERO,
         };
-        if let Some(up) = options.camera.up {
-            app.state.rig.target.up = up;
-        }
         if let Some(source) = options.source.clone() {
             app.load(source);
             app.first = Some(options);

@@ -117,10 +117,16 @@ pub fn bindings() -> Vec<Binding> {
     use Group::{Camera, File, Solve, View};
     let plain = |key, group, text, action| bind(Modifiers::NONE, key, group, text, action);
     let command = |key, group, text, action| bind(Modifiers::COMMAND, key, group, text, action);
+    let shift = |key, group, text, action| bind(Modifiers::SHIFT, key, group, text, action);
     let alt =
         |key, mode: ViewMode| bind(Modifiers::ALT, key, View, mode.label(), Action::Mode(mode));
     let mut all = vec![
-        plain(Key::Home, Camera, "Show the whole scene", Action::FrameAll),
+        plain(
+            Key::Home,
+            Camera,
+            "Back to the first view",
+            Action::FirstLook,
+        ),
         plain(Key::Enter, Camera, "Show the whole scene", Action::FrameAll),
         plain(Key::F, Camera, "Show the selection", Action::FrameSelected),
         plain(
@@ -159,8 +165,8 @@ pub fn bindings() -> Vec<Binding> {
             "Perspective or parallel",
             Action::ToggleProjection,
         ),
-        command(Key::Y, Camera, "Y is up", Action::Up(UpAxis::Y)),
-        command(Key::Z, Camera, "Z is up", Action::Up(UpAxis::Z)),
+        shift(Key::Y, Camera, "Y is up", Action::Up(UpAxis::Y)),
+        shift(Key::Z, Camera, "Z is up", Action::Up(UpAxis::Z)),
         plain(
             Key::M,
             View,
@@ -183,6 +189,12 @@ pub fn bindings() -> Vec<Binding> {
         plain(Key::L, View, "Links of what is picked", Action::ToggleLinks),
         plain(Key::N, View, "Normals and back", Action::ToggleNormals),
         plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
+        plain(
+            Key::X,
+            View,
+            "See through walls from outside",
+            Action::ToggleSeeThrough,
+        ),
         plain(Key::Minus, View, "Darker by ½ EV", Action::ExposureBy(-0.5)),
         plain(
             Key::Equals,
@@ -205,6 +217,19 @@ pub fn bindings() -> Vec<Binding> {
             Action::Stop,
         ),
         command(Key::R, Solve, "Restart", Action::Reset),
+        command(
+            Key::Z,
+            Solve,
+            "Undo a change of lights and materials",
+            Action::Undo,
+        ),
+        bind(
+            Modifiers::COMMAND | Modifiers::SHIFT,
+            Key::Z,
+            Solve,
+            "Make the change again",
+            Action::Redo,
+        ),
         plain(
             Key::R,
             Solve,

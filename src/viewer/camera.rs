@@ -211,6 +211,24 @@ impl Camera {
         self.distance = (radius / narrow.atan().sin()).clamp(MIN_DISTANCE, MAX_DISTANCE);
     }
 
+    /// Show a whole box as large as it can be, from the direction that it has.
+    pub fn fit_box(&mut self, min: Vec3, max: Vec3, aspect: f32) {
+        /// Share of the picture that the box takes.
+        const SHARE: f32 = 0.92;
+        self.pivot = 0.5 * (min + max);
+        let half = 0.5 * (max - min);
+        let tan = (0.5 * self.fov_y_radians).tan() * SHARE;
+        let needed = (0..8).map(|corner| {
+            let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+            let corner = half * Vec3::new(sign(0), sign(1), sign(2));
+            let across = corner.dot(self.right()).abs() / (tan * aspect);
+            let up = corner.dot(self.upward()).abs() / tan;
+            corner.dot(self.backward()) + across.max(up)
+        });
+        let needed = needed.fold(MIN_DISTANCE, f32::max);
+        self.distance = needed.min(MAX_DISTANCE);
+    }
+
     /// Look along an axis.
     pub fn look_from(&mut self, view: AxisView) {
         (self.yaw, self.pitch) = match view {
@@ -386,18 +404,20 @@ mod tests {
     #[test]
     fn framed_box_is_inside_the_picture() {
         let (min, max) = (Vec3::new(-50.0, -20.0, -30.0), Vec3::new(50.0, 20.0, 30.0));
-        let mut camera = Camera::default();
-        camera.frame_box(min, max, 1.4);
-        for corner in 0..8 {
-            let pick = |bit: u32, axis: usize| {
-                if corner & bit == 0 {
-                    min[axis]
-                } else {
-                    max[axis]
-                }
-            };
-            let ndc = ndc_of(&camera, Vec3::new(pick(1, 0), pick(2, 1), pick(4, 2)), 1.4);
-            assert!(ndc.x.abs() < 1.0 && ndc.y.abs() < 1.0, "{ndc}");
+        for frame in [Camera::frame_box, Camera::fit_box] {
+            let mut camera = Camera::default();
+            frame(&mut camera, min, max, 1.4);
+            for corner in 0..8 {
+                let pick = |bit: u32, axis: usize| {
+                    if corner & bit == 0 {
+                        min[axis]
+                    } else {
+                        max[axis]
+                    }
+                };
+                let ndc = ndc_of(&camera, Vec3::new(pick(1, 0), pick(2, 1), pick(4, 2)), 1.4);
+                assert!(ndc.x.abs() < 1.0 && ndc.y.abs() < 1.0, "{ndc}");
+            }
         }
     }
 }

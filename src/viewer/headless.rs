@@ -7,7 +7,9 @@ use image::{DynamicImage, Rgb32FImage, RgbaImage};
 
 use super::{
     camera::Camera,
-    cluster_lines, clusters, exposure, light_range,
+    cluster_lines, clusters, exposure,
+    first_look::Interior,
+    light_range,
     picture_file::{self, EncodeError},
     render::{
         Cutout, CutoutTarget, Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
@@ -64,6 +66,8 @@ pub struct Subject<'a> {
     pub snapshot: &'a Snapshot,
     /// Errors measured at its vertices, for the mode that shows them.
     pub errors: Option<&'a Arc<Vec<f32>>>,
+    /// The room, where the scene is one.
+    pub interior: Option<Interior>,
 }
 
 /// A device of one's own.
@@ -187,6 +191,7 @@ fn with_picture<T>(
         scene,
         snapshot,
         errors,
+        interior,
     } = subject;
     let shown = clusters::shown(&snapshot.clusters, &view.clusters);
     let boxes = cluster_lines::boxes(&snapshot.clusters, &shown, &view.clusters);
@@ -207,6 +212,7 @@ fn with_picture<T>(
             errors.map(|errors| errors.as_slice()),
         ),
         view,
+        interior,
         overlay: &overlay,
         background: Vec3::splat(theme::PICTURE_BACKGROUND),
         pixels_per_point: 1.0,

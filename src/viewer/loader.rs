@@ -14,10 +14,13 @@ use std::{
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::{camera::Camera, opening};
+use super::{
+    camera::Camera,
+    first_look::{Interior, first_look},
+};
 use crate::{
     geometry::RayTree,
-    scene::{self, ReadProgress, Scene, SceneOptions, builtin},
+    scene::{self, Environment, Lighting, ReadProgress, Scene, SceneOptions, builtin},
     worker::Wake,
 };
 
@@ -59,17 +62,24 @@ impl SceneSource {
 }
 
 /// A scene with what the window needs to show it.
+#[derive(Clone)]
 pub struct LoadedScene {
     /// Where it came from.
     pub source: SceneSource,
     /// The scene.
     pub scene: Arc<Scene>,
+    /// Sky and sun that it brings along, in its own units.
+    own_environment: Arc<Environment>,
     /// For picking, and for the reference.
     pub rays: Arc<RayTree>,
-    /// Lower corner in frame units.
+    /// Lower corner of what matters, in frame units.
     pub min: Vec3,
-    /// Upper corner in frame units.
+    /// Upper corner of what matters, in frame units.
     pub max: Vec3,
+    /// Whether light reaches what is seen first.
+    pub is_lit: bool,
+    /// The room, where it is one.
+    pub interior: Option<Interior>,
     /// Triangles that emit.
     pub emitter_count: usize,
     /// Whether there are one-sided faces, whose backs can be shown or looked through.
@@ -78,6 +88,21 @@ pub struct LoadedScene {
     pub is_grey: bool,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
+}
+
+impl LoadedScene {
+    /// The same under another sky and sun.
+    pub fn under(&self, lighting: &Lighting) -> Self {
+        let mut scene = Scene::clone(&self.scene);
+        scene.environment = self.own_environment.clone();
+        let environment = lighting.environment(&scene);
+        let scene = scene.in_environment(environment);
+        Self {
+            is_grey: is_grey(&scene),
+            scene: Arc::new(scene),
+            ..self.clone()
+        }
+    }
 }
 
 /// Stages of loading a scene, in order.
@@ -161,7 +186,12 @@ impl Loader {
     ///
     /// # Errors
     /// When the system refuses a thread.
-    pub fn start(source: SceneSource, options: SceneOptions, wake: Wake) -> std::io::Result<Self> {
+    pub fn start(
+        source: SceneSource,
+        options: SceneOptions,
+        lighting: Lighting,
+        wake: Wake,
+    ) -> std::io::Result<Self> {
         let (sender, receiver) = mpsc::channel();
         let tracker = Tracker::default();
         let (wanted, tracked) = (source.clone(), tracker.clone());
@@ -169,7 +199,7 @@ impl Loader {
             .name("loader".to_owned())
             .spawn(move || {
                 // Nobody listens when another scene was asked for meanwhile.
-                let _ = sender.send(load(wanted, &options, &tracked));
+                let _ = sender.send(load(wanted, &options, &lighting, &tracked));
                 wake();
             })?;
         Ok(Self {
@@ -210,6 +240,7 @@ impl Loader {
 fn load(
     source: SceneSource,
     options: &SceneOptions,
+    lighting: &Lighting,
     tracker: &Tracker,
 ) -> Result<LoadedScene, String> {
     tracker.enter(Phase::Reading);
@@ -226,13 +257,16 @@ fn load(
             (scene, Some(viewpoint))
         }
     };
-    let (min, max) = bounds(&scene);
+    let own_environment = scene.environment.clone();
+    let scene = lighting.apply(scene);
     tracker.enter(Phase::BuildingRayTree);
     let rays = RayTree::new(&scene);
     tracker.enter(Phase::ChoosingView);
-    let viewpoint = viewpoint.unwrap_or_else(|| opening::deepest_view(&scene, &rays, min, max));
+    let look = first_look(&scene, &rays);
+    let [min, max] = look.bounds;
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
+        own_environment,
         emitter_count: scene.surfaces.iter().filter(emits).count(),
         has_backs: scene.triangles.iter().any(|triangle| !triangle.two_sided),
         is_grey: is_grey(&scene),
@@ -241,7 +275,9 @@ fn load(
         source,
         min,
         max,
-        viewpoint,
+        is_lit: look.is_lit,
+        interior: look.interior,
+        viewpoint: viewpoint.unwrap_or(look.camera),
     })
 }
 
@@ -250,6 +286,7 @@ fn is_grey(scene: &Scene) -> bool {
     let is_grey = |color: Vec3| color.min_element() == color.max_element();
     let mut surfaces = scene.surfaces.iter();
     scene.textures.is_empty()
+        && scene.environment.is_grey()
         && surfaces.all(|surface| is_grey(surface.reflectance) && is_grey(surface.emission))
 }
 
@@ -257,17 +294,7 @@ fn is_grey(scene: &Scene) -> bool {
 pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
     let eye = scene.frame.from_world(builtin.viewpoint.position);
     let target = scene.frame.from_world(builtin.viewpoint.target);
-    Camera::looking(eye, target, Vec3::Y)
-}
-
-/// Box around a scene in frame units.
-pub fn bounds(scene: &Scene) -> (Vec3, Vec3) {
-    scene
-        .positions
-        .iter()
-        .fold((Vec3::MAX, Vec3::MIN), |(min, max), position| {
-            (min.min(*position), max.max(*position))
-        })
+    Camera::looking(eye, target, scene.up.vector())
 }
 
 #[cfg(test)]

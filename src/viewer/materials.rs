@@ -1,8 +1,11 @@
 //! Lights and materials as the user has changed them: what is switched on, how bright, in which colour.
 
-use glam::Vec3;
+use std::time::{Duration, Instant};
 
-use crate::scene::{Appearance, Material, Scene, Surface, TriangleId};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::scene::{Appearance, Lighting, Material, Scene, Surface, TriangleId};
 
 /// A light as its controls show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +30,21 @@ impl LightControl {
             color: emission / strength,
             strength,
         })
+    }
+
+    /// A white lamp whose radiance is `strength`.
+    fn white(strength: f32) -> Self {
+        Self {
+            is_on: true,
+            intensity: 1.0,
+            color: Vec3::ONE,
+            strength,
+        }
+    }
+
+    /// The same at its first brightness and white.
+    pub fn as_made(&self) -> Self {
+        Self::white(self.strength)
     }
 
     /// Emitted radiance.
@@ -99,6 +117,85 @@ impl Materials {
     /// A material as in the file.
     pub fn of_file(&self, index: usize) -> &MaterialControl {
         &self.of_file[index]
+    }
+
+    /// Make a material a lamp, as bright as the brightest of the file, or of radiance 1. One that is switched off is
+    /// switched on.
+    pub fn make_lamp(&mut self, index: usize) {
+        let known = self.of_file.iter().filter_map(|material| material.light);
+        let strength = known.map(|light| light.strength).fold(0.0, f32::max);
+        let strength = if strength > 0.0 { strength } else { 1.0 };
+        let light = &mut self.now[index].light;
+        light
+            .get_or_insert_with(|| LightControl::white(strength))
+            .is_on = true;
+    }
+
+    /// Make a material no lamp: one of the file is switched off.
+    pub fn put_out(&mut self, index: usize) {
+        let light = &mut self.now[index].light;
+        match self.of_file[index].light {
+            Some(_) => light.iter_mut().for_each(|light| light.is_on = false),
+            None => *light = None,
+        }
+    }
+
+    /// Whether a material emits now.
+    pub fn is_lamp(&self, index: usize) -> bool {
+        self.now[index].light.is_some_and(|light| light.is_on)
+    }
+
+    /// Materials that emit nothing though their names say that they are lamps.
+    pub fn named_like_lamps(&self) -> Vec<usize> {
+        let is_named = |&index: &usize| is_named_like_lamp(&self.now[index].name);
+        (0..self.now.len())
+            .filter(|&index| !self.is_lamp(index))
+            .filter(is_named)
+            .collect()
+    }
+
+    /// The materials that were changed.
+    pub fn changes(&self) -> Vec<SavedMaterial> {
+        let pairs = self.now.iter().zip(&self.of_file);
+        let changed = pairs.filter(|(now, of_file)| now != of_file);
+        changed
+            .map(|(now, _)| {
+                let Appearance {
+                    reflectance,
+                    emission,
+                } = now.appearance();
+                SavedMaterial {
+                    name: now.name.clone(),
+                    reflectance: reflectance.to_array(),
+                    emission: emission.to_array(),
+                }
+            })
+            .collect()
+    }
+
+    /// Change materials as they were saved; returns the names that no material has.
+    pub fn restore<'a>(&mut self, saved: &'a [SavedMaterial]) -> Vec<&'a str> {
+        let mut unknown = Vec::new();
+        for saved in saved {
+            let known = self.now.iter().position(|now| now.name == saved.name);
+            let Some(index) = known else {
+                unknown.push(saved.name.as_str());
+                continue;
+            };
+            self.now[index].reflectance = Vec3::from_array(saved.reflectance);
+            let emission = Vec3::from_array(saved.emission);
+            let strength = emission.max_element();
+            if strength <= 0.0 {
+                self.put_out(index);
+                continue;
+            }
+            self.make_lamp(index);
+            if let Some(light) = &mut self.now[index].light {
+                light.color = emission / strength;
+                light.intensity = strength / light.strength;
+            }
+        }
+        unknown
     }
 
     /// Reset to the values of the file.
@@ -174,6 +271,116 @@ impl Materials {
     }
 }
 
+/// A changed material as the sidecar has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SavedMaterial {
+    /// Its name.
+    pub name: String,
+    /// Diffuse reflectance, linear, 0 to 1.
+    pub reflectance: [f32; 3],
+    /// Emitted radiance, in units of [`Scene::radiance_unit`], at least 0.
+    pub emission: [f32; 3],
+}
+
+impl SavedMaterial {
+    /// One sentence about the first value out of its range.
+    ///
+    /// # Errors
+    /// Where there is one.
+    pub fn check(&self) -> Result<(), String> {
+        for (what, values, most) in [
+            ("reflectance", self.reflectance, 1.0),
+            ("emission", self.emission, f32::MAX),
+        ] {
+            let wrong = values
+                .into_iter()
+                .find(|value| !(0.0..=most).contains(value));
+            if let Some(value) = wrong {
+                let name = &self.name;
+                return Err(format!(
+                    "{what} of '{name}' is {value}, which is out of range"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Words that name lamps: whole words of a name, and ends of words, as in `ceilinglight`. A wall may be painted lightgrey.
+const LAMP_WORDS: [&str; 9] = [
+    "light", "lights", "lamp", "lamps", "bulb", "bulbs", "neon", "emitter", "emission",
+];
+
+/// Whether the name of a material says that it is a lamp.
+fn is_named_like_lamp(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let mut words = name.split(|c: char| !c.is_alphabetic());
+    name.contains('灯')
+        || words.any(|word| {
+            word.starts_with("emit")
+                || word.starts_with("emiss")
+                || LAMP_WORDS.iter().any(|lamp| word.ends_with(lamp))
+        })
+}
+
+/// All that can be changed about the light of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lights {
+    /// Its lamps and materials.
+    pub materials: Materials,
+    /// Sky and sun.
+    pub lighting: Lighting,
+}
+
+/// Lights and materials before and after changes, to go back and forth between.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    past: Vec<Lights>,
+    future: Vec<Lights>,
+    changed: Option<Instant>,
+}
+
+impl History {
+    /// Changes that are remembered.
+    const KEPT: usize = 100;
+    /// Changes that follow each other sooner belong together, as those of one drag do.
+    const TOGETHER: Duration = Duration::from_millis(700);
+
+    /// Remember lights and materials before a change that is made at this time.
+    pub fn note(&mut self, before: Lights, now: Instant) {
+        let last = self.changed.replace(now);
+        self.future.clear();
+        if last.is_some_and(|last| now.duration_since(last) < Self::TOGETHER) {
+            return;
+        }
+        if self.past.len() >= Self::KEPT {
+            self.past.remove(0);
+        }
+        self.past.push(before);
+    }
+
+    /// Whether there is a change to undo.
+    pub fn can_undo(&self) -> bool {
+        !self.past.is_empty()
+    }
+
+    /// Lights and materials before the last change, given those of now.
+    pub fn undo(&mut self, now: Lights) -> Option<Lights> {
+        let before = self.past.pop()?;
+        self.future.push(now);
+        self.changed = None;
+        Some(before)
+    }
+
+    /// Lights and materials after the change that was undone last, given those of now.
+    pub fn redo(&mut self, now: Lights) -> Option<Lights> {
+        let after = self.future.pop()?;
+        self.past.push(now);
+        self.changed = None;
+        Some(after)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -219,6 +426,81 @@ mod tests {
         assert_eq!(materials.lights().count(), 1, "it can be switched on again");
         materials.reset();
         assert_eq!(materials.appearances(&scene), scene.appearances());
+    }
+
+    #[test]
+    fn any_material_becomes_a_lamp_and_none_again() {
+        let scene = cornell();
+        let mut materials = Materials::of(&scene);
+        let white = materials.now.iter().position(|now| now.name == "white");
+        let white = white.expect("the box has white walls");
+        materials.make_lamp(white);
+        assert!(materials.is_lamp(white));
+        let strength = scene.materials.iter().map(|of| of.emission.max_element());
+        let strength = strength.fold(0.0, f32::max);
+        let emission = materials.appearances(&scene)[white].emission;
+        assert_eq!(emission, Vec3::splat(strength));
+        materials.put_out(white);
+        assert!(!materials.are_changed());
+    }
+
+    #[test]
+    fn lamps_are_known_by_their_names() {
+        let lamps = [
+            "Light",
+            "ceiling_lamp.003",
+            "CeilingLight",
+            "Neon2",
+            "吊灯",
+            "emit",
+            "Bulb_E27",
+            "emissive",
+        ];
+        for name in lamps {
+            assert!(is_named_like_lamp(name), "{name}");
+        }
+        for name in ["lightgrey", "wall", "delighted", "clamped", "", "x2lamb"] {
+            assert!(!is_named_like_lamp(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn saved_changes_are_made_again() {
+        let scene = cornell();
+        let mut materials = Materials::of(&scene);
+        materials.now[0].reflectance = Vec3::new(0.1, 0.2, 0.3);
+        materials.make_lamp(1);
+        let lamp = materials.lights().last().expect("the box has a lamp");
+        materials.put_out(lamp);
+        let saved = materials.changes();
+        assert_eq!(saved.len(), 3);
+        assert!(saved.iter().all(|saved| saved.check().is_ok()));
+        let mut again = Materials::of(&scene);
+        assert!(again.restore(&saved).is_empty());
+        assert_eq!(again.appearances(&scene), materials.appearances(&scene));
+        let mut gone = saved[0].clone();
+        gone.name = "gone".to_owned();
+        assert_eq!(again.restore(&[gone.clone()]), ["gone"]);
+        gone.emission[1] = f32::NAN;
+        assert!(gone.check().is_err());
+    }
+
+    #[test]
+    fn changes_are_undone_and_made_again() {
+        let first = Lights {
+            materials: Materials::of(&cornell()),
+            lighting: Lighting::default(),
+        };
+        let mut second = first.clone();
+        second.materials.make_lamp(0);
+        let (mut history, start) = (History::default(), Instant::now());
+        history.note(first.clone(), start);
+        // Still the same drag.
+        history.note(second.clone(), start + Duration::from_millis(100));
+        assert_eq!(history.undo(second.clone()), Some(first.clone()));
+        assert_eq!(history.undo(first.clone()), None);
+        assert_eq!(history.redo(first), Some(second.clone()));
+        assert_eq!(history.redo(second), None);
     }
 
     #[test]

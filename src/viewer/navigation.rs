@@ -113,7 +113,7 @@ fn point_under(rect: egui::Rect, state: &State, pointer: egui::Pos2) -> Vec3 {
     let surface = state
         .loaded
         .as_ref()
-        .and_then(|loaded| pick::pick(loaded, camera, ndc, aspect, state.view.backs));
+        .and_then(|loaded| pick::pick(loaded, camera, ndc, aspect, &state.view));
     surface.map_or_else(
         || {
             let (origin, direction) = camera.ray(ndc, aspect);
@@ -134,7 +134,7 @@ fn clicked(response: &egui::Response, state: &mut State) -> Option<Picked> {
     let rect = response.rect;
     let ndc = ndc_of(rect, response.interact_pointer_pos()?);
     let aspect = rect.width() / rect.height().max(1.0);
-    let hit = pick::pick(loaded, &state.rig.current, ndc, aspect, state.view.backs);
+    let hit = pick::pick(loaded, &state.rig.current, ndc, aspect, &state.view);
     if response.double_clicked() {
         match hit {
             Some(pick) => state.rig.target.set_pivot(pick.point),

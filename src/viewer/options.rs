@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{camera::Camera, loader::SceneSource, view::ViewRequest};
 use crate::{
-    scene::{Frame, SceneOptions},
+    scene::{Frame, Lighting, SceneOptions},
     solver::SolveSettings,
     worker::RunOptions,
 };
@@ -16,6 +16,8 @@ pub struct Options {
     pub source: Option<SceneSource>,
     /// How it is read.
     pub scene_options: SceneOptions,
+    /// The light that it has beside its own.
+    pub lighting: Lighting,
     /// Settings of the solve.
     pub settings: SolveSettings,
     /// Whether these settings go before those saved beside the scene.

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{camera::Camera, loader::LoadedScene};
+use super::{camera::Camera, loader::LoadedScene, view::ViewSettings};
 use crate::{
     geometry::barycentric_in_plane,
     scene::{TriangleId, luminance},
@@ -62,17 +62,23 @@ pub struct ObjectLight {
 }
 
 /// The nearest surface under a point of the picture; −1…1, y up.
-/// One-sided faces seen from behind are looked through unless they are shown.
+/// One-sided faces seen from behind are looked through unless they are shown, and so is what stands before a room that is
+/// looked into.
 pub fn pick(
     loaded: &LoadedScene,
     camera: &Camera,
     ndc: Vec2,
     aspect: f32,
-    backs_are_shown: bool,
+    view: &ViewSettings,
 ) -> Option<Pick> {
     /// Surfaces looked through at most; a picture with more backs before a front is a picture of nothing.
     const MOST_LAYERS: usize = 64;
     let (mut origin, direction) = camera.ray(ndc, aspect);
+    let room = loaded.interior;
+    let room = room.filter(|room| room.is_looked_into(camera, view));
+    if let Some(entered) = room.and_then(|room| room.entered(origin, direction)) {
+        origin += direction * entered;
+    }
     let mut from = None;
     for _ in 0..MOST_LAYERS {
         let hit = loaded.rays.closest_shown(origin, direction, from)?;
@@ -81,7 +87,7 @@ pub fn pick(
             .area_vector
             .dot(direction)
             > 0.0;
-        if !is_back || backs_are_shown || loaded.scene.triangles[hit.triangle.index()].two_sided {
+        if !is_back || view.backs || loaded.scene.triangles[hit.triangle.index()].two_sided {
             return Some(Pick {
                 point,
                 triangle: hit.triangle,

@@ -9,7 +9,7 @@ use std::{
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{camera::Camera, loader::SceneSource, view::ViewSettings};
+use super::{camera::Camera, loader::SceneSource, materials::SavedMaterial, view::ViewSettings};
 use crate::{
     scene::{Frame, write_whole},
     solver::SolveSettings,
@@ -61,6 +61,8 @@ struct Sidecar {
     camera: Option<SavedCamera>,
     view: ViewSettings,
     settings: SolveSettings,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    materials: Vec<SavedMaterial>,
 }
 
 /// The content of a sidecar, in the scene's frame.
@@ -72,6 +74,8 @@ pub struct Session {
     pub view: ViewSettings,
     /// How it is computed.
     pub settings: SolveSettings,
+    /// Materials that differ from the file.
+    pub materials: Vec<SavedMaterial>,
 }
 
 /// Where the sidecar of a scene is: the file's name with `.vecrad.toml` behind it.
@@ -93,6 +97,7 @@ pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
         }),
         view: session.view.clone(),
         settings: session.settings.clone(),
+        materials: session.materials.clone(),
     };
     toml::to_string_pretty(&saved).map_err(|error| error.to_string())
 }
@@ -108,6 +113,7 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
     })?;
     saved.settings.check()?;
     saved.view.check()?;
+    saved.materials.iter().try_for_each(SavedMaterial::check)?;
     let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };
     let camera = saved.camera.map(|camera| Camera {
         fov_y_radians: camera.view_angle_degrees.to_radians(),
@@ -122,6 +128,7 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
         camera: camera.filter(Camera::is_valid),
         view: saved.view,
         settings: saved.settings,
+        materials: saved.materials,
     })
 }
 
@@ -196,11 +203,17 @@ mod tests {
                 ..ViewSettings::default()
             },
             settings: SolveSettings::draft(),
+            materials: vec![SavedMaterial {
+                name: "ceiling lamp".to_owned(),
+                reflectance: [0.0, 0.25, 0.5],
+                emission: [12.0, 10.0, 8.0],
+            }],
         };
         let text = to_toml(&session, &frame).expect("plain values");
         let read = from_toml(&text, &frame).expect("our own text");
         assert_eq!(read.view, session.view);
         assert_eq!(read.settings, session.settings);
+        assert_eq!(read.materials, session.materials);
         let (was, is) = (session.camera.expect("set"), read.camera.expect("valid"));
         assert!((was.eye() - is.eye()).length() < 1e-3);
         assert!((was.up - is.up).length() < 1e-6);
@@ -243,6 +256,10 @@ mod tests {
             (
                 "view.links.most = 4000000000",
                 "links.most is 4000000000, but must be within 1 and 4096",
+            ),
+            (
+                "[[materials]]\nname = \"a\"\nreflectance = [0.5, 2.0, 0.0]\nemission = [0.0, 0.0, 0.0]",
+                "reflectance of 'a' is 2, which is out of range",
             ),
         ] {
             assert_eq!(from_toml(text, &frame).expect_err(text), sentence);

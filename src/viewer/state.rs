@@ -9,8 +9,9 @@ use super::{
     frame_time::FrameTimes,
     inspection::Inspections,
     loader::{LoadedScene, Loader},
-    materials::Materials,
+    materials::{History, Lights, Materials},
     messages::Messages,
+    options::CameraRequest,
     panel_state::PanelState,
     pick::{ObjectLight, Pick, Probe},
     run::Run,
@@ -21,7 +22,7 @@ use super::{
 };
 use crate::{
     hierarchy::NodeId,
-    scene::{Scene, SceneOptions},
+    scene::{Lighting, Scene, SceneOptions},
     solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
@@ -55,8 +56,12 @@ pub struct State {
     pub options: RunOptions,
     /// How scenes are read.
     pub scene_options: SceneOptions,
+    /// The light that they have beside their own.
+    pub lighting: Lighting,
     /// Its lights and materials, as they were changed.
     pub materials: Materials,
+    /// How they were before and after changes.
+    pub history: History,
     /// How the light is shown.
     pub view: ViewSettings,
     /// The view mode before the key for normals was pressed.
@@ -103,6 +108,25 @@ impl State {
         let aspect = self.aspect();
         if let Some(loaded) = &self.loaded {
             self.rig.target.frame_box(loaded.min, loaded.max, aspect);
+        }
+    }
+
+    /// Lights and materials as they are now.
+    pub fn lights(&self) -> Lights {
+        Lights {
+            materials: self.materials.clone(),
+            lighting: self.lighting.clone(),
+        }
+    }
+
+    /// Go back to the view that the scene opened with, with the axis up that is up now.
+    pub fn look_first(&mut self) {
+        if let Some(loaded) = &self.loaded {
+            let upright = CameraRequest {
+                up: Some(self.rig.target.up),
+                ..CameraRequest::default()
+            };
+            self.rig.target = upright.apply(loaded.viewpoint, &loaded.scene.frame);
         }
     }
 
@@ -161,6 +185,12 @@ impl State {
     /// Whether there are one-sided faces, whose backs can be shown.
     pub fn has_backs(&self) -> bool {
         self.loaded.as_ref().is_some_and(|loaded| loaded.has_backs)
+    }
+
+    /// Whether the scene is a room, whose walls can be looked through.
+    pub fn has_interior(&self) -> bool {
+        let loaded = self.loaded.as_ref();
+        loaded.is_some_and(|loaded| loaded.interior.is_some())
     }
 
     /// Whether there are emitters; of no scene nobody knows.

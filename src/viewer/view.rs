@@ -184,6 +184,8 @@ pub struct ViewSettings {
     pub edges: bool,
     /// Whether backs of one-sided faces are drawn, dark, instead of being looked through.
     pub backs: bool,
+    /// Whether what stands between the viewer and the inside of a room is left out.
+    pub see_through: bool,
     /// Whether textures show in detail, and not only as the mean of each element.
     pub texture_detail: bool,
     /// The cluster boxes.
@@ -308,6 +310,7 @@ impl Default for ViewSettings {
             fixed_range: None,
             edges: false,
             backs: false,
+            see_through: true,
             texture_detail: true,
             clusters: ClusterOverlay::default(),
             links: LinkOverlay::default(),

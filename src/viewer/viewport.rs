@@ -11,6 +11,7 @@ use glam::Vec3;
 use super::{
     camera::Camera,
     exposure,
+    first_look::Interior,
     line_cache::LineCache,
     messages::Severity,
     navigation,
@@ -46,6 +47,7 @@ struct MeterKey {
     mode: ViewMode,
     texture_detail: bool,
     backs: bool,
+    see_through: bool,
     camera: Camera,
 }
 
@@ -56,6 +58,7 @@ impl MeterKey {
             mode: key.view.mode,
             texture_detail: key.view.texture_detail,
             backs: key.view.backs,
+            see_through: key.view.see_through,
             camera: key.camera,
         }
     }
@@ -66,6 +69,7 @@ impl MeterKey {
             || self.mode != other.mode
             || self.texture_detail != other.texture_detail
             || self.backs != other.backs
+            || self.see_through != other.see_through
             || exposure::shows_other_things(&self.camera, &other.camera)
     }
 }
@@ -77,6 +81,7 @@ struct PictureKey {
     segments: Arc<Vec<SegmentInstance>>,
     camera: Camera,
     view: ViewSettings,
+    interior: Option<Interior>,
     size: [u32; 2],
     background: Vec3,
 }
@@ -162,8 +167,9 @@ impl Viewport {
         let gpu = self.renderer.gpu().clone();
         let is_first = state.exposure.target.is_none();
         // Lights that are dimmed would look as bright as before.
-        let is_due =
-            key.view.mode.is_light() && key.staged.is_lit && !state.materials.are_changed();
+        let is_due = key.view.mode.is_light()
+            && key.staged.is_lit
+            && (is_first || !state.materials.are_changed());
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
             let last = self.metered.as_ref();
@@ -263,6 +269,7 @@ impl Viewport {
                 mode: staged.wanted.mode,
                 ..state.view.clone()
             },
+            interior: state.loaded.as_ref().and_then(|loaded| loaded.interior),
             size,
             background,
         })
@@ -290,6 +297,7 @@ impl Viewport {
             view: &key.view,
             is_unlit: !key.staged.is_lit,
             range: wanted.range,
+            interior: key.interior,
             overlay: &overlay,
             background: key.background,
             pixels_per_point,

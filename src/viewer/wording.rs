@@ -1,8 +1,9 @@
 //! Sentences of other rooms as the window says them: they name controls where the command line names flags.
 
 /// Flags by the name of their control in the window.
-const CONTROLS: [(&str, &str); 12] = [
+const CONTROLS: [(&str, &str); 14] = [
     ("--sides", "Sides"),
+    ("--up", "Camera"),
     ("--epsilon", "Link threshold ε"),
     ("--min-area", "Smallest element"),
     ("--max-steps", "Maximum steps"),
@@ -14,17 +15,20 @@ const CONTROLS: [(&str, &str); 12] = [
     ("--samples", "Samples p"),
     ("--method", "Clusters"),
     ("--reference", "Trace reference"),
+    ("--sky", "Sky"),
 ];
 
 /// Values of flags by their label in the window.
-const VALUES: [(&str, &str); 7] = [
+const VALUES: [(&str, &str); 9] = [
     ("auto", "Automatic"),
+    ("+Y", "Y is up"),
     ("one", "One-sided"),
     ("two", "Two-sided"),
     ("sampled", "Shadow rays"),
     ("linked", "Links"),
     ("interval", "Interval bounds"),
     ("samples", "p samples"),
+    ("none", "None"),
 ];
 
 /// A sentence without flags: `--sides two` becomes “Sides: Two-sided”. A flag without a control keeps its words.
@@ -88,6 +92,7 @@ mod tests {
                 "raise --min-area, or stop",
                 "raise “Smallest element”, or stop",
             ),
+            ("choose --up +Y", "choose “Camera: Y is up”"),
             ("see --some-flag now", "see “some flag” now"),
             ("a -- b, --, x--sides", "a -- b, --, x--sides"),
         ] {

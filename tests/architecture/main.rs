@@ -80,15 +80,18 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "multipole",
             "light_tree",
             "samples",
+            "sky",
+            "sun",
             "lights",
             "smooth",
             "field",
-            "surfaces",
             "noise",
             "vertex_samples",
             "border",
             "interpolation",
             "before_walls",
+            "fields",
+            "surfaces",
             "adapt",
             "light_parts",
         ],
@@ -100,13 +103,14 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
 ];
 
 /// Words that only some rooms may say.
-const CONFINED: [(&str, &[&str]); 7] = [
+const CONFINED: [(&str, &[&str]); 8] = [
     ("egui", &["viewer"]),
     ("eframe", &["viewer"]),
     ("rfd", &["viewer"]),
     ("wgpu", &["viewer"]),
     ("obvhs", &["geometry"]),
     ("tobj", &["scene"]),
+    ("hw_skymodel", &["scene"]),
     ("clap", &["cli"]),
 ];
 

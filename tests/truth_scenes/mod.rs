@@ -1,5 +1,7 @@
 //! Small scenes with known light, made in the tests that need them.
 
+#![allow(dead_code, reason = "each test uses some of it")]
+
 use glam::{DVec3, Vec3};
 use vecrad::scene::{Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides};
 
@@ -15,6 +17,14 @@ impl Plates {
         let [reflectance, emission] = [reflectance, emission].map(Vec3::splat);
         self.builder
             .push_material(Material::plain("", reflectance, emission))
+    }
+
+    /// Add a black pane: all but the part `opacity` of the light passes.
+    pub(crate) fn pane(&mut self, opacity: f32) -> MaterialId {
+        self.builder.push_material(Material {
+            opacity,
+            ..Material::plain("", Vec3::ZERO, Vec3::ZERO)
+        })
     }
 
     /// Add a rectangle of `2 n²` triangles; its front shows along `u × v`.

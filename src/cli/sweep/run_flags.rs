@@ -7,7 +7,10 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 
 use crate::{
-    cli::{Preset, SettingFlags, UsageError, flags::at_least_zero, values::name_of},
+    cli::{
+        Preset, SettingFlags, UsageError,
+        values::{at_least_zero, name_of},
+    },
     solver::{Method, Oracle, SolveSettings},
 };
 

@@ -16,11 +16,11 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::ReportArguments;
 use crate::{
-    cli::{Outcome, load, output::say, progress::Progress, report::core_count},
+    cli::{Outcome, load, load::light, output::say, progress::Progress, report::core_count},
     geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, ReferenceFacts, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
-    scene::{Scene, builtin::room_of},
+    scene::{Lighting, Scene, builtin::room_of},
     solver::{Cancel, DisplayMesh, VertexLight},
     worker::RunOptions,
 };
@@ -49,6 +49,8 @@ pub(super) struct Session<'a> {
     pub(super) interrupted: Arc<AtomicBool>,
     /// Baselines run here; the solver has its own of the same size.
     pub(super) pool: Arc<ThreadPool>,
+    /// Light that is asked for.
+    lighting: Lighting,
     progress: Progress,
     /// Whether a limit that the user gave ended a solver run.
     is_cut_short: bool,
@@ -78,6 +80,7 @@ impl<'a> Session<'a> {
             arguments,
             interrupted,
             pool: Arc::new(pool),
+            lighting: arguments.scene_flags.lighting()?,
             progress: Progress::new(arguments.quiet),
             is_cut_short: false,
         })
@@ -179,10 +182,13 @@ impl<'a> Session<'a> {
     /// Read or make a scene, its warnings to standard error.
     pub(super) fn load(&mut self, source: &Source) -> Result<Arc<Scene>> {
         let options = self.arguments.scene_flags.options();
+        let lighting = &self.lighting;
         let scene = match source {
-            Source::File(path) => load(Some(path), None, &options)?,
-            Source::Builtin(name) => load(None, Some(name), &options)?,
-            Source::Room(triangles) => room_of(*triangles as usize).finish(&options)?,
+            Source::File(path) => load(Some(path), None, &options, lighting)?,
+            Source::Builtin(name) => load(None, Some(name), &options, lighting)?,
+            Source::Room(triangles) => {
+                light(room_of(*triangles as usize).finish(&options)?, lighting)?
+            }
         };
         for warning in &scene.warnings {
             say(format_args!("warning: {warning}"));

@@ -4,6 +4,7 @@
 //! floor; what stands in them is closed and faces outward, sunk a little into what carries it. Y is up.
 
 mod cornell;
+mod courtyard;
 mod furnace;
 mod gallery;
 mod palette;
@@ -22,7 +23,7 @@ pub use room::room_of;
 
 use glam::DVec3;
 
-use super::{BuildError, Scene, SceneBuilder, SceneOptions};
+use super::{BuildError, Environment, Scene, SceneBuilder, SceneOptions, UpAxis};
 
 /// Where to look at a scene from, in world units, with y up and a vertical field of view of about 45°.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +44,7 @@ pub struct Builtin {
     /// The viewpoint for its picture.
     pub viewpoint: Viewpoint,
     faces: fn() -> SceneBuilder,
+    environment: Option<fn() -> Environment>,
 }
 
 impl Builtin {
@@ -50,15 +52,20 @@ impl Builtin {
     pub fn builder(&self) -> SceneBuilder {
         let mut builder = (self.faces)();
         builder.source.name = self.name.to_owned();
+        builder.source.up = Some(UpAxis::Y);
         builder
     }
 
-    /// The finished scene.
+    /// The finished scene, in an environment where it brings one along.
     ///
     /// # Errors
     /// As [`SceneBuilder::finish`]; not for the scenes in this module.
     pub fn scene(&self, options: &SceneOptions) -> Result<Scene, BuildError> {
-        self.builder().finish(options)
+        let scene = self.builder().finish(options)?;
+        Ok(match self.environment {
+            Some(environment) => scene.in_environment(environment()),
+            None => scene,
+        })
     }
 }
 
@@ -89,71 +96,131 @@ const fn view(position: [f64; 3], target: [f64; 3]) -> Viewpoint {
     }
 }
 
-static BUILTINS: [Builtin; 11] = [
+static BUILTINS: [Builtin; 13] = [
     Builtin {
         name: "gallery",
         summary: "a hall with columns, a staircase, furniture and pictures, lit by windows and warm spots",
         viewpoint: view([7.3, 1.7, 0.7], [4.3, 1.75, 9.0]),
         faces: gallery::gallery,
+        environment: None,
     },
     Builtin {
         name: "cornell",
         summary: "the Cornell box by its published measurements, in millimetres",
         viewpoint: view([278.0, 273.0, -800.0], [278.0, 273.0, 279.6]),
         faces: cornell::cornell,
+        environment: None,
     },
     Builtin {
         name: "room-1022",
         summary: "a coloured room with two organic bodies and one small light, 1,022 triangles",
         viewpoint: room::VIEWPOINT,
         faces: room::room_1022,
+        environment: None,
     },
     Builtin {
         name: "room-8621",
         summary: "the same room in 8,621 triangles",
         viewpoint: room::VIEWPOINT,
         faces: room::room_8621,
+        environment: None,
     },
     Builtin {
         name: "room-42879",
         summary: "the same room in 42,879 triangles",
         viewpoint: room::VIEWPOINT,
         faces: room::room_42879,
+        environment: None,
     },
     Builtin {
         name: "room-1m",
         summary: "the same room in 1,000,000 triangles",
         viewpoint: room::VIEWPOINT,
         faces: room::room_1m,
+        environment: None,
     },
     Builtin {
         name: "tiled-room",
         summary: "a small room with textures: floor tiles, a poster and a patterned light",
         viewpoint: view([2.6, 1.5, 0.25], [1.1, 1.0, 3.0]),
         faces: tiled_room::tiled_room,
+        environment: None,
+    },
+    Builtin {
+        name: "courtyard",
+        summary: "a courtyard with an arcade, under a blue sky and the afternoon's sun",
+        viewpoint: view([-4.2, 1.7, 3.4], [1.6, 1.6, -3.2]),
+        faces: courtyard::courtyard,
+        environment: Some(courtyard::afternoon),
+    },
+    Builtin {
+        name: "glazed-room",
+        summary: "a room with a window of two panes, lit through it by sky and sun",
+        viewpoint: view([0.5, 1.6, 0.4], [3.0, 1.1, 4.0]),
+        faces: courtyard::glazed_room,
+        environment: Some(courtyard::morning),
     },
     Builtin {
         name: "soup",
         summary: "20,000 small triangles and quadrilaterals of any orientation in a room",
         viewpoint: view([3.8, 1.7, 0.2], [1.4, 1.4, 3.0]),
         faces: soup::soup,
+        environment: None,
     },
     Builtin {
         name: "plates",
         summary: "two unit squares that face each other at distance 1; the upper one emits",
         viewpoint: view([2.6, 1.1, 2.3], [0.5, 0.45, 0.5]),
         faces: || plates(1.0),
+        environment: None,
     },
     Builtin {
         name: "perpendicular-plates",
         summary: "two unit squares that share an edge at a right angle; the upright one emits",
         viewpoint: view([2.4, 1.3, 2.1], [0.4, 0.35, 0.5]),
         faces: perpendicular_plates,
+        environment: None,
     },
     Builtin {
         name: "furnace",
         summary: "a closed cube that glows and reflects alike everywhere: every point has radiance 1",
         viewpoint: view([0.9, 0.55, 0.9], [0.2, 0.45, 0.2]),
         faces: || furnace(0.5, 0.5, 4),
+        environment: None,
     },
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{SceneOptions, WarningKind};
+
+    #[test]
+    fn every_scene_has_light_and_nothing_to_warn_of() {
+        // The largest are made elsewhere.
+        for builtin in builtins()
+            .iter()
+            .filter(|builtin| builtin.name != "room-1m")
+        {
+            let scene = builtin
+                .scene(&SceneOptions::default())
+                .expect("it has faces");
+            assert!(scene.has_light(), "{}", builtin.name);
+            let is_odd = |kind| kind != WarningKind::Orientation;
+            let odd = scene.warnings.iter().find(|warning| is_odd(warning.kind));
+            assert!(odd.is_none(), "{}: {odd:?}", builtin.name);
+        }
+    }
+
+    #[test]
+    fn walls_of_scenes_lit_from_outside_are_closed() {
+        for name in ["courtyard", "glazed-room"] {
+            let scene = builtin(name, &SceneOptions::default()).expect("it is there");
+            let scene = scene.expect("it has faces");
+            for triangle in &scene.triangles {
+                let paint = &scene.materials[triangle.material.index()].name;
+                assert_eq!(triangle.two_sided, paint == "glass", "{name}: {paint}");
+            }
+        }
+    }
+}

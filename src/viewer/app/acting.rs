@@ -1,12 +1,14 @@
 //! Actions carried out.
 
+use std::{sync::Arc, time::Instant};
+
 use eframe::egui;
 
 use super::{
     super::{
         action::{Action, Scale},
         bindings, clusters, focus,
-        materials::Materials,
+        materials::{Lights, Materials},
         messages::Severity,
         navigation::Picked,
         panel_state::PanelState,
@@ -19,7 +21,7 @@ use super::{
     },
     App,
 };
-use crate::worker::Effect;
+use crate::{scene::Lighting, worker::Effect};
 
 impl App {
     /// Carry out what was asked for.
@@ -45,7 +47,34 @@ impl App {
                 self.state.options = options.clone();
                 self.worker.change_options(options);
             }
-            Action::Relight(materials) => self.relight(materials),
+            Action::Relight(materials) => {
+                self.remember_lights();
+                self.relight(materials);
+            }
+            Action::Light(lighting) => {
+                self.remember_lights();
+                self.light(lighting);
+            }
+            Action::Undo | Action::Redo => {
+                let now = self.state.lights();
+                let history = &mut self.state.history;
+                let other = match action {
+                    Action::Undo => history.undo(now),
+                    _ => history.redo(now),
+                };
+                if let Some(Lights {
+                    materials,
+                    lighting,
+                }) = other
+                {
+                    if lighting != self.state.lighting {
+                        self.light(lighting);
+                    }
+                    if materials != self.state.materials {
+                        self.relight(materials);
+                    }
+                }
+            }
             Action::Sides(sides) => {
                 self.state.scene_options.sides = sides;
                 self.reload();
@@ -79,6 +108,7 @@ impl App {
             } => self.save_picture(path, size, is_transparent),
             Action::MeshDialog => self.ask_for_mesh(),
             Action::SaveMesh(path) => self.save_mesh(path),
+            Action::SaveMaterials => self.save_materials(),
             Action::SaveSidecar => self.save_sidecar(),
             Action::ToggleFullScreen => {
                 let is_full = ctx.input(|input| input.viewport().fullscreen.unwrap_or(false));
@@ -153,6 +183,14 @@ impl App {
                 }
                 state.view.clusters.shown = true;
             }
+            Action::ToggleSeeThrough if state.has_interior() => {
+                state.view.see_through = !state.view.see_through;
+            }
+            Action::ToggleSeeThrough => {
+                let text = "there are no walls to see through: the scene is no room";
+                state.messages.push(Severity::Note, text);
+            }
+            Action::FirstLook => state.look_first(),
             Action::FrameAll => state.frame_all(),
             Action::LookFrom(view) => state.rig.target.look_from(*view),
             Action::ToggleProjection => {
@@ -160,6 +198,8 @@ impl App {
                 state.rig.current.orthographic = state.rig.target.orthographic;
             }
             Action::Up(up) => {
+                // It holds for the next file, too.
+                state.scene_options.up = Some(*up);
                 state.rig.target.up = up.vector();
                 state.rig.current.up = up.vector();
             }
@@ -240,8 +280,41 @@ impl App {
         }
     }
 
+    /// Remember lights and materials before a change.
+    fn remember_lights(&mut self) {
+        let before = self.state.lights();
+        self.state.history.note(before, Instant::now());
+    }
+
+    /// Light the scene from another sky and sun: from the beginning, with the same geometry and the same rays.
+    fn light(&mut self, lighting: Lighting) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let loaded = loaded.under(&lighting);
+        self.state.lighting = lighting;
+        self.state.inspections.close();
+        self.state.run.last_change = None;
+        self.worker.watch(None);
+        self.state.truth.forget_reference();
+        if self.state.view.mode == ViewMode::Error {
+            self.state.view.mode = ViewMode::default();
+        }
+        self.worker.start_with_rays(
+            loaded.scene.clone(),
+            loaded.rays.clone(),
+            self.state.settings.clone(),
+            self.state.options.clone(),
+        );
+        if self.state.materials.are_changed() {
+            let appearances = self.state.materials.appearances(&loaded.scene);
+            self.worker.relight(appearances.into());
+        }
+        self.state.loaded = Some(Arc::new(loaded));
+    }
+
     /// Light the scene with other lights and materials. A reference was traced with those before.
-    fn relight(&mut self, materials: Materials) {
+    pub(super) fn relight(&mut self, materials: Materials) {
         let Some(loaded) = &self.state.loaded else {
             return;
         };

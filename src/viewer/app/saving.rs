@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::{
     super::{
+        material_file,
         messages::Severity,
         saver::{self, Content},
         session::{self, Session},
@@ -118,6 +119,26 @@ impl App {
         saving.start(self.notices.0.clone(), &self.unfinished, self.wake.clone());
     }
 
+    pub(super) fn save_materials(&mut self) {
+        let Some(loaded) = &self.state.loaded else {
+            return;
+        };
+        let changes = self.state.materials.changes();
+        let is_srgb = self.state.scene_options.mtl_color_is_srgb;
+        let (severity, text) =
+            match material_file::save(&loaded.source, &loaded.scene, &changes, is_srgb) {
+                Ok(path) => (
+                    Severity::Note,
+                    format!(
+                        "saved {}; the scene uses it once its mtllib line names it",
+                        path.display()
+                    ),
+                ),
+                Err(error) => (Severity::Error, error),
+            };
+        self.state.messages.push_lasting(severity, text);
+    }
+
     pub(super) fn save_sidecar(&mut self) {
         let Some(loaded) = &self.state.loaded else {
             return;
@@ -126,6 +147,7 @@ impl App {
             camera: Some(self.state.rig.target),
             view: self.state.view.clone(),
             settings: self.state.settings.clone(),
+            materials: self.state.materials.changes(),
         };
         match session::save(&loaded.source, &saved, &loaded.scene.frame) {
             Ok(path) => self

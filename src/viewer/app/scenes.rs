@@ -6,9 +6,8 @@ use super::{
     super::{
         exposure::Follower,
         loader::{LoadedScene, Loader, SceneSource},
-        materials::Materials,
+        materials::{History, Materials, SavedMaterial},
         messages::Severity,
-        options::CameraRequest,
         session,
         truth::Truth,
         view::ViewMode,
@@ -27,7 +26,8 @@ impl App {
 
     fn start_loader(&mut self, source: SceneSource) {
         self.state.messages.open_scene();
-        match Loader::start(source, self.state.scene_options, self.wake.clone()) {
+        let (options, lighting) = (self.state.scene_options, self.state.lighting.clone());
+        match Loader::start(source, options, lighting, self.wake.clone()) {
             Ok(loader) => self.state.loading = Some(loader),
             Err(error) => self
                 .state
@@ -44,12 +44,21 @@ impl App {
             let text = wording::without_flags(&warning.to_string());
             self.state.messages.push(Severity::Warning, text);
         }
+        if let Some(sentence) = loaded.scene.up_sentence() {
+            let text = wording::without_flags(&sentence);
+            self.state.messages.push(Severity::Note, text);
+        }
+        if loaded.scene.has_light() && !loaded.is_lit {
+            let text = "no light reaches what is seen first; make a lamp of a material: click a surface, then “Lamp”";
+            self.state.messages.push(Severity::Warning, text);
+        }
         if let Some(path) = loaded.source.path() {
             self.state.recent.push(path);
         }
+        let mut changed = Vec::new();
         if !self.keeps_view {
             self.state.exposure = Follower::default();
-            self.open_view(&loaded);
+            changed = self.open_view(&loaded);
         }
         self.keeps_view = true;
         self.title = Some(loaded.source.window_title());
@@ -67,7 +76,9 @@ impl App {
             self.state.options.clone(),
         );
         self.state.materials = Materials::of(&loaded.scene);
+        self.state.history = History::default();
         self.state.loaded = Some(Arc::new(loaded));
+        self.restore(&changed);
         // The view of errors is nothing without a reference.
         if self.state.view.mode == ViewMode::Error {
             self.trace_reference();
@@ -86,17 +97,11 @@ impl App {
     }
 
     /// Camera, view and settings that a scene opens with: its sidecar's, then the command line's.
-    fn open_view(&mut self, loaded: &LoadedScene) {
+    /// Returns the materials that its sidecar changes.
+    fn open_view(&mut self, loaded: &LoadedScene) -> Vec<SavedMaterial> {
+        let mut changed = Vec::new();
         let frame = &loaded.scene.frame;
         let mut camera = loaded.viewpoint;
-        if loaded.source.path().is_some() {
-            // The axis chosen before holds for the next file, too; built-in scenes know theirs.
-            let chosen = CameraRequest {
-                up: Some(self.state.rig.target.up),
-                ..CameraRequest::default()
-            };
-            camera = chosen.apply(camera, frame);
-        }
         match session::load(&loaded.source, frame) {
             Some(Ok(saved)) => {
                 camera = saved.camera.unwrap_or(camera);
@@ -108,6 +113,7 @@ impl App {
                     self.state.settings = saved.settings;
                 }
                 self.state.view = saved.view;
+                changed = saved.materials;
             }
             Some(Err(error)) => self.state.messages.push(Severity::Warning, error),
             None => {}
@@ -124,6 +130,23 @@ impl App {
             self.state.view = first.view.apply(&self.state.view);
         }
         self.state.rig.jump(camera);
+        changed
+    }
+
+    /// Change materials as they were saved.
+    fn restore(&mut self, saved: &[SavedMaterial]) {
+        let mut materials = self.state.materials.clone();
+        let unknown = materials.restore(saved);
+        if !unknown.is_empty() {
+            let text = format!(
+                "the saved settings change materials that are not there: {}",
+                unknown.join(", ")
+            );
+            self.state.messages.push(Severity::Warning, text);
+        }
+        if materials != self.state.materials {
+            self.relight(materials);
+        }
     }
 
     pub(super) fn reload(&mut self) {

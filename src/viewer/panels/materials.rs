@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use super::{
     color::color_button,
+    outside,
     row::{self, slider},
 };
 use crate::viewer::{
@@ -26,7 +27,7 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
     };
     let mut materials = state.materials.clone();
     lights_ui(ui, &mut materials);
-    row::section(ui, "Reflectance", false, |ui| {
+    row::section(ui, "Materials", false, |ui| {
         reflectances_ui(ui, &mut materials, loaded.scene.max_reflectance);
     });
     ui.horizontal(|ui| {
@@ -34,6 +35,11 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
         let reset = ui.add_enabled(materials.are_changed(), reset);
         if reset.on_hover_text("All as in the file").clicked() {
             materials.reset();
+        }
+        let undo = egui::Button::new("Undo");
+        let undo = ui.add_enabled(state.history.can_undo(), undo);
+        if undo.on_hover_text("As before the last change (Ctrl+Z)").clicked() {
+            actions.push(Action::Undo);
         }
         if let Some(secs) = state.run.relit_secs {
             ui.weak(format!("Relit in {}", seconds(secs)))
@@ -45,12 +51,17 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>)
     if materials != state.materials {
         actions.push(Action::Relight(materials));
     }
+    ui.separator();
+    outside::outside_ui(ui, state, actions);
 }
 
 fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
     let lights: Vec<usize> = materials.lights().collect();
     if lights.is_empty() {
         ui.weak("No material emits light.");
+    }
+    named_ui(ui, materials);
+    if lights.is_empty() {
         return;
     }
     // Of each light a line with its name and one with its intensity.
@@ -66,12 +77,59 @@ fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
         });
 }
 
+/// Offer to light what is named like a lamp.
+fn named_ui(ui: &mut egui::Ui, materials: &mut Materials) {
+    let named = materials.named_like_lamps();
+    if named.is_empty() || materials.lights().next().is_some() {
+        return;
+    }
+    let names: Vec<&str> = named
+        .iter()
+        .map(|&index| materials.now[index].name.as_str())
+        .collect();
+    let lit = ui
+        .button("Light what is named like a lamp")
+        .on_hover_text(names.join(", "));
+    if lit.clicked() {
+        for index in named {
+            materials.make_lamp(index);
+        }
+    }
+}
+
+/// A material's reflectance, and whether it is a lamp.
+pub(super) fn material_ui(ui: &mut egui::Ui, materials: &mut Materials, index: usize, most: f32) {
+    let default = materials.of_file(index).reflectance;
+    let mut is_lamp = materials.is_lamp(index);
+    ui.horizontal(|ui| {
+        let material = &mut materials.now[index];
+        let name = format!("Reflectance of {}", material.name);
+        color_button(ui, &name, &mut material.reflectance);
+        material.reflectance = material.reflectance.min(Vec3::splat(most));
+        let label = format!("{} is a lamp", material.name);
+        let lamp = ui.toggle_value(&mut is_lamp, "Lamp");
+        lamp.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+        let lamp = lamp.on_hover_text("Whether it emits light; how much stands above");
+        ui.label(&material.name);
+        if material.reflectance != default && row::reset_button(ui, &name).clicked() {
+            material.reflectance = default;
+        }
+        if lamp.clicked() {
+            match is_lamp {
+                true => materials.make_lamp(index),
+                false => materials.put_out(index),
+            }
+        }
+    });
+}
+
 fn light_ui(ui: &mut egui::Ui, materials: &mut Materials, index: usize) {
     let default = materials.of_file(index).light;
     let material = &mut materials.now[index];
-    let (Some(light), Some(default)) = (&mut material.light, default) else {
+    let Some(light) = &mut material.light else {
         return;
     };
+    let default = default.unwrap_or(light.as_made());
     ui.horizontal(|ui| {
         let name = format!("Colour of {}", material.name);
         color_button(ui, &name, &mut light.color);
@@ -85,7 +143,7 @@ fn intensity_ui(ui: &mut egui::Ui, light: &mut LightControl, default: &LightCont
     row::setting(
         ui,
         "Intensity",
-        "Times as bright as in the file. Values outside the slider may be typed.",
+        "Times as bright as in the file, or as it was made. Values outside the slider may be typed.",
         &mut light.intensity,
         &default.intensity,
         |ui, value| ui.add(slider(value, 0.01..=100.0)),
@@ -101,20 +159,7 @@ fn reflectances_ui(ui: &mut egui::Ui, materials: &mut Materials, most: f32) {
         .min_scrolled_height(MOST_HEIGHT)
         .show_rows(ui, height, count, |ui, shown| {
             for index in shown {
-                let default = materials.of_file(index).reflectance;
-                let material = &mut materials.now[index];
-                ui.push_id(index, |ui| {
-                    ui.horizontal(|ui| {
-                        let name = format!("Reflectance of {}", material.name);
-                        color_button(ui, &name, &mut material.reflectance);
-                        material.reflectance = material.reflectance.min(Vec3::splat(most));
-                        ui.label(&material.name);
-                        if material.reflectance != default && row::reset_button(ui, &name).clicked()
-                        {
-                            material.reflectance = default;
-                        }
-                    });
-                });
+                ui.push_id(index, |ui| material_ui(ui, materials, index, most));
             }
         });
 }

@@ -91,6 +91,13 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
         "Save camera and settings",
         Action::SaveSidecar,
     );
+    item(
+        ui,
+        table,
+        actions,
+        "Save material file",
+        Action::SaveMaterials,
+    );
     ui.add_enabled_ui(state.run.snapshot.is_some(), |ui| {
         item(ui, table, actions, "Export lit mesh…", Action::MeshDialog);
     });
@@ -130,6 +137,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     ui.separator();
     let view = &state.view;
     let has_backs = state.has_backs() && view.mode != ViewMode::FaceOrientation;
+    let has_interior = state.has_interior();
     let toggles = [
         (
             "Element mesh over the light",
@@ -144,6 +152,11 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         ),
         ("Backs of faces", view.backs, Action::ToggleBacks),
         (
+            "See through walls from outside",
+            view.see_through,
+            Action::ToggleSeeThrough,
+        ),
+        (
             "Automatic exposure",
             view.auto_exposure,
             Action::AutoExposure,
@@ -155,7 +168,12 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         ),
     ];
     for (label, is_on, action) in toggles {
-        if has_backs || action != Action::ToggleBacks {
+        let is_offered = match action {
+            Action::ToggleBacks => has_backs,
+            Action::ToggleSeeThrough => has_interior,
+            _ => true,
+        };
+        if is_offered {
             toggle(ui, table, actions, label, is_on, action);
         }
     }
@@ -206,6 +224,13 @@ fn theme_menu(ui: &mut egui::Ui) {
 }
 
 fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut Vec<Action>) {
+    item(
+        ui,
+        table,
+        actions,
+        "Back to the first view",
+        Action::FirstLook,
+    );
     item(ui, table, actions, "Show the whole scene", Action::FrameAll);
     item(
         ui,

@@ -14,6 +14,7 @@ pub mod mesh;
 pub mod messages;
 pub mod method;
 pub mod omissions;
+pub mod outside;
 pub mod path;
 pub mod picture;
 pub mod plot;

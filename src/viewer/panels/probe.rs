@@ -3,7 +3,7 @@
 use eframe::egui;
 use glam::Vec3;
 
-use super::{path::path_ui, power::PowerScale, row};
+use super::{materials, path::path_ui, power::PowerScale, row};
 use crate::{
     scene::luminance,
     viewer::{
@@ -112,6 +112,12 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
             inspection_rows(ui, state);
         }
     });
+    let mut materials = state.materials.clone();
+    let index = triangle.material.index();
+    materials::material_ui(ui, &mut materials, index, scene.max_reflectance);
+    if materials != state.materials {
+        actions.push(Action::Relight(materials));
+    }
     if selection.probe.is_none() && pick.is_back && !triangle.two_sided {
         ui.weak("This side is the back of a one-sided face: it reflects nothing.");
     }

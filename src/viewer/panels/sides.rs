@@ -64,7 +64,7 @@ fn light_sections(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
         }
     });
     if state.loaded.is_some() {
-        row::section(ui, "Lights and materials", state.has_emitters(), |ui| {
+        row::section(ui, "Lights and materials", true, |ui| {
             materials::materials_ui(ui, state, actions);
         });
     }

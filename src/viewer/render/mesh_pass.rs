@@ -14,6 +14,14 @@ use crate::viewer::view::{ViewMode, ViewSettings};
 
 /// Pipelines of the surfaces.
 pub(super) struct MeshPass {
+    whole: Pipelines,
+    /// The same without what stands before the room that is looked into. Of their own, since a fragment that may be
+    /// discarded is tested for its depth only after it was shaded.
+    cut: Pipelines,
+}
+
+/// Pipelines by what they draw.
+struct Pipelines {
     front: wgpu::RenderPipeline,
     /// Fronts in the colour of backs.
     turned: wgpu::RenderPipeline,
@@ -46,43 +54,55 @@ impl MeshPass {
                 bind_group_layouts: &[Some(view_layout), Some(details.layout())],
                 immediate_size: 0,
             });
-        let build = |kind| pipeline(gpu, &layout, &module, kind);
+        let pipelines = |cuts| {
+            let build = |kind| pipeline(gpu, &layout, &module, kind, cuts);
+            Pipelines {
+                front: build(Kind::Front),
+                turned: build(Kind::Turned),
+                back: build(Kind::Back),
+                edge: build(Kind::Edge),
+                cut_out: build(Kind::CutOut),
+                cut_out_light: build(Kind::CutOutLight),
+                filter: build(Kind::Filter),
+                pane: build(Kind::Pane),
+                meter: build(Kind::Meter),
+                meter_cut_out: build(Kind::MeterCutOut),
+                meter_back: build(Kind::MeterBack),
+            }
+        };
         Self {
-            front: build(Kind::Front),
-            turned: build(Kind::Turned),
-            back: build(Kind::Back),
-            edge: build(Kind::Edge),
-            cut_out: build(Kind::CutOut),
-            cut_out_light: build(Kind::CutOutLight),
-            filter: build(Kind::Filter),
-            pane: build(Kind::Pane),
-            meter: build(Kind::Meter),
-            meter_cut_out: build(Kind::MeterCutOut),
-            meter_back: build(Kind::MeterBack),
+            whole: pipelines(false),
+            cut: pipelines(true),
         }
     }
 
-    /// Draw what was uploaded; group 0 is set.
+    fn pipelines(&self, cuts: bool) -> &Pipelines {
+        if cuts { &self.cut } else { &self.whole }
+    }
+
+    /// Draw what was uploaded, whole or without what stands before the room; group 0 is set.
     pub(super) fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         uploads: &Uploads,
         view: &ViewSettings,
+        cuts: bool,
     ) {
+        let pipelines = self.pipelines(cuts);
         let shows_orientation = view.mode == ViewMode::FaceOrientation;
         let pipelines_of = |copy, look| match (shows_orientation, copy, look) {
-            (true, FaceCopy::Back, _) => vec![&self.turned],
-            (true, _, _) | (_, _, Look::Opaque) => vec![&self.front],
+            (true, FaceCopy::Back, _) => vec![&pipelines.turned],
+            (true, _, _) | (_, _, Look::Opaque) => vec![&pipelines.front],
             // What is light is said last, of the samples that were drawn.
-            (_, _, Look::Pane) if view.mode.is_light() => vec![&self.filter, &self.pane],
-            (_, _, Look::Pane | Look::CutOut) => vec![&self.cut_out, &self.cut_out_light],
+            (_, _, Look::Pane) if view.mode.is_light() => vec![&pipelines.filter, &pipelines.pane],
+            (_, _, Look::Pane | Look::CutOut) => vec![&pipelines.cut_out, &pipelines.cut_out_light],
         };
-        let back = (view.backs || shows_orientation).then_some(&self.back);
+        let back = (view.backs || shows_orientation).then_some(&pipelines.back);
         draw_sides(pass, uploads, pipelines_of, back);
         if view.mode.shows_edges(view.edges)
             && let Some((edges, count)) = uploads.mesh().and_then(|mesh| mesh.edges.as_ref())
         {
-            pass.set_pipeline(&self.edge);
+            pass.set_pipeline(&pipelines.edge);
             pass.set_bind_group(1, uploads.details().bind_group(0), &[]);
             pass.set_index_buffer(edges.slice(..), wgpu::IndexFormat::Uint32);
             pass.draw_indexed(0..*count, 0, 0..1);
@@ -95,11 +115,13 @@ impl MeshPass {
         pass: &mut wgpu::RenderPass<'_>,
         uploads: &Uploads,
         view: &ViewSettings,
+        cuts: bool,
     ) {
-        let back = view.backs.then_some(&self.meter_back);
+        let pipelines = self.pipelines(cuts);
+        let back = view.backs.then_some(&pipelines.meter_back);
         let pipelines_of = |_, look| match look {
-            Look::Opaque => vec![&self.meter],
-            Look::CutOut => vec![&self.meter_cut_out],
+            Look::Opaque => vec![&pipelines.meter],
+            Look::CutOut => vec![&pipelines.meter_cut_out],
             // What is seen through them is metered.
             Look::Pane => Vec::new(),
         };
@@ -200,6 +222,7 @@ fn pipeline(
     layout: &wgpu::PipelineLayout,
     module: &wgpu::ShaderModule,
     kind: Kind,
+    cuts: bool,
 ) -> wgpu::RenderPipeline {
     use wgpu::{BlendComponent, BlendFactor, BlendOperation, PrimitiveTopology};
     let (label, vertex, fragment) = match kind {
@@ -307,7 +330,10 @@ fn pipeline(
             fragment: Some(wgpu::FragmentState {
                 module,
                 entry_point: Some(fragment),
-                compilation_options: Default::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &[("CUTS", f64::from(u8::from(cuts)))],
+                    ..Default::default()
+                },
                 targets: &[Some(wgpu::ColorTargetState {
                     format: if is_meter {
                         METER_FORMAT

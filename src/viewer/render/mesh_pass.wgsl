@@ -46,6 +46,32 @@ fn vs_main(
 }
 
 const PI: f32 = 3.14159265;
+
+// Whether what stands before the room is cut away.
+override CUTS: bool = false;
+
+// Whether a point stands on the way from the viewer into the room: see `Interior::entered`.
+fn is_before_room(position: vec3<f32>) -> bool {
+    // From the viewer to the point, or, where the projection is parallel, from before everything: 1 is at the point.
+    var way = position - view.eye.xyz;
+    if (view.eye.w > 0.5) {
+        way = -view.backward.xyz * 1e5;
+    }
+    let direction = select(way, vec3<f32>(1e-9), abs(way) < vec3<f32>(1e-9));
+    let a = (view.room_min.xyz - position) / direction + 1.0;
+    let b = (view.room_max.xyz - position) / direction + 1.0;
+    let near = min(a, b);
+    let far = max(a, b);
+    let entered = max(near.x, max(near.y, near.z));
+    let left = min(far.x, min(far.y, far.z));
+    return view.room_min.w > 0.5 && entered >= 1.0 && entered <= left;
+}
+
+fn cut(position: vec3<f32>) {
+    if (CUTS && is_before_room(position)) {
+        discard;
+    }
+}
 // Largest value of a half float, a little less.
 const BRIGHTEST: f32 = 60000.0;
 
@@ -101,6 +127,7 @@ fn shown_emission(surface: Surface) -> vec3<f32> {
 }
 
 fn shown(surface: Surface) -> vec4<f32> {
+    cut(surface.position);
     let reflectance = shown_reflectance(surface);
     let radiance = shown_emission(surface) + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
@@ -150,6 +177,7 @@ fn fs_cut_out(surface: Surface) -> @location(0) vec4<f32> {
 // What a pane lets pass.
 @fragment
 fn fs_filter(surface: Surface) -> @location(0) vec4<f32> {
+    cut(surface.position);
     if (coverage(surface) < 0.5) {
         discard;
     }
@@ -178,6 +206,7 @@ fn fs_meter_cut_out(surface: Surface) -> @location(0) vec4<u32> {
 // Bits of the luminance that a light mode shows, before emission scale and exposure: with the sign set where most of it
 // is emitted, 0 where there is none. Read by `Meter`.
 fn metered(surface: Surface) -> vec4<u32> {
+    cut(surface.position);
     let reflectance = shown_reflectance(surface);
     var emitted = luminance(shown_emission(surface));
     var reflected = luminance(reflectance * surface.light / PI);
@@ -196,12 +225,14 @@ fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
 
 @fragment
 fn fs_meter_back(surface: Surface) -> @location(0) vec4<u32> {
+    cut(surface.position);
     return vec4<u32>(0u);
 }
 
 // The back of a face.
 @fragment
 fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
+    cut(surface.position);
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
     if (u32(view.display.x) == 6u) {
         return vec4<f32>(vec3<f32>(0.6, 0.05, 0.04) * (0.3 + 0.7 * facing), 0.0);
@@ -212,6 +243,7 @@ fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
 struct Edge {
     @builtin(position) clip: vec4<f32>,
     @location(0) facing: f32,
+    @location(1) position: vec3<f32>,
 };
 
 @vertex
@@ -223,12 +255,14 @@ fn vs_edge(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> 
     var out: Edge;
     out.clip = lifted(view.clip_from_frame * vec4<f32>(position, 1.0));
     out.facing = dot(normal, to_eye);
+    out.position = position;
     return out;
 }
 
 // Edges of faces that are looked through are not drawn, else they would hide what is behind.
 @fragment
 fn fs_edge(edge: Edge) -> @location(0) vec4<f32> {
+    cut(edge.position);
     if (edge.facing < 0.0 && view.backward.w < 0.5) {
         discard;
     }

@@ -25,7 +25,7 @@ pub use readback::ReadError;
 pub use target::Target;
 pub use uploads::{Source, Uploads};
 
-use super::{camera::Camera, view::ViewSettings};
+use super::{camera::Camera, first_look::Interior, view::ViewSettings};
 use crate::{
     scene::Scene,
     solver::{DisplayMesh, VertexLight},
@@ -83,6 +83,8 @@ pub struct Gpu {
     pub sample_count: u32,
     /// Samples a pixel where time does not matter.
     pub most_samples: u32,
+    /// Whether shaders can read the samples of a pixel.
+    pub has_readable_samples: bool,
     /// Format of the linear picture.
     pub linear_format: wgpu::TextureFormat,
     /// Largest buffer to make, in bytes; at most what the adapter takes.
@@ -104,6 +106,8 @@ impl Gpu {
                 .flags
                 .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
         let most_samples = if multisampled && drawable { 4 } else { 1 };
+        // GL reads samples from version 3.1 on, which also brought these.
+        let downlevel = adapter.get_downlevel_capabilities().flags;
         // A processor that plays adapter takes twice as long for four samples.
         let is_slow = about.device_type == wgpu::DeviceType::Cpu;
         Self {
@@ -117,6 +121,8 @@ impl Gpu {
             ),
             sample_count: if is_slow { 1 } else { most_samples },
             most_samples,
+            has_readable_samples: about.backend != wgpu::Backend::Gl
+                || downlevel.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS),
             linear_format: if drawable {
                 LINEAR_FORMAT
             } else {
@@ -142,6 +148,11 @@ impl Gpu {
             },
             ..Default::default()
         }
+    }
+
+    /// Whether pixels have several samples, and shaders read them.
+    fn reads_samples(&self) -> bool {
+        self.sample_count > 1 && self.has_readable_samples
     }
 
     /// A buffer with these contents. Written through the queue: a buffer that is mapped to begin with cannot be had
@@ -195,6 +206,8 @@ pub struct Picture<'a> {
     pub is_unlit: bool,
     /// Ends of the false colours.
     pub range: [f32; 2],
+    /// The room, where the scene is one.
+    pub interior: Option<Interior>,
     /// Lines on top.
     pub overlay: &'a Overlay,
     /// Display-linear colour behind everything.
@@ -204,6 +217,12 @@ pub struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
+    /// The room that is looked into from outside, so that what stands before it is not drawn.
+    fn room_looked_into(&self) -> Option<Interior> {
+        let is_looked_into = |room: &Interior| room.is_looked_into(self.camera, self.view);
+        self.interior.filter(is_looked_into)
+    }
+
     /// The source of its uploads.
     fn source(&self) -> Source<'a> {
         Source {
@@ -339,7 +358,9 @@ impl Renderer {
         {
             let mut pass = target.begin(&mut encoder);
             pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
-            self.mesh_pass.draw_meter(&mut pass, uploads, picture.view);
+            let cuts = picture.room_looked_into().is_some();
+            self.mesh_pass
+                .draw_meter(&mut pass, uploads, picture.view, cuts);
         }
         self.gpu.queue.submit([encoder.finish()]);
         Metering::begin(&self.gpu, &target)
@@ -367,7 +388,8 @@ impl Renderer {
     ) {
         let mut pass = target.begin_linear(encoder, background);
         pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
-        self.mesh_pass.draw(&mut pass, uploads, picture.view);
+        let cuts = picture.room_looked_into().is_some();
+        self.mesh_pass.draw(&mut pass, uploads, picture.view, cuts);
         self.line_pass.draw(&mut pass, uploads.boxes());
     }
 }

@@ -10,6 +10,8 @@ pub struct Target {
     linear: wgpu::Texture,
     linear_view: wgpu::TextureView,
     multisampled_view: Option<wgpu::TextureView>,
+    /// Whether the tone mapping reads the samples.
+    keeps_samples: bool,
     depth_view: wgpu::TextureView,
     display: wgpu::Texture,
     display_view: wgpu::TextureView,
@@ -37,12 +39,18 @@ impl Target {
         let linear = texture(gpu, "linear picture", size, gpu.linear_format, 1, readable);
         let display = texture(gpu, "display picture", size, DISPLAY_FORMAT, 1, readable);
         let samples = gpu.sample_count;
-        let multisampled =
-            (samples > 1).then(|| texture(gpu, "samples", size, gpu.linear_format, samples, drawn));
+        let keeps_samples = gpu.reads_samples();
+        let sampled = match keeps_samples {
+            true => drawn | wgpu::TextureUsages::TEXTURE_BINDING,
+            false => drawn,
+        };
+        let multisampled = (samples > 1)
+            .then(|| texture(gpu, "samples", size, gpu.linear_format, samples, sampled));
         let depth = texture(gpu, "depth", size, DEPTH_FORMAT, samples, drawn);
         let whole = wgpu::TextureViewDescriptor::default();
         Ok(Self {
             size,
+            keeps_samples,
             linear_view: linear.create_view(&whole),
             multisampled_view: multisampled.map(|texture| texture.create_view(&whole)),
             depth_view: depth.create_view(&whole),
@@ -72,9 +80,11 @@ impl Target {
         &self.linear
     }
 
-    /// The linear picture, for tone mapping.
-    pub(super) fn linear_view(&self) -> &wgpu::TextureView {
-        &self.linear_view
+    /// The picture for tone mapping: its samples, where they are kept.
+    pub(super) fn tone_mapped_view(&self) -> &wgpu::TextureView {
+        let samples = self.multisampled_view.as_ref();
+        let samples = samples.filter(|_| self.keeps_samples);
+        samples.unwrap_or(&self.linear_view)
     }
 
     /// Begin drawing surfaces and lines over a background, whose alpha says whether it is light.
@@ -84,6 +94,9 @@ impl Target {
         background: Vec4,
     ) -> wgpu::RenderPass<'e> {
         let (view, resolve_target, store) = match &self.multisampled_view {
+            Some(samples) if self.keeps_samples => {
+                (samples, Some(&self.linear_view), wgpu::StoreOp::Store)
+            }
             Some(samples) => (samples, Some(&self.linear_view), wgpu::StoreOp::Discard),
             None => (&self.linear_view, None, wgpu::StoreOp::Store),
         };

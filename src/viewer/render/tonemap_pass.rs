@@ -1,4 +1,4 @@
-//! One pass from the linear picture to display colours.
+//! One pass from the linear picture to display colours; from its samples, where they can be read.
 
 use super::{DISPLAY_FORMAT, Gpu, Target};
 
@@ -6,21 +6,27 @@ use super::{DISPLAY_FORMAT, Gpu, Target};
 pub(super) struct TonemapPass {
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::RenderPipeline,
+    /// Place of the picture among what the shader reads.
+    binding: u32,
 }
 
 impl TonemapPass {
     /// Build the pipeline.
     pub(super) fn new(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout) -> Self {
         let device = &gpu.device;
+        let (binding, entry_point) = match gpu.reads_samples() {
+            true => (1, "fs_samples"),
+            false => (0, "fs_main"),
+        };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("tone map"),
             entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
+                binding,
                 visibility: wgpu::ShaderStages::FRAGMENT,
                 ty: wgpu::BindingType::Texture {
                     sample_type: wgpu::TextureSampleType::Float { filterable: false },
                     view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
+                    multisampled: gpu.reads_samples(),
                 },
                 count: None,
             }],
@@ -50,14 +56,18 @@ impl TonemapPass {
             multisample: wgpu::MultisampleState::default(),
             fragment: Some(wgpu::FragmentState {
                 module: &module,
-                entry_point: Some("fs_main"),
+                entry_point: Some(entry_point),
                 compilation_options: Default::default(),
                 targets: &[Some(DISPLAY_FORMAT.into())],
             }),
             multiview_mask: None,
             cache: None,
         });
-        Self { layout, pipeline }
+        Self {
+            layout,
+            pipeline,
+            binding,
+        }
     }
 
     /// Draw; group 0 is set.
@@ -66,8 +76,8 @@ impl TonemapPass {
             label: Some("tone map"),
             layout: &self.layout,
             entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(target.linear_view()),
+                binding: self.binding,
+                resource: wgpu::BindingResource::TextureView(target.tone_mapped_view()),
             }],
         });
         pass.set_pipeline(&self.pipeline);

@@ -1,7 +1,9 @@
-// From the linear picture to display colours: tone map where alpha says light, then the sRGB curve.
+// From the linear picture to display colours: tone map where alpha says light, then the sRGB curve. The samples of a pixel
+// are averaged between the two: the mean of a lamp and a wall beside it is as bright as the lamp before the tone map.
 // Twin of `crate::export::color`.
 
 @group(1) @binding(0) var picture: texture_2d<f32>;
+@group(1) @binding(1) var samples: texture_multisampled_2d<f32>;
 
 @vertex
 fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
@@ -28,17 +30,31 @@ fn neutral(light: vec3<f32>) -> vec3<f32> {
     return mix(scaled, vec3<f32>(new_peak), share);
 }
 
-fn srgb(linear: vec3<f32>) -> vec3<f32> {
-    let x = clamp(linear, vec3<f32>(0.0), vec3<f32>(1.0));
+fn srgb(x: vec3<f32>) -> vec3<f32> {
     return select(1.055 * pow(x, vec3<f32>(1.0 / 2.4)) - 0.055, x * 12.92, x <= vec3<f32>(0.0031308));
 }
 
-@fragment
-fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
-    let pixel = textureLoad(picture, vec2<i32>(at.xy), 0);
+// Display-linear colour, 0 to 1.
+fn shown(pixel: vec4<f32>) -> vec3<f32> {
     var mapped = pixel.rgb;
     if (view.display.z < 0.5) {
         mapped = neutral(pixel.rgb);
     }
-    return vec4<f32>(srgb(mix(pixel.rgb, mapped, pixel.a)), 1.0);
+    return clamp(mix(pixel.rgb, mapped, pixel.a), vec3<f32>(0.0), vec3<f32>(1.0));
+}
+
+@fragment
+fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    return vec4<f32>(srgb(shown(textureLoad(picture, vec2<i32>(at.xy), 0))), 1.0);
+}
+
+// Of a picture whose samples can be read.
+@fragment
+fn fs_samples(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let count = i32(textureNumSamples(samples));
+    var sum = vec3<f32>(0.0);
+    for (var index = 0; index < count; index++) {
+        sum += shown(textureLoad(samples, vec2<i32>(at.xy), index));
+    }
+    return vec4<f32>(srgb(sum / f32(count)), 1.0);
 }

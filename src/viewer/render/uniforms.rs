@@ -2,11 +2,13 @@
 
 use std::num::NonZeroU64;
 
+use glam::Vec3;
+
 use super::{super::theme, Picture};
 use crate::{export::ToneMap, viewer::view::ViewMode};
 
-/// Floats of `View`: a matrix, five vectors, nine ramp colours.
-const FLOAT_COUNT: usize = 16 + 5 * 4 + 9 * 4;
+/// Floats of `View`: a matrix, seven vectors, nine ramp colours.
+const FLOAT_COUNT: usize = 16 + 7 * 4 + 9 * 4;
 const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
 /// Width of segments in points.
 const LINE_POINTS: f32 = 2.5;
@@ -108,6 +110,10 @@ impl ViewUniforms {
             LINE_POINTS * picture.pixels_per_point,
             EDGE_OPACITY[usize::from(is_solid)],
         ]);
+        let room = picture.room_looked_into();
+        let [min, max] = room.map_or([Vec3::ZERO; 2], |room| [room.min, room.max]);
+        floats.extend([min.x, min.y, min.z, flag(room.is_some())]);
+        floats.extend([max.x, max.y, max.z, 0.0]);
         for color in theme::ramp_stops() {
             floats.extend([color.x, color.y, color.z, 1.0]);
         }

@@ -11,6 +11,9 @@ struct View {
     display: vec4<f32>,
     // Width and height in pixels; width of a line in pixels; opacity of the edges.
     viewport: vec4<f32>,
+    // Lower corner of the room, w: 1 where what stands before it is not drawn; upper corner.
+    room_min: vec4<f32>,
+    room_max: vec4<f32>,
     // Display-linear colours of the false-colour ramp, evenly spaced.
     ramp: array<vec4<f32>, 9>,
 };

@@ -1,0 +1,149 @@
+//! The first view and what is done from there: back to it, through walls, lamps made and undone, changes kept.
+
+#![cfg(feature = "viewer")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod windows;
+
+use std::fs;
+
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use glam::{Vec2, Vec3};
+use vecrad::{
+    scene::{Lighting, Sky, SkySource, SunSource},
+    solver::SolveSettings,
+    viewer::{Options, action::Action, app::App, loader::SceneSource, run::RunStatus, session},
+};
+use windows::{one_triangle, perform, plates, wait_for, window};
+
+fn press(harness: &mut Harness<'static, App>, modifiers: Modifiers, key: Key) {
+    harness.key_press_modifiers(modifiers, key);
+    harness.run_steps(3);
+}
+
+/// Whether a message holds this.
+fn is_told(harness: &Harness<'static, App>, text: &str) -> bool {
+    let messages = &harness.state().state.messages.all;
+    messages.iter().any(|message| message.text.contains(text))
+}
+
+fn opened(source: SceneSource) -> Harness<'static, App> {
+    let mut harness = window(Options {
+        source: Some(source),
+        settings: SolveSettings::draft(),
+        ..Options::default()
+    });
+    wait_for(&mut harness, |app| app.state.loaded.is_some());
+    harness
+}
+
+#[test]
+fn home_returns_to_the_first_view() {
+    let mut harness = plates();
+    let first = harness.state().state.rig.target;
+    harness
+        .state_mut()
+        .state
+        .rig
+        .target
+        .orbit(Vec2::new(200.0, 40.0));
+    press(&mut harness, Modifiers::NONE, Key::Home);
+    let back = harness.state().state.rig.target;
+    assert!((back.eye() - first.eye()).length() < 1e-2);
+    press(&mut harness, Modifiers::SHIFT, Key::Z);
+    press(&mut harness, Modifiers::NONE, Key::Home);
+    assert_eq!(harness.state().state.rig.target.up, Vec3::Z);
+}
+
+#[test]
+fn walls_are_seen_through_until_a_key_says_otherwise() {
+    let mut harness = opened(SceneSource::Builtin("room-1022".to_owned()));
+    assert!(harness.state().state.has_interior());
+    assert!(harness.state().state.view.see_through);
+    press(&mut harness, Modifiers::NONE, Key::X);
+    assert!(!harness.state().state.view.see_through);
+    let mut plates = plates();
+    press(&mut plates, Modifiers::NONE, Key::X);
+    assert!(is_told(&plates, "no walls to see through"));
+}
+
+#[test]
+fn a_lamp_is_made_undone_and_made_again() {
+    let (_folder, mut harness) = one_triangle("scene.obj");
+    let mut materials = harness.state().state.materials.clone();
+    materials.make_lamp(0);
+    perform(&mut harness, Action::Relight(materials));
+    let is_lamp = |harness: &Harness<'static, App>| harness.state().state.materials.is_lamp(0);
+    assert!(is_lamp(&harness));
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert!(!is_lamp(&harness));
+    press(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    assert!(is_lamp(&harness));
+}
+
+#[test]
+fn sky_and_sun_are_changed_and_undone() {
+    let mut harness = plates();
+    let sky = SkySource::Uniform(Vec3::new(0.5, 0.75, 1.0));
+    let lighting = Lighting {
+        sky: Some(sky),
+        sun: Some(SunSource::Disc {
+            azimuth: 90.0,
+            elevation: 30.0,
+            irradiance: Vec3::splat(10.0),
+            diameter: 0.53,
+        }),
+        ..Lighting::default()
+    };
+    perform(&mut harness, Action::Light(lighting));
+    let environment = |harness: &Harness<'static, App>| {
+        let loaded = harness.state().state.loaded.as_ref().unwrap();
+        loaded.scene.environment.clone()
+    };
+    let shown = environment(&harness);
+    assert_eq!(shown.sky, Sky::Uniform(Vec3::new(0.5, 0.75, 1.0)));
+    assert!(shown.sun.is_some_and(|sun| sun.direction.x > 0.8));
+    assert!(!harness.state().state.is_grey());
+    wait_for(&mut harness, |app| {
+        matches!(app.state.run.status, RunStatus::Finished(_))
+    });
+    press(&mut harness, Modifiers::COMMAND, Key::Z);
+    assert!(environment(&harness).is_dark());
+}
+
+#[test]
+fn changed_materials_are_kept_beside_the_scene() {
+    let (folder, mut harness) = one_triangle("scene.obj");
+    let mut materials = harness.state().state.materials.clone();
+    materials.make_lamp(0);
+    materials.now[0].reflectance = Vec3::new(0.125, 0.25, 0.5);
+    perform(&mut harness, Action::Relight(materials.clone()));
+    perform(&mut harness, Action::SaveSidecar);
+    perform(&mut harness, Action::SaveMaterials);
+    let text = fs::read_to_string(folder.path().join("scene.vecrad.mtl")).unwrap();
+    assert!(text.contains("Kd 0.125 0.25 0.5\nKe 1 1 1\n"), "{text}");
+    let source = SceneSource::File(folder.path().join("scene.obj"));
+    assert!(session::sidecar_path(&source).unwrap().is_file());
+    let again = opened(source);
+    let scene = again.state().state.loaded.as_ref().unwrap().scene.clone();
+    assert_eq!(
+        again.state().state.materials.appearances(&scene),
+        materials.appearances(&scene)
+    );
+}
+
+#[test]
+fn a_file_with_z_up_opens_upright_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.obj");
+    let text = "# FreeCAD v0.21\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(&path, text).unwrap();
+    let harness = opened(SceneSource::File(path));
+    assert_eq!(harness.state().state.rig.target.up, Vec3::Z);
+    assert!(is_told(
+        &harness,
+        "+Z is up, as the program that wrote the file shows"
+    ));
+    assert!(is_told(&harness, "“Camera: Y is up”"));
+}
