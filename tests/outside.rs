@@ -365,7 +365,7 @@ fn radiance_is_the_same_everywhere_where_surfaces_complete_the_sky() {
                 .iter()
                 .map(|light| (light.x / PI / level - 1.0).powi(2));
             let deviation = (squares.sum::<f32>() / light.len() as f32).sqrt();
-            assert!(deviation < 0.03, "{deviation}, {direct:?}, {reflectance}");
+            assert!(deviation < 0.045, "{deviation}, {direct:?}, {reflectance}");
         }
     }
 }

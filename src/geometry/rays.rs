@@ -155,11 +155,6 @@ impl RayTree {
         self.passing(ray, [from, None])
     }
 
-    /// Whether anything passes along a ray of unit direction out of the scene.
-    pub fn leaves(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> bool {
-        self.transmittance_outward(origin, direction, from) != Vec3::ZERO
-    }
-
     /// What passes through all triangles on a ray but two.
     fn passing(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> Vec3 {
         let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));

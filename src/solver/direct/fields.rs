@@ -118,7 +118,7 @@ impl DirectFields {
     }
 
     /// Irradiance from outside of a leaf, W/m².
-    pub(crate) fn from_outside(&self, hierarchy: &Hierarchy, leaf: usize) -> Vec4 {
+    pub(crate) fn outside_irradiance(&self, hierarchy: &Hierarchy, leaf: usize) -> Vec4 {
         self.outside()
             .map(|field| field.element(hierarchy, leaf))
             .sum::<Vec4>()

@@ -43,7 +43,7 @@ fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let sent = area_total(hierarchy, |leaf| {
         let reflectance = hierarchy.reflectance_of(leaf).extend(0.0);
         let emitted = (hierarchy.emission_of(leaf) * PI).extend(0.0);
-        let outside = surfaces.direct.from_outside(hierarchy, leaf);
+        let outside = surfaces.direct.outside_irradiance(hierarchy, leaf);
         reflectance * linked.total(surfaces, leaf) + emitted + outside
     });
     if sent > 0.0 { arrived / sent } else { 1.0 }

@@ -22,8 +22,9 @@ pub struct Interior {
 
 /// Rays around a place. Fewer miss walls at the ends of long rooms.
 const DIRECTIONS: usize = 128;
-/// Share of them that must end on a surface: an open box ends five of six. Less, and a place between two houses is a room.
-const LEAST_SHARE: f32 = 0.6;
+/// Share of them that must end on a surface: an open box ends five of six. Less, and a place between two houses, or under
+/// a pergola, is a room; more, and a room with a wide opening is none.
+const LEAST_SHARE: f32 = 0.75;
 /// Share of the rays on each side of an axis that go through windows and doors. Less, and what lies behind a window
 /// belongs to the room; more, and its own ends do not.
 const OUTSIDE: f32 = 0.02;

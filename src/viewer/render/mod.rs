@@ -25,9 +25,13 @@ pub use readback::ReadError;
 pub use target::Target;
 pub use uploads::{Source, Uploads};
 
-use super::{camera::Camera, first_look::Interior, view::ViewSettings};
+use super::{
+    camera::Camera,
+    first_look::Interior,
+    view::{ViewMode, ViewSettings},
+};
 use crate::{
-    scene::Scene,
+    scene::{Scene, Sky},
     solver::{DisplayMesh, VertexLight},
 };
 use detail::DetailSet;
@@ -223,6 +227,20 @@ impl<'a> Picture<'a> {
         self.interior.filter(is_looked_into)
     }
 
+    /// What is seen where no surface is: the radiance of a uniform sky that was asked for, else the background. Alpha
+    /// says whether it is light.
+    fn backdrop(&self) -> Vec4 {
+        let environment = &self.scene.environment;
+        match environment.sky {
+            Sky::Uniform(radiance)
+                if self.view.mode == ViewMode::Radiance && !environment.is_default =>
+            {
+                radiance.extend(1.0)
+            }
+            _ => self.background.extend(0.0),
+        }
+    }
+
     /// The source of its uploads.
     fn source(&self) -> Source<'a> {
         Source {
@@ -328,8 +346,7 @@ impl Renderer {
     /// Draw a picture of what was uploaded for it.
     pub fn draw(&mut self, target: &Target, picture: &Picture<'_>, uploads: &Uploads) {
         let mut encoder = self.begin(target.size(), picture);
-        let background = picture.background.extend(0.0);
-        self.draw_linear(&mut encoder, target, background, picture, uploads);
+        self.draw_linear(&mut encoder, target, picture.backdrop(), picture, uploads);
         // Turn it into display colours.
         {
             let mut pass = target.begin_display(&mut encoder);
