@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use vecrad::scene::{
     ReadError, Scene, SceneOptions, Warning,
     WarningKind::{
-        Encoding, FaceSkipped, LineSkipped, MaterialMissing, NoEmitter, TextureMissing,
+        Encoding, FaceSkipped, LineSkipped, MaterialMissing, NoEmitter, SeeThrough, TextureMissing,
         Unsupported, ValueClamped,
     },
     read_obj,
@@ -225,7 +225,7 @@ fn hazards_of_the_mtl_file_keep_the_other_materials() {
     let kinds: Vec<_> = scene.warnings.iter().map(|warning| warning.kind).collect();
     for kind in [
         LineSkipped,
-        Unsupported,
+        SeeThrough,
         TextureMissing,
         ValueClamped,
         MaterialMissing,

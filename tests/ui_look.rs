@@ -1,7 +1,6 @@
 //! The first view and what is done from there: back to it, through walls, lamps made and undone, changes kept.
 
 #![cfg(feature = "viewer")]
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod windows;
 

@@ -1,7 +1,7 @@
 //! The view that a scene opens with.
 //!
 //! One rule chooses it: of many cameras, the one whose picture shows most of what there is to see, lit. What there is to
-//! see are [`Spots`] on the surfaces, each of which counts by the light that reaches it. Cameras stand around the scene,
+//! see are `Spots` on the surfaces, each of which counts by the light that reaches it. Cameras stand around the scene,
 //! and in the free space that its surfaces look into. So a room is seen from inside, since from outside its walls hide
 //! the rest; a box without a front from before it; an object from outside.
 
