@@ -255,7 +255,7 @@ fn transparency_and_gloss_are_told_once_and_for_which_materials() {
     }
     let scene = read(&folder(&[("scene.obj", &obj), ("a.mtl", &mtl)], &[]));
     let expected = [
-        "a.mtl:1: light passes through 'Glass' (d 0.3), 'Pane' (Tr 0.9)",
+        "a.mtl:1: transparent materials: 'Glass' (d 0.3), 'Pane' (Tr 0.9)",
         "a.mtl:4: gloss and relief are not computed, so these surfaces are matt and flat: 'Wall', 'Floor' (illum 4)",
     ];
     assert_eq!(said(&scene), expected);
@@ -299,7 +299,7 @@ fn what_exporters_write_by_habit_is_no_glass() {
     );
     assert_eq!(found, [1.0, 1.0, 0.25]);
     let expected = [
-        "a.mtl:5: light passes through 'c' (d 0.25)",
+        "a.mtl:5: transparent materials: 'c' (d 0.25)",
         "a.mtl:1: treated as solid: 'a' (d 0, as most materials), 'b' (Tr 1, as most materials)",
     ];
     assert_eq!(said, expected);
@@ -345,7 +345,7 @@ fn alpha_of_a_picture_counts_as_transparency_and_hidden_colours_do_not() {
     });
     leaf.save(folder.path().join("leaf.png")).unwrap();
     let scene = read(&folder);
-    let expected = "a.mtl:1: light passes through 'Leaf' (cut out by alpha of map_Kd)";
+    let expected = "a.mtl:1: transparent materials: 'Leaf' (cut out by alpha of map_Kd)";
     assert_eq!(said(&scene), [expected]);
     for surface in &scene.surfaces {
         assert_near(

@@ -311,7 +311,7 @@ impl Import<'_> {
         for (kind, what, groups) in [
             (
                 WarningKind::SeeThrough,
-                "light passes through",
+                "transparent materials:",
                 &remarks.see_through,
             ),
             (WarningKind::SeeThrough, "treated as solid:", &remarks.solid),
