@@ -204,7 +204,6 @@ impl SkyTree {
             );
             for (path, range) in [([left, middle, apex], one), ([apex, middle, right], other)] {
                 let own = &samples[range.clone()];
-                // A single sample cannot be told further.
                 let child = candidate(tree.nodes.len(), own, range, halvings + 1);
                 tree.nodes.push(Node::leaf(path, radiosity(path, own)));
                 pending.push(child);

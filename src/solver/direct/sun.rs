@@ -1,6 +1,6 @@
 //! The sun as an emitter: a disc in the sky.
 
-use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, TAU};
+use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4};
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -106,11 +106,11 @@ fn disc_point(square: Vec2) -> Vec2 {
         return at;
     }
     let (radius, angle) = if at.x.abs() > at.y.abs() {
-        (at.x, FRAC_PI_2 * 0.5 * at.y / at.x)
+        (at.x, FRAC_PI_4 * at.y / at.x)
     } else {
-        (at.y, FRAC_PI_2 - FRAC_PI_2 * 0.5 * at.x / at.y)
+        (at.y, FRAC_PI_2 - FRAC_PI_4 * at.x / at.y)
     };
-    Vec2::from_angle(angle % TAU) * radius
+    Vec2::from_angle(angle) * radius
 }
 
 #[cfg(test)]

@@ -343,112 +343,97 @@ fn bind_group(
     })
 }
 
+/// Width, height and pixels of a picture.
+type Level = (u32, u32, Vec<Vec3>);
+
 /// A cut-out with all its smaller levels. In each as large a part is above a half as in the whole, so that leaves do not
 /// vanish in the distance (Castaño 2010).
 fn upload_cutout(gpu: &Gpu, cutout: &Cutout) -> wgpu::TextureView {
     let places = (0..cutout.height).flat_map(|y| (0..cutout.width).map(move |x| (x, y)));
     let pixel = |(x, y)| Vec3::splat(f32::from(u8::from(cutout.has(x, y))));
-    let mut level = (cutout.width, cutout.height, places.map(pixel).collect());
-    while level.0.max(level.1) > MAX_SIDE.min(gpu.max_picture_side()) {
-        level = halved(&level);
-    }
-    let count = level.2.len();
-    let share = level.2.iter().map(|pixel| f64::from(pixel.x)).sum::<f64>() / count as f64;
-    let size = (level.0, level.1);
-    let level_count = size.0.max(size.1).ilog2() + 1;
-    let mut bytes = Vec::new();
-    for index in 0..level_count {
+    let whole = fitting(
+        gpu,
+        (cutout.width, cutout.height, places.map(pixel).collect()),
+    );
+    let count = whole.2.len();
+    let share = whole.2.iter().map(|pixel| f64::from(pixel.x)).sum::<f64>() / count as f64;
+    let format = wgpu::TextureFormat::R8Unorm;
+    upload_levels(gpu, &cutout.name, whole, format, |pixels, bytes| {
         // The value that as many pixels are above becomes a half.
-        let mut sorted: Vec<f32> = level.2.iter().map(|pixel| pixel.x).collect();
+        let mut sorted: Vec<f32> = pixels.iter().map(|pixel| pixel.x).collect();
         sorted.sort_unstable_by(f32::total_cmp);
         let below = ((1.0 - share) * sorted.len() as f64) as usize;
         let limit = sorted[below.min(sorted.len() - 1)].clamp(1.0 / 255.0, 1.0);
         let scale = 0.5 / limit.min(0.5);
-        bytes.extend(
-            level
-                .2
-                .iter()
-                .map(|pixel| (255.0 * (pixel.x * scale).min(1.0)).round() as u8),
-        );
-        if index + 1 < level_count {
-            level = halved(&level);
-        }
-    }
-    let made = gpu.device.create_texture_with_data(
-        &gpu.queue,
-        &texture_of(
-            &cutout.name,
-            size,
-            level_count,
-            wgpu::TextureFormat::R8Unorm,
-        ),
-        wgpu::util::TextureDataOrder::LayerMajor,
-        &bytes,
-    );
-    made.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn texture_of(
-    label: &str,
-    (width, height): (u32, u32),
-    mip_level_count: u32,
-    format: wgpu::TextureFormat,
-) -> wgpu::TextureDescriptor<'_> {
-    wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    }
+        let byte = |pixel: &Vec3| (255.0 * (pixel.x * scale).min(1.0)).round() as u8;
+        bytes.extend(pixels.iter().map(byte));
+    })
 }
 
 /// A texture with all its smaller levels, sRGB-encoded.
 fn upload(gpu: &Gpu, texture: &Texture) -> Uploaded {
     let channels = texture.pixels.iter().map(|pixel| pixel.max_element());
     let scale = channels.fold(1.0, f32::max);
-    let mut level = (texture.width, texture.height, texture.pixels.clone());
-    while level.0.max(level.1) > MAX_SIDE.min(gpu.max_picture_side()) {
-        level = halved(&level);
-    }
-    let (width, height) = (level.0, level.1);
-    let level_count = width.max(height).ilog2() + 1;
-    let mut bytes = Vec::new();
-    for index in 0..level_count {
-        bytes.extend(level.2.iter().flat_map(|pixel| {
+    let whole = fitting(gpu, (texture.width, texture.height, texture.pixels.clone()));
+    let format = wgpu::TextureFormat::Rgba8UnormSrgb;
+    let view = upload_levels(gpu, &texture.name, whole, format, |pixels, bytes| {
+        bytes.extend(pixels.iter().flat_map(|pixel| {
             let [r, g, b] = (pixel / scale).to_array().map(srgb_byte);
             [r, g, b, 255]
         }));
-        if index + 1 < level_count {
+    });
+    Uploaded { view, scale }
+}
+
+/// A picture, halved until the adapter takes it.
+fn fitting(gpu: &Gpu, mut level: Level) -> Level {
+    while level.0.max(level.1) > MAX_SIDE.min(gpu.max_picture_side()) {
+        level = halved(&level);
+    }
+    level
+}
+
+/// A picture with all its smaller levels, whose pixels `encode` appends as bytes of the format.
+fn upload_levels(
+    gpu: &Gpu,
+    label: &str,
+    mut level: Level,
+    format: wgpu::TextureFormat,
+    encode: impl Fn(&[Vec3], &mut Vec<u8>),
+) -> wgpu::TextureView {
+    let (width, height) = (level.0, level.1);
+    let mip_level_count = width.max(height).ilog2() + 1;
+    let mut bytes = Vec::new();
+    for index in 0..mip_level_count {
+        encode(&level.2, &mut bytes);
+        if index + 1 < mip_level_count {
             level = halved(&level);
         }
     }
     let made = gpu.device.create_texture_with_data(
         &gpu.queue,
-        &texture_of(
-            &texture.name,
-            (width, height),
-            level_count,
-            wgpu::TextureFormat::Rgba8UnormSrgb,
-        ),
+        &wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
         wgpu::util::TextureDataOrder::LayerMajor,
         &bytes,
     );
-    Uploaded {
-        view: made.create_view(&wgpu::TextureViewDescriptor::default()),
-        scale,
-    }
+    made.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// A picture of half the size, at least 1 × 1; an odd last row or column counts for its neighbour, too.
-fn halved((width, height, pixels): &(u32, u32, Vec<Vec3>)) -> (u32, u32, Vec<Vec3>) {
+fn halved((width, height, pixels): &Level) -> Level {
     let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
     let pixel = |x: u32, y: u32| pixels[(y.min(height - 1) * width + x.min(width - 1)) as usize];
     let mut half = Vec::with_capacity((half_width * half_height) as usize);
