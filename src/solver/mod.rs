@@ -8,6 +8,7 @@ mod budget;
 mod cancel;
 mod coverage;
 mod direct;
+mod estimate;
 mod iteration;
 mod limits;
 mod omission;
@@ -29,8 +30,8 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, InspectedLink, Inspection, Note, Omitted, PathNode, Place, Relit,
-    Snapshot, StepReport, Subject, VertexLight,
+    ClusterBox, DisplayMesh, EstimatedError, InspectedLink, Inspection, Note, Omitted, PathNode,
+    Place, Relit, Snapshot, StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

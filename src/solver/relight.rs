@@ -27,6 +27,7 @@ impl Solver {
             self.vertex_factors = before;
             return None;
         }
+        report.estimated_error = self.estimate_error(cancel);
         Some(report)
     }
 
@@ -57,6 +58,9 @@ impl Solver {
                 cancel,
             };
             self.ray_count += self.relighting.mix_direct(field, shooting, &appearances)?;
+        }
+        if let Some(estimator) = &mut self.estimator {
+            estimator.forget_direct_light();
         }
         // The new colours.
         let emitted_before = relighting::emitted(&self.hierarchy);

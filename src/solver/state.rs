@@ -5,10 +5,11 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Direct, Snapshot, SolveSettings, StepReport,
+    Cancel, Direct, EstimatedError, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, CoverageMap},
     direct::{self, DirectFields, Surfaces},
+    estimate::{self, ErrorEstimator},
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
     places,
@@ -59,6 +60,8 @@ pub struct Solver {
     /// Whether the memory limit prevented finer links or elements in the last step.
     is_full: bool,
     pub(super) relighting: Relighting,
+    /// Points and rays that estimate the error of a step; `None` before the first.
+    pub(super) estimator: Option<ErrorEstimator>,
     pub(super) snapshot: Snapshot,
 }
 
@@ -118,6 +121,7 @@ impl Solver {
             ray_count,
             is_full: false,
             relighting: Relighting::new(&scene),
+            estimator: None,
             snapshot: Snapshot::default(),
             scene,
             settings,
@@ -210,6 +214,7 @@ impl Solver {
         // Figures and picture.
         self.fill(&mut report);
         self.show(report.step, cancel)?;
+        report.estimated_error = Some(self.estimate_error(cancel)?);
         self.step = report.step;
         report.is_final = report.is_full || self.step >= step_count;
         self.relighting.end_step(&report);
@@ -227,6 +232,10 @@ impl Solver {
             + size_of_val(self.leaves.as_slice())
             + size_of_val(self.vertex_factors.as_slice())
             + self.relighting.memory_bytes()
+            + self
+                .estimator
+                .as_ref()
+                .map_or(0, ErrorEstimator::memory_bytes)
             + self.snapshot.memory_bytes();
         Budget {
             limit: self.memory_limit,
@@ -416,6 +425,25 @@ impl Solver {
         if self.is_full || budget.is_exceeded(surfaces, &self.linked) {
             shown::note_full(report);
         }
+    }
+
+    /// Estimate the error of the light shown.
+    pub(super) fn estimate_error(&mut self, cancel: &Cancel) -> Option<EstimatedError> {
+        let (scene, rays) = (&self.scene, &self.rays);
+        let shown = estimate::Shown {
+            scene,
+            settings: &self.settings,
+            surfaces: Surfaces::new(&self.hierarchy, &self.direct),
+            sees_outside: self.plan.sees_outside,
+            irradiance: &self.snapshot.light.irradiance,
+            solve_rays: self.ray_count,
+            cancel,
+        };
+        let seed = self.settings.seed;
+        let estimator = self
+            .estimator
+            .get_or_insert_with(|| ErrorEstimator::new(scene, &self.hierarchy, rays, seed));
+        estimator.estimate(shown)
     }
 
     /// Renew the snapshot after a step. When cancelled it is unchanged.

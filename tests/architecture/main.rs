@@ -67,6 +67,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "budget",
             "refine",
             "relighting",
+            "estimate",
             "shown",
             "state",
             "queries",

@@ -1,5 +1,6 @@
 //! Plain data that a solve hands out: snapshots, reports, inspections, omissions.
 
+mod estimated_error;
 mod inspection;
 mod note;
 mod omitted;
@@ -7,6 +8,7 @@ mod relit;
 mod snapshot;
 mod step_report;
 
+pub use estimated_error::EstimatedError;
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use note::Note;
 pub use omitted::Omitted;
