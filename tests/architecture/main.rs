@@ -71,6 +71,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "shown",
             "state",
             "queries",
+            "accuracy",
             "relight",
         ],
     ),

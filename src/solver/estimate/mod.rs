@@ -57,6 +57,14 @@ const MOST_POINTS: usize = 1024;
 /// Rays of the estimate by the rays of the solve. More takes longer; fewer makes the interval wide.
 const RAY_SHARE: f64 = 0.05;
 
+/// Most of them where the interval holds the error that is asked for. More takes longer than a further step would; fewer
+/// takes that step though the error is reached.
+const MOST_RAY_SHARE: f64 = 0.4;
+
+/// The error of a step relative to that of the second before, below which steps still help. Smaller, and slow progress is
+/// given up; larger, and noise is taken for progress.
+const ADVANCE: f64 = 0.9;
+
 /// Added to the seed, so that neither these points nor their rays are those of the solve or of a reference.
 const SEEDS: [u64; 3] = [
     0x51f1_5eed_0000_0001,
@@ -95,6 +103,8 @@ pub(super) struct ErrorEstimator {
     /// Two independent sets of rays.
     halves: [Samples; 2],
     ray_count: u64,
+    /// Trimmed errors of steps beyond the settings.
+    errors: Vec<f64>,
 }
 
 impl ErrorEstimator {
@@ -126,6 +136,7 @@ impl ErrorEstimator {
             level: 0,
             halves,
             ray_count: 0,
+            errors: Vec::new(),
         }
     }
 
@@ -136,8 +147,32 @@ impl ErrorEstimator {
         }
     }
 
-    /// The error of the light shown; `None` when cancelled.
+    /// Count a step beyond the settings. Returns whether the error has become smaller within the last two of them.
+    pub(super) fn advances(&mut self, estimated: EstimatedError) -> bool {
+        self.errors.push(estimated.trimmed_rms);
+        let count = self.errors.len();
+        count < 3 || estimated.trimmed_rms < ADVANCE * self.errors[count - 3]
+    }
+
+    /// The error of the light shown; `None` when cancelled. Where it is not clear whether an error that is asked for is
+    /// reached, more rays are shot, as long as these are fewer than those of a further step.
     pub(super) fn estimate(&mut self, shown: Shown<'_>) -> Option<EstimatedError> {
+        let mut share = RAY_SHARE;
+        loop {
+            let estimated = self.estimate_by(shown, share)?;
+            let is_open = shown.settings.error.is_some_and(|wanted| {
+                let within = estimated.trimmed_low..estimated.trimmed_high;
+                within.contains(&f64::from(wanted))
+            });
+            if !is_open || share >= MOST_RAY_SHARE || self.level + 1 == LEVELS.len() {
+                return Some(estimated);
+            }
+            share *= 2.0;
+        }
+    }
+
+    /// The error, by at most this share of the rays of the solve.
+    fn estimate_by(&mut self, shown: Shown<'_>, share: f64) -> Option<EstimatedError> {
         let Surfaces { hierarchy, direct } = shown.surfaces;
         // All direct light is sampled here, also that which the solve links.
         let own = (shown.settings.direct == Direct::Linked).then(|| {
@@ -149,7 +184,8 @@ impl ErrorEstimator {
         });
         let direct = own.as_ref().unwrap_or(direct);
         // As many points and rays as the solve pays for.
-        self.level = self.affordable_level(direct, shown.solve_rays);
+        let affordable = (shown.solve_rays as f64 * share) as u64;
+        self.level = self.affordable_level(direct, affordable);
         let (_, count) = LEVELS[self.level];
         let chosen = self.chosen();
         for half in &mut self.halves {
@@ -216,8 +252,7 @@ impl ErrorEstimator {
     }
 
     /// The finest level whose rays are affordable; never one before the present.
-    fn affordable_level(&self, direct: &DirectFields, solve_rays: u64) -> usize {
-        let affordable = (solve_rays as f64 * RAY_SHARE) as u64;
+    fn affordable_level(&self, direct: &DirectFields, affordable: u64) -> usize {
         let cost = |&(points, count): &(usize, u32)| {
             let each = count + samples::shadow_rays(count) * direct.count() as u32;
             (points * self.halves.len()) as u64 * u64::from(each)

@@ -29,3 +29,20 @@ pub struct EstimatedError {
     /// Rays shot for it in all steps so far, beside those of the solve.
     pub rays: u64,
 }
+
+impl EstimatedError {
+    /// The trimmed error and its interval in per cent, for people.
+    pub fn text(&self) -> String {
+        let per_cent = |share: f64| {
+            let value = 100.0 * share;
+            if value < 9.95 {
+                format!("{value:.1}")
+            } else {
+                format!("{value:.0}")
+            }
+        };
+        let [middle, low, high] =
+            [self.trimmed_rms, self.trimmed_low, self.trimmed_high].map(per_cent);
+        format!("{middle} % ({low}…{high})")
+    }
+}

@@ -10,7 +10,7 @@ mod step_report;
 
 pub use estimated_error::EstimatedError;
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
-pub use note::Note;
+pub use note::{Note, Obstacle};
 pub use omitted::Omitted;
 pub use relit::Relit;
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, VertexLight};
