@@ -13,6 +13,7 @@
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::complement::{Complement, SkyShare, SkyShares};
 use crate::{
     hierarchy::{Channels as _, Hierarchy, Moments, Tables},
     solver::plan::Plan,
@@ -44,6 +45,10 @@ pub(crate) struct HemisphereCoverage {
     pub(super) share: f32,
     /// Standard error of the part; 0 if it is exact.
     deviation: f32,
+    /// The lit part of all that fills the hemisphere, backs of surfaces included, 0…1.
+    lit: f32,
+    /// If the part is the complement of that of an even sky, the radiosity (luminance) of a surface as bright; else 0.
+    sky: f32,
 }
 
 impl HemisphereCoverage {
@@ -51,23 +56,104 @@ impl HemisphereCoverage {
     pub(super) const ENCLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
+        lit: 1.0,
+        sky: 0.0,
     };
 
     /// Unknown: light is not scaled.
     pub(super) const UNKNOWN: Self = Self {
         share: 0.0,
         deviation: f32::INFINITY,
+        ..Self::ENCLOSED
     };
 
     /// Inside a solid, where no light arrives.
     pub(super) const INSIDE_SOLID: Self = Self {
         share: 0.0,
         deviation: 0.0,
+        lit: 0.0,
+        sky: 0.0,
     };
 
-    /// An estimate of the part, with its standard error.
-    pub(super) fn estimated(share: f32, deviation: f32) -> Self {
-        Self { share, deviation }
+    /// An estimate of the part, with its standard error; `lit` is the lit part of all that fills the hemisphere.
+    pub(super) fn estimated(share: f32, deviation: f32, lit: f32) -> Self {
+        Self {
+            share,
+            deviation,
+            lit,
+            sky: 0.0,
+        }
+    }
+
+    /// The complement of what an even sky of this radiosity (luminance) fills, of which a part is `lit`. What is exact
+    /// without the sky stays as it is.
+    pub(super) fn beside_sky(self, sky: SkyShare, lit: f32, radiosity: f32) -> Self {
+        if self == Self::INSIDE_SOLID || self == Self::UNKNOWN {
+            return self;
+        }
+        Self {
+            share: (1.0 - sky.share).clamp(0.0, 1.0) * lit,
+            deviation: sky.deviation * lit,
+            lit,
+            sky: radiosity,
+        }
+    }
+
+    /// The mean of the parts at three corners.
+    pub(crate) fn mean(corners: [Self; 3]) -> Self {
+        let [first, ..] = corners;
+        if corners == [first; 3] {
+            return first;
+        }
+        let mean = |of: fn(&Self) -> f32| corners.iter().map(of).sum::<f32>() / 3.0;
+        Self {
+            share: mean(|corner| corner.share),
+            deviation: mean(|corner| corner.deviation),
+            lit: mean(|corner| corner.lit),
+            sky: first.sky,
+        }
+    }
+
+    /// The lit part of all that fills the hemisphere.
+    pub(super) fn lit(&self) -> f32 {
+        self.lit
+    }
+
+    /// Weight of the part beside another estimate of it, 0…1: `trust` by their errors alone, 0…1, and more where the sky
+    /// fills the rest, since an error of both cancels as far as the surfaces, of this radiosity (luminance), are as bright
+    /// as the sky. (The weight for which the variance of the irradiance is least.)
+    fn weight(&self, trust: f32, radiosity: f32) -> f32 {
+        let cancelled = if self.sky > 0.0 {
+            (self.sky / radiosity.max(f32::MIN_POSITIVE)).min(1.0)
+        } else {
+            0.0
+        };
+        trust + (1.0 - trust) * cancelled
+    }
+
+    /// For an estimate of an irradiance by this number of rays, given that over links: the radiosity to subtract from what
+    /// each ray meets and to add times the part. Where the mean radiosity is known better than which rays meet something,
+    /// that removes their noise (a control variate); 0 where no sky gives the part.
+    pub(crate) fn control(&self, linked: Vec4, rays: u32) -> Control {
+        if self.sky <= 0.0 {
+            return Control::default();
+        }
+        let filled = self.share.max(linked.form_factor_sum());
+        let radiosity = linked.color() / filled.max(f32::MIN_POSITIVE);
+        let (own, others) = (
+            self.deviation * self.deviation,
+            self.share * (1.0 - self.share) / rays.max(1) as f32,
+        );
+        let trust = if own + others > 0.0 {
+            others / (own + others)
+        } else {
+            0.0
+        };
+        let radiosity = radiosity * self.weight(trust, luminance(radiosity.extend(0.0)));
+        Control {
+            radiosity: radiosity.extend(0.0),
+            irradiance: (radiosity * self.share).extend(0.0),
+        }
     }
 
     /// Whether the part is exact, and so the same for all elements of the cell.
@@ -75,9 +161,9 @@ impl HemisphereCoverage {
         self.deviation == 0.0
     }
 
-    /// Factor of an irradiance with this sum of form factors, at least 0. Where the coverage is an estimate, a sum
-    /// within its error is changed little.
-    fn factor(&self, row_sum: f32) -> f32 {
+    /// Factor of an irradiance with this sum of form factors and mean radiosity (luminance), at least 0. Where the
+    /// coverage is an estimate, a sum within its error is changed little.
+    fn factor(&self, row_sum: f32, radiosity: f32) -> f32 {
         let gap = self.share - row_sum;
         let doubt = 2.0 * self.deviation;
         let trust = if self.is_certain() {
@@ -86,7 +172,7 @@ impl HemisphereCoverage {
             let surplus = if gap < 0.0 { SURPLUS * self.share } else { 0.0 };
             gap * gap / (gap * gap + doubt * doubt + surplus * surplus)
         };
-        let target = row_sum + trust * gap;
+        let target = row_sum + self.weight(trust, radiosity) * gap;
         let row_sum = row_sum.max(LEAST_ROW * self.share);
         if row_sum > 0.0 { target / row_sum } else { 1.0 }
     }
@@ -95,22 +181,26 @@ impl HemisphereCoverage {
     /// coverage. `sums` are the area of the cell and the sum of form factors times area over the cell; `nearby` is the
     /// mean radiosity of the neighbourhood.
     pub(crate) fn scaled(&self, light: Vec4, sums: (f32, f32), nearby: Vec3) -> Vec4 {
-        multiplied(
-            light,
-            self.factor_for(light.form_factor_sum(), sums),
-            nearby,
-        )
+        multiplied(light, self.factor_for(light, sums), nearby)
     }
 
-    /// The factor for one leaf with this sum of form factors. An estimate holds for the mean over the cell, whose
-    /// elements may differ.
-    fn factor_for(&self, row_sum: f32, (area, weighted): (f32, f32)) -> f32 {
-        if self.is_certain() || area <= 0.0 {
-            self.factor(row_sum)
-        } else {
-            self.factor(weighted / area)
-        }
+    /// The factor for one leaf with this irradiance. An estimate by rays holds for the mean over the cell, whose elements
+    /// may differ.
+    fn factor_for(&self, light: Vec4, (area, weighted): (f32, f32)) -> f32 {
+        let row_sum = light.form_factor_sum();
+        let radiosity = luminance(light.color().extend(0.0)) / row_sum.max(f32::MIN_POSITIVE);
+        let is_own = self.is_certain() || self.sky > 0.0 || area <= 0.0;
+        self.factor(if is_own { row_sum } else { weighted / area }, radiosity)
     }
+}
+
+/// See [`HemisphereCoverage::control`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Control {
+    /// Radiosity to subtract from that of each surface that a ray meets, W/m².
+    pub(crate) radiosity: Vec4,
+    /// Irradiance to add, W/m².
+    pub(crate) irradiance: Vec4,
 }
 
 /// Irradiance times a factor; the missing light has the radiosity `nearby` if that is darker. The sum of form factors
@@ -136,6 +226,8 @@ pub(crate) struct CoverageMap {
     near: Vec<u32>,
     /// Whether only a share of the rays was shot.
     is_rough: bool,
+    /// The coverage of the present elements and vertices where an even sky gives it.
+    complement: Option<Complement>,
 }
 
 impl CoverageMap {
@@ -153,7 +245,12 @@ impl CoverageMap {
         for cluster in hierarchy.groups(NEIGHBOURS) {
             near[hierarchy.clusters[cluster].patches()].fill(cluster as u32);
         }
-        Self { of, near, is_rough }
+        Self {
+            of,
+            near,
+            is_rough,
+            complement: None,
+        }
     }
 
     /// The same coverage of all patches.
@@ -194,14 +291,47 @@ impl CoverageMap {
         total.color() / total.area().max(f32::MIN_POSITIVE)
     }
 
-    /// The coverage of a cell.
-    pub(crate) fn of(&self, cell: usize) -> HemisphereCoverage {
-        self.of[cell]
+    /// Give the present elements and vertices the complement of what an even sky fills, if there is one.
+    pub(crate) fn complete(&mut self, hierarchy: &Hierarchy, sky: Option<&SkyShares>) {
+        let probed = |element| self.of[self.cell(hierarchy, element)];
+        self.complement = sky.map(|sky| Complement::new(hierarchy, sky, probed));
+    }
+
+    /// The coverage of a leaf: its own where the sky gives it, else that of its cell.
+    pub(crate) fn of(&self, hierarchy: &Hierarchy, leaf: usize) -> HemisphereCoverage {
+        let Some(complement) = &self.complement else {
+            return self.of[self.cell(hierarchy, leaf)];
+        };
+        // Newer elements have that of the element that was divided.
+        let mut element = leaf;
+        while element >= complement.elements.len() {
+            element = hierarchy.mesh.elements[element].parent as usize;
+        }
+        complement.elements[element]
+    }
+
+    /// The coverage at a vertex; `None` where the sky does not give it.
+    pub(crate) fn at_vertex(&self, vertex: u32) -> Option<HemisphereCoverage> {
+        let complement = self.complement.as_ref()?;
+        complement.vertices.get(vertex as usize).copied()
+    }
+
+    /// The coverage at the corners of a leaf.
+    pub(crate) fn at_corners(&self, hierarchy: &Hierarchy, leaf: usize) -> [HemisphereCoverage; 3] {
+        let own = self.of(hierarchy, leaf);
+        let corners = hierarchy.mesh.elements[leaf].vertices;
+        match own.sky > 0.0 {
+            true => corners.map(|vertex| self.at_vertex(vertex).unwrap_or(own)),
+            false => [own; 3],
+        }
     }
 
     /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
-        size_of_val(self.of.as_slice()) + size_of_val(self.near.as_slice())
+        let complement = self.complement.as_ref();
+        size_of_val(self.of.as_slice())
+            + size_of_val(self.near.as_slice())
+            + complement.map_or(0, Complement::memory_bytes)
     }
 }
 
@@ -260,11 +390,10 @@ impl CoverageMap {
             .into_par_iter()
             .with_min_len(1024)
             .map(|index| {
-                let cell = cell(index);
-                let coverage = self.of(cell);
+                let sums = sums[cell(index)];
+                let coverage = self.of(hierarchy, index);
                 let is_leaf = elements[index].is_leaf();
-                is_leaf
-                    .then(|| coverage.factor_for(irradiance[index].form_factor_sum(), sums[cell]))
+                is_leaf.then(|| coverage.factor_for(irradiance[index], sums))
             })
             .collect()
     }
@@ -285,10 +414,10 @@ mod tests {
         for _ in 0..200 {
             let (radiosity, row, share) =
                 (color(&mut random), 1.5 * random.uniform(), random.uniform());
-            let coverage = HemisphereCoverage::estimated(share, 0.0);
+            let coverage = HemisphereCoverage::estimated(share, 0.0, 1.0);
             let light = (radiosity * row).extend(row);
             let scaled = coverage.scaled(light, (1.0, row), radiosity);
-            let expected = radiosity * row * coverage.factor(row);
+            let expected = radiosity * row * coverage.factor(row, 1.0);
             assert!((scaled.color() - expected).abs().max_element() < 1e-5);
             assert_eq!(scaled.form_factor_sum(), row);
         }

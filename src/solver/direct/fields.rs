@@ -11,7 +11,8 @@ use crate::{
     hierarchy::{Channels as _, Hierarchy},
     scene::Scene,
     solver::{
-        Cancel, Direct, SolveSettings, limits::Limits, places::OffsetPlaces, sums::area_total,
+        Cancel, Direct, SolveSettings, coverage::SkyShares, limits::Limits, places::OffsetPlaces,
+        sums::area_total,
     },
 };
 
@@ -115,6 +116,18 @@ impl DirectFields {
         let power =
             |field: &DirectField| area_total(hierarchy, |leaf| field.element(hierarchy, leaf));
         self.outside().map(power).sum()
+    }
+
+    /// The parts of all hemispheres that the sky fills, if it is equally bright in all directions.
+    pub(crate) fn sky_shares(&self, hierarchy: &Hierarchy) -> Option<SkyShares> {
+        let even =
+            |field: &DirectField| Some((field.lights.even_radiosity()?, field.shares(hierarchy)?));
+        let (radiosity, [vertices, elements]) = self.outside().find_map(even)?;
+        Some(SkyShares {
+            radiosity,
+            vertices,
+            elements,
+        })
     }
 
     /// Irradiance from outside of a leaf, W/m².

@@ -81,7 +81,7 @@ pub(crate) fn gather_leaves(
 /// radiosity of the neighbourhood.
 fn scale_to_coverage(
     hierarchy: &Hierarchy,
-    coverage: HemisphereCoverage,
+    coverage: &CoverageMap,
     nearby: Vec3,
     leaves: &mut [LeafLight],
 ) {
@@ -92,9 +92,11 @@ fn scale_to_coverage(
         (areas + area, rows + area * leaf.centre.form_factor_sum())
     });
     for leaf in leaves {
-        for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
+        let corners = coverage.at_corners(hierarchy, leaf.element as usize);
+        for (value, coverage) in leaf.corners.iter_mut().zip(corners) {
             *value = coverage.scaled(*value, sums, nearby);
         }
+        leaf.centre = HemisphereCoverage::mean(corners).scaled(leaf.centre, sums, nearby);
     }
 }
 
@@ -247,8 +249,7 @@ impl<'a> Walk<'a> {
         let cell = |leaf: &LeafLight| self.coverage.cell(hierarchy, leaf.element as usize);
         let nearby = self.coverage.nearby(self.kernel.tables, patch);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-            let coverage = self.coverage.of(cell(&leaves[0]));
-            scale_to_coverage(hierarchy, coverage, nearby, leaves);
+            scale_to_coverage(hierarchy, self.coverage, nearby, leaves);
         }
     }
 

@@ -182,7 +182,10 @@ impl<'a> Inspector<'a> {
             });
         let patch = elements[leaf].patch as usize;
         let nearby = self.coverage.nearby(&self.linked.power, patch);
-        let scaled = self.coverage.of(cell).scaled(light, sums, nearby);
+        let scaled = self
+            .coverage
+            .of(self.hierarchy(), leaf)
+            .scaled(light, sums, nearby);
         let ratio = (scaled / light).color();
         Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }
