@@ -28,6 +28,10 @@ const CANDIDATES: u32 = 6;
 /// noisy.
 const POWER_SHARE: f32 = 0.5;
 
+/// Rays that estimate the tint of a pair with coloured panes between; a quarter of them where those show no colour. Fewer
+/// leave spots of colour and miss small panes; more cost time in scenes with coloured panes.
+const TINT_RAYS: u32 = 16;
+
 /// Points of a receiver at which form factors to clusters are summed. Fewer miss their variation near an edge; more
 /// cost time for links that later steps divide.
 const POINTS: usize = 4;
@@ -298,22 +302,9 @@ impl PairSampler<'_> {
         let mut all = Share::default();
         let (source, receiver) = (self.source(source), self.receiver(receiver));
         for _ in 0..ray_count {
-            let (mut chosen, mut sum) = (None, 0.0);
-            for _ in 0..CANDIDATES {
-                let candidate = self.sample_source(&source, random);
-                let to = self.sample(&receiver, random);
-                let weight = transfer(&candidate.from, &to);
-                sum += weight;
-                if chosen.is_none() || random.uniform() * sum < weight {
-                    chosen = Some((candidate, to));
-                }
-            }
-            let Some((candidate, to)) = chosen else {
+            let Some((candidate, sum, passing)) = self.pair(&source, &receiver, random) else {
                 continue;
             };
-            let from = candidate.from;
-            let ends = [Some(to.triangle), Some(from.triangle)];
-            let passing = self.rays.transmittance(to.point, from.point, ends);
             let visible = passing.element_sum() / 3.0;
             all.count(1.0, visible);
             light.count(sum * candidate.light, visible);
@@ -321,6 +312,54 @@ impl PairSampler<'_> {
         }
         let area = area.part().or(all.part()).unwrap_or(1.0);
         (light.part().unwrap_or(area), area)
+    }
+
+    /// What coloured panes make of the light of a source, by channel, 1 on average; and the number of rays.
+    pub fn tint(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> (Vec3, u32) {
+        let (source, receiver) = (self.source(source), self.receiver(receiver));
+        let is_grey = |sum: Vec3| sum == Vec3::splat(sum.x);
+        let (mut arrived, mut rays) = (Vec3::ZERO, 0);
+        while rays < TINT_RAYS / 4 || rays < TINT_RAYS && !is_grey(arrived) {
+            rays += 1;
+            if let Some((candidate, weight, passing)) = self.pair(&source, &receiver, random) {
+                arrived += passing * (weight * candidate.light);
+            }
+        }
+        let mean = arrived.element_sum() / 3.0;
+        let is_coloured = mean > 0.0 && !is_grey(arrived);
+        (
+            if is_coloured {
+                arrived / mean
+            } else {
+                Vec3::ONE
+            },
+            rays,
+        )
+    }
+
+    /// A pair of points by their unoccluded transfer, with the summed transfer of its candidates and what passes between
+    /// them, by channel, 0…1.
+    fn pair(
+        &self,
+        source: &Source,
+        receiver: &Receiver,
+        random: &mut Random,
+    ) -> Option<(Candidate, f32, Vec3)> {
+        let (mut chosen, mut sum) = (None, 0.0);
+        for _ in 0..CANDIDATES {
+            let candidate = self.sample_source(source, random);
+            let to = self.sample(receiver, random);
+            let weight = transfer(&candidate.from, &to);
+            sum += weight;
+            if chosen.is_none() || random.uniform() * sum < weight {
+                chosen = Some((candidate, to));
+            }
+        }
+        let (candidate, to) = chosen?;
+        let from = candidate.from;
+        let ends = [Some(to.triangle), Some(from.triangle)];
+        let passing = self.rays.transmittance(to.point, from.point, ends);
+        Some((candidate, sum, passing))
     }
 
     /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of
