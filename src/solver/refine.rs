@@ -147,7 +147,8 @@ impl Refining<'_> {
             .into_par_iter()
             .flat_map_iter(|receiver| {
                 let of_link = move |link: &Link| {
-                    if link.light_factor() <= 0.0 || self.cancel.is_cancelled() {
+                    // Nothing passes, or all of every ray.
+                    if [0.0, 1.0].contains(&link.light_factor()) || self.cancel.is_cancelled() {
                         return (Vec3::ONE, 0);
                     }
                     let pair = (u64::from(link.source.0) << 32) | u64::from(receiver);

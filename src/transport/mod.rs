@@ -9,6 +9,7 @@ mod patch_sums;
 mod refine;
 mod refiner;
 mod sights;
+mod tint;
 mod validate;
 mod visibility;
 

@@ -28,10 +28,6 @@ const CANDIDATES: u32 = 6;
 /// noisy.
 const POWER_SHARE: f32 = 0.5;
 
-/// Rays that estimate the tint of a pair with coloured panes between; a quarter of them where those show no colour. Fewer
-/// leave spots of colour and miss small panes; more cost time in scenes with coloured panes.
-const TINT_RAYS: u32 = 16;
-
 /// Points of a receiver at which form factors to clusters are summed. Fewer miss their variation near an edge; more
 /// cost time for links that later steps divide.
 const POINTS: usize = 4;
@@ -47,7 +43,7 @@ struct Sample {
 
 /// An element to sample points on.
 #[derive(Clone, Copy, Debug)]
-struct Facet {
+pub(super) struct Facet {
     corners: [Vec3; 3],
     normal: Vec3,
     triangle: TriangleId,
@@ -69,7 +65,7 @@ impl Facet {
 }
 
 /// A node whose points are sampled by area.
-enum Receiver {
+pub(super) enum Receiver {
     /// An element as a whole, without regard to its children.
     Element(Facet),
     /// An element with inactive parts.
@@ -79,7 +75,7 @@ enum Receiver {
 }
 
 /// A node whose points are sampled by power and by area in turn.
-struct Source {
+pub(super) struct Source {
     kind: Kind,
     /// The element if it is a leaf; otherwise a leaf is chosen for each point.
     leaf: Option<Facet>,
@@ -91,10 +87,10 @@ struct Source {
 
 /// A candidate point of a source.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+pub(super) struct Candidate {
     from: Sample,
     /// Light that the point stands for, relative to that of a point sampled by area on a source of uniform radiosity.
-    light: f32,
+    pub(super) light: f32,
     /// Area that the point stands for, likewise.
     area: f32,
 }
@@ -165,7 +161,7 @@ impl PairSampler<'_> {
         (sample.point, sample.normal)
     }
 
-    fn receiver(&self, node: NodeId) -> Receiver {
+    pub(super) fn receiver(&self, node: NodeId) -> Receiver {
         match self.hierarchy.kind(node) {
             Kind::Element(index) if self.is_whole(index) => Receiver::Element(self.facet(index)),
             Kind::Element(index) => Receiver::Parts(index),
@@ -195,7 +191,7 @@ impl PairSampler<'_> {
         }
     }
 
-    fn source(&self, node: NodeId) -> Source {
+    pub(super) fn source(&self, node: NodeId) -> Source {
         let kind = self.hierarchy.kind(node);
         let (leaf, area, power) = match kind {
             Kind::Element(index) => {
@@ -314,32 +310,9 @@ impl PairSampler<'_> {
         (light.part().unwrap_or(area), area)
     }
 
-    /// What coloured panes make of the light of a source, by channel, 1 on average; and the number of rays.
-    pub fn tint(&self, source: NodeId, receiver: NodeId, random: &mut Random) -> (Vec3, u32) {
-        let (source, receiver) = (self.source(source), self.receiver(receiver));
-        let is_grey = |sum: Vec3| sum == Vec3::splat(sum.x);
-        let (mut arrived, mut rays) = (Vec3::ZERO, 0);
-        while rays < TINT_RAYS / 4 || rays < TINT_RAYS && !is_grey(arrived) {
-            rays += 1;
-            if let Some((candidate, weight, passing)) = self.pair(&source, &receiver, random) {
-                arrived += passing * (weight * candidate.light);
-            }
-        }
-        let mean = arrived.element_sum() / 3.0;
-        let is_coloured = mean > 0.0 && !is_grey(arrived);
-        (
-            if is_coloured {
-                arrived / mean
-            } else {
-                Vec3::ONE
-            },
-            rays,
-        )
-    }
-
     /// A pair of points by their unoccluded transfer, with the summed transfer of its candidates and what passes between
     /// them, by channel, 0…1.
-    fn pair(
+    pub(super) fn pair(
         &self,
         source: &Source,
         receiver: &Receiver,

@@ -5,17 +5,8 @@
 //! one gives the other: the coverage at each vertex and of each leaf is the complement of the sky's share there. An error
 //! of that share then cancels, as far as surfaces are as bright as the sky.
 
-use super::hemisphere::HemisphereCoverage;
+use super::hemisphere::{HemisphereCoverage, SkyShare};
 use crate::hierarchy::Hierarchy;
-
-/// The part of a hemisphere that an even sky fills, cosine-weighted.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct SkyShare {
-    /// The part, 0…1.
-    pub(crate) share: f32,
-    /// Standard error of the part.
-    pub(crate) deviation: f32,
-}
 
 /// The parts of all hemispheres that an even sky fills.
 #[derive(Clone, Debug)]

@@ -2,8 +2,10 @@
 
 mod complement;
 mod hemisphere;
+mod map;
 mod prober;
 
-pub(crate) use complement::{SkyShare, SkyShares};
-pub(crate) use hemisphere::{Control, CoverageMap, HemisphereCoverage};
+pub(crate) use complement::SkyShares;
+pub(crate) use hemisphere::{Control, HemisphereCoverage, SkyShare};
+pub(crate) use map::CoverageMap;
 pub(crate) use prober::probe;

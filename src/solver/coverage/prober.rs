@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::hemisphere::{CoverageMap, HemisphereCoverage};
+use super::{hemisphere::HemisphereCoverage, map::CoverageMap};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Element, Hierarchy},
