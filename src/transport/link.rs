@@ -75,8 +75,8 @@ impl Link {
 #[derive(Clone, Copy, Debug)]
 pub struct TintedLink<'a> {
     link: &'a Link,
-    /// Factor by channel, 1 for the form factor and on average over the colours.
-    tint: Vec4,
+    /// Factor by colour, 1 on average; `None` where no pane is coloured.
+    tint: Option<&'a Vec3>,
 }
 
 impl Deref for TintedLink<'_> {
@@ -90,17 +90,21 @@ impl Deref for TintedLink<'_> {
 impl TintedLink<'_> {
     /// As [`Link::light_factor`], by channel.
     pub fn tinted_light_factor(&self) -> Vec4 {
-        self.tint * self.light_factor()
+        self.tinted(Vec4::splat(self.light_factor()))
     }
 
     /// As [`Link::form_factor`], by channel.
     pub fn tinted_form_factor(&self) -> Vec4 {
-        self.tint * self.form_factor()
+        self.tinted(Vec4::splat(self.form_factor()))
     }
 
     /// As [`Link::transmission`], by channel.
     pub fn tinted_transmission(&self) -> Vec4 {
-        self.transmission() * self.tint
+        self.tinted(self.transmission())
+    }
+
+    fn tinted(&self, factor: Vec4) -> Vec4 {
+        self.tint.map_or(factor, |tint| factor * tint.extend(1.0))
     }
 }
 
@@ -118,15 +122,19 @@ impl<'a> TintedLinks<'a> {
         self.links.is_empty()
     }
 
-    /// The links in order.
-    pub fn iter(self) -> impl Iterator<Item = TintedLink<'a>> {
-        self.links.iter().enumerate().map(move |(index, link)| {
-            let tint = self
-                .tints
-                .get(index)
-                .map_or(Vec4::ONE, |tint| tint.extend(1.0));
-            TintedLink { link, tint }
-        })
+    /// Call `visit` for each link in order. Two loops, since that without tints is the common one and takes most of the
+    /// time of a sweep.
+    pub fn for_each(self, mut visit: impl FnMut(TintedLink<'a>)) {
+        if self.tints.is_empty() {
+            for link in self.links {
+                visit(TintedLink { link, tint: None });
+            }
+        } else {
+            for (link, tint) in self.links.iter().zip(self.tints) {
+                let tint = Some(tint);
+                visit(TintedLink { link, tint });
+            }
+        }
     }
 }
 

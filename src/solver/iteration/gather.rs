@@ -104,7 +104,7 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
                 hierarchy.mesh.elements[index].centroid,
                 hierarchy.patch_of(index).normal,
             );
-            for link in links.iter() {
+            links.for_each(|link| {
                 sum += match hierarchy.kind(link.source) {
                     Kind::Element(source) => {
                         kernel.tables.elements[source] * link.tinted_form_factor()
@@ -113,7 +113,7 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
                         kernel.irradiance(link.source, point, normal) * link.tinted_transmission()
                     }
                 };
-            }
+            });
             sum
         })
         .collect()
@@ -172,7 +172,7 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     let hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
     let mut sum = Moments::default();
-    for link in links.tinted(NodeId(index as u32)).iter() {
+    links.tinted(NodeId(index as u32)).for_each(|link| {
         if link.source.index() == index {
             sum.add_isotropic(
                 self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
@@ -183,7 +183,7 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
                 .vector_irradiance(link.source, cluster.centroid)
                 .add_to(&mut sum, link.tinted_transmission());
         }
-    }
+    });
     sum
 }
 
@@ -200,7 +200,7 @@ fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<V
             let mut sums = vec![Vec4::ZERO; range.len()];
             let mut at = leaf;
             while !cancel.is_cancelled() {
-                for link in links.tinted(NodeId(at as u32)).iter() {
+                links.tinted(NodeId(at as u32)).for_each(|link| {
                     push_one(
                         kernel,
                         at,
@@ -209,7 +209,7 @@ fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<V
                         &hierarchy.patches[range.clone()],
                         &mut sums,
                     );
-                }
+                });
                 match hierarchy.clusters[at].parent {
                     u32::MAX => break,
                     parent => at = parent as usize,

@@ -211,14 +211,14 @@ impl<'a> Walk<'a> {
         let cluster = &self.kernel.hierarchy.clusters[index];
         let far = SIGHT_DISTANCE * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
-        for link in self.links.tinted(NodeId(index as u32)).iter() {
+        self.links.tinted(NodeId(index as u32)).for_each(|link| {
             chain.error += link.error;
             if link.source.index() == index {
                 chain.even += own_irradiance(self.kernel, index, link);
             } else {
                 chain.add(self.kernel, link, cluster.centroid, far);
             }
-        }
+        });
         self.push(cluster.centroid, cluster.radius, chain);
     }
 
@@ -274,8 +274,7 @@ impl<'a> Walk<'a> {
             .offsets
             .places(&hierarchy.mesh.elements[index], corners);
         let points = Vectors4::new([centroid, a, b, c]);
-        let elements = self.path.iter().flat_map(|chain| chain.own.iter());
-        for link in elements.chain(own.iter()) {
+        let mut add = |link: TintedLink<'_>| {
             light.error += link.error;
             let transmission = transmission(kernel, link);
             let [centre, corners @ ..] = kernel.irradiances(link.source, &points, normal);
@@ -283,7 +282,11 @@ impl<'a> Walk<'a> {
             for (sum, corner) in light.corners.iter_mut().zip(corners) {
                 *sum += corner * transmission;
             }
+        };
+        for chain in &self.path {
+            chain.own.for_each(&mut add);
         }
+        own.for_each(add);
         light
     }
 }

@@ -138,7 +138,7 @@ impl<'a> Inspector<'a> {
         let mut found = Vec::new();
         for &receiver in path {
             let place = self.place(receiver);
-            for link in self.linked.links.tinted(receiver).iter() {
+            self.linked.links.tinted(receiver).for_each(|link| {
                 let share = match self.hierarchy().kind(node) {
                     Kind::Cluster(index) => mean_irradiance(kernel, index, receiver, link),
                     Kind::Element(leaf) => {
@@ -159,7 +159,7 @@ impl<'a> Inspector<'a> {
                     form_factor: share.form_factor_sum(),
                     error: link.error,
                 });
-            }
+            });
         }
         found
     }
