@@ -1,0 +1,122 @@
+//! Figures of an estimate from the errors at its points.
+
+use glam::Vec3;
+
+use super::samples::Stored;
+use crate::{hierarchy::luminance, solver::EstimatedError};
+
+/// Standard errors to either side that hold 95 %.
+const DEVIATIONS: f64 = 1.96;
+
+/// One in so many points is omitted by trimmed figures.
+const TRIMMED_PART: usize = 100;
+
+/// Standard errors by which a point must be wrong to be omitted: the product of two errors is large where their noise
+/// agrees by chance. Smaller, and such points are omitted and the others are too small; larger, and nothing is.
+const OUTLIER_DEVIATIONS: f64 = 4.0;
+
+/// Least mean square of the true light over that of the light stored: noise of few points may leave nothing of it.
+const SMALLEST_SHARE: f64 = 0.1;
+
+/// Reflected light at a point, luminance; the common factor 1/π is left out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reflected {
+    stored: f64,
+    /// Its error, by two independent estimates.
+    errors: [f64; 2],
+}
+
+impl Reflected {
+    /// From the light stored and two estimates of the error of its irradiance.
+    pub(super) fn new(stored: &Stored, errors: [Vec3; 2]) -> Self {
+        Self {
+            stored: stored_light(stored),
+            errors: errors.map(|error| reflected(stored, error)),
+        }
+    }
+
+    fn error(&self) -> f64 {
+        0.5 * (self.errors[0] + self.errors[1])
+    }
+
+    fn square(&self) -> f64 {
+        self.errors[0] * self.errors[1]
+    }
+}
+
+/// Luminance of the light that is reflected where light is stored; the common factor 1/π is left out.
+pub(super) fn stored_light(stored: &Stored) -> f64 {
+    reflected(stored, stored.irradiance)
+}
+
+fn reflected(stored: &Stored, irradiance: Vec3) -> f64 {
+    f64::from(luminance((stored.reflectance * irradiance).extend(0.0)))
+}
+
+/// A mean and its standard error.
+struct Mean {
+    mean: f64,
+    error: f64,
+}
+
+impl Mean {
+    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+        let count = values.clone().count().max(1) as f64;
+        let mean = values.clone().sum::<f64>() / count;
+        let square = values.map(|value| (value - mean).powi(2)).sum::<f64>();
+        Self {
+            mean,
+            error: (square / (count * (count - 1.0).max(1.0))).sqrt(),
+        }
+    }
+
+    /// The root of the mean and of both ends of its interval, over a scale.
+    fn roots(&self, scale: f64) -> [f64; 3] {
+        let half = DEVIATIONS * self.error;
+        [self.mean, self.mean - half, self.mean + half]
+            .map(|square| (square.max(0.0).sqrt() / scale).min(f64::MAX))
+    }
+}
+
+/// All figures but the counts, from the points with rays and the light stored at `all` points.
+pub(super) fn estimated(points: &[Reflected], all: &[f64]) -> EstimatedError {
+    // Mean square of the true light: that of the light stored, and what its error changes.
+    let change = |point: &Reflected| point.square() - 2.0 * point.stored * point.error();
+    let stored_square = Mean::of(all.iter().map(|stored| stored * stored)).mean;
+    let square = stored_square + Mean::of(points.iter().map(change)).mean;
+    let scale = square.max(SMALLEST_SHARE * stored_square).sqrt();
+    let scale = scale.max(f64::MIN_POSITIVE);
+    let squares = Mean::of(points.iter().map(Reflected::square));
+    let [rms, rms_low, rms_high] = squares.roots(scale);
+    // Without the worst points, as far as noise does not explain them.
+    let noise = |point: &Reflected| (0.5 * (point.errors[0] - point.errors[1])).powi(2);
+    let noise = Mean::of(points.iter().map(noise)).mean.sqrt();
+    let mut kept: Vec<&Reflected> = points.iter().collect();
+    kept.sort_by(|a, b| b.error().abs().total_cmp(&a.error().abs()));
+    let is_outlier = |point: &&&Reflected| point.error().abs() > OUTLIER_DEVIATIONS * noise;
+    let outliers = kept.iter().take_while(is_outlier).count();
+    let trimmed = &kept[outliers.min(points.len() / TRIMMED_PART)..];
+    let squares = Mean::of(trimmed.iter().map(|point| point.square()));
+    let [trimmed_rms, trimmed_low, trimmed_high] = squares.roots(scale);
+    // Energy.
+    let stored = Mean::of(all.iter().copied()).mean;
+    let error = Mean::of(points.iter().map(Reflected::error));
+    let energy = |error: f64| {
+        let truth = stored - error;
+        if truth > 0.0 { stored / truth } else { 1.0 }
+    };
+    let half = DEVIATIONS * error.error;
+    EstimatedError {
+        rms,
+        rms_low,
+        rms_high,
+        trimmed_rms,
+        trimmed_low,
+        trimmed_high,
+        energy: energy(error.mean),
+        energy_low: energy(error.mean - half),
+        energy_high: energy(error.mean + half),
+        points: 0,
+        rays: 0,
+    }
+}
