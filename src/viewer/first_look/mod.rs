@@ -259,8 +259,6 @@ impl Judge<'_> {
 
     /// The same from free space.
     fn meets_from(&self, origin: Vec3, direction: Vec3) -> Option<(f32, bool)> {
-        // Adding 0 turns -0 into 0: the tree takes it for a direction below 0, and finds nothing.
-        let direction = direction + 0.0;
         let hit = self.rays.closest(origin, direction, None)?;
         Some((
             hit.distance,
