@@ -14,7 +14,7 @@ use vecrad::{
     solver::SolveSettings,
     viewer::{Options, action::Action, app::App, loader::SceneSource, run::RunStatus, session},
 };
-use windows::{one_triangle, perform, plates, wait_for, window};
+use windows::{ONE_TRIANGLE, one_triangle, perform, plates, wait_for, window};
 
 fn press(harness: &mut Harness<'static, App>, modifiers: Modifiers, key: Key) {
     harness.key_press_modifiers(modifiers, key);
@@ -130,6 +130,71 @@ fn changed_materials_are_kept_beside_the_scene() {
         again.state().state.materials.appearances(&scene),
         materials.appearances(&scene)
     );
+}
+
+#[test]
+fn sky_and_sun_are_kept_beside_the_scene() {
+    let (folder, mut harness) = one_triangle("scene.obj");
+    let sun = SunSource::Disc {
+        azimuth: 90.0,
+        elevation: 30.0,
+        irradiance: Vec3::new(10.0, 9.0, 8.0),
+        diameter: 2.0,
+    };
+    let lighting = Lighting {
+        sky: Some(SkySource::Uniform(Vec3::new(0.5, 0.75, 1.0))),
+        is_sky_off: true,
+        sun: Some(sun),
+        ..Lighting::default()
+    };
+    perform(&mut harness, Action::Light(lighting.clone()));
+    perform(&mut harness, Action::SaveSidecar);
+    let source = SceneSource::File(folder.path().join("scene.obj"));
+    let again = opened(source.clone());
+    assert_eq!(again.state().state.lighting, lighting);
+    let loaded = again.state().state.loaded.as_ref().unwrap();
+    assert_eq!(loaded.scene.environment.sky, Sky::Dark);
+    assert!(loaded.scene.environment.sun.is_some());
+    // The command line goes before it.
+    let mut asked = window(Options {
+        source: Some(source),
+        settings: SolveSettings::draft(),
+        lighting: Lighting {
+            sun: Some(SunSource::Dark),
+            ..Lighting::default()
+        },
+        ..Options::default()
+    });
+    wait_for(&mut asked, |app| app.state.loaded.is_some());
+    let state = &asked.state().state;
+    assert_eq!(state.lighting.sun, Some(SunSource::Dark));
+    assert_eq!(state.lighting.sky, lighting.sky);
+    // Another scene does not have it.
+    perform(
+        &mut asked,
+        Action::Load(SceneSource::Builtin("plates".to_owned())),
+    );
+    wait_for(&mut asked, |app| {
+        let shown = app.state.loaded.as_ref();
+        shown.is_some_and(|loaded| loaded.source.path().is_none())
+    });
+    assert_eq!(asked.state().state.lighting.sky, None);
+}
+
+#[test]
+fn a_saved_sky_whose_picture_is_gone_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.obj");
+    fs::write(&path, ONE_TRIANGLE).unwrap();
+    let text = "[light.sky]\non = true\npicture = { file = \"gone.hdr\", scale = [1.0, 1.0, 1.0], rotation = 0.0 }\n";
+    fs::write(folder.path().join("scene.obj.vecrad.toml"), text).unwrap();
+    let harness = opened(SceneSource::File(path));
+    assert!(is_told(
+        &harness,
+        "the saved sky was not used: there is no such picture"
+    ));
+    let loaded = harness.state().state.loaded.as_ref().unwrap();
+    assert!(loaded.scene.environment.is_default);
 }
 
 #[test]
