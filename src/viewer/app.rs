@@ -192,7 +192,7 @@ impl eframe::App for App {
         let picked = egui::CentralPanel::no_frame()
             .show(ui, |ui| {
                 let rect = ui.available_rect_before_wrap();
-                let picked = viewport_ui(ui, self.viewport.as_mut(), &mut self.state);
+                let picked = viewport_ui(ui, self.viewport.as_mut(), &mut self.state, &mut actions);
                 if self.state.loaded.is_none() && self.state.loading.is_none() {
                     panels::scene::empty_ui(ui, rect, &mut self.state, &mut actions);
                 }

@@ -217,6 +217,12 @@ pub fn bindings() -> Vec<Binding> {
             Action::Stop,
         ),
         command(Key::R, Solve, "Restart", Action::Reset),
+        plain(
+            Key::U,
+            Solve,
+            "Left drag moves the sun, or the camera again",
+            Action::ToggleSunDrag,
+        ),
         command(
             Key::Z,
             Solve,

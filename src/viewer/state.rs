@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     hierarchy::NodeId,
-    scene::{Lighting, Scene, SceneOptions},
+    scene::{Lighting, Scene, SceneOptions, SunSource},
     solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
@@ -117,6 +117,15 @@ impl State {
             materials: self.materials.clone(),
             lighting: self.lighting.clone(),
         }
+    }
+
+    /// The sun that shines, if there is one.
+    pub fn sun(&self) -> Option<SunSource> {
+        let loaded = self.loaded.as_ref()?;
+        let scene = &loaded.scene;
+        let sun = scene.environment.sun.as_ref()?;
+        let own = || SunSource::of(sun, scene.up, scene.radiance_unit);
+        Some(self.lighting.sun.unwrap_or_else(own))
     }
 
     /// Go back to the view that the scene opened with, with the axis up that is up now.

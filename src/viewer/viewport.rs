@@ -3,12 +3,13 @@
 use std::sync::{Arc, Weak};
 
 use eframe::{
-    egui::{self, Color32, Rect, TextureId, pos2},
+    egui::{self, Color32, Pos2, Rect, TextureId, pos2},
     egui_wgpu::RenderState,
 };
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::{
+    action::Action,
     camera::Camera,
     exposure,
     first_look::Interior,
@@ -353,12 +354,13 @@ pub fn viewport_ui(
     ui: &mut egui::Ui,
     viewport: Option<&mut Viewport>,
     state: &mut State,
+    actions: &mut Vec<Action>,
 ) -> Option<navigation::Picked> {
     let rect = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(rect);
     let response = ui.interact(rect, scene_id(), egui::Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Scene"));
-    let picked = navigation::navigate(ui, &response, state);
+    let picked = navigation::navigate(ui, &response, state, actions);
     ui.painter().rect_filled(rect, 0.0, ui.visuals().panel_fill);
     if let Some(viewport) = viewport {
         viewport.paint(ui, rect, state);
@@ -366,20 +368,47 @@ pub fn viewport_ui(
     if let Some(selection) = &state.selection {
         mark(ui, rect, &state.rig.current, &selection.pick);
     }
+    if state.panels.drags_sun
+        && let Some(loaded) = &state.loaded
+        && let Some(sun) = &loaded.scene.environment.sun
+    {
+        sun_marker(ui, rect, &state.rig.current, sun.direction);
+    }
     if state.loaded.is_some() {
         axes(ui, rect, &state.rig.current);
     }
     picked
 }
 
+/// Where a point, or with a fourth coordinate of 0 a direction, is seen; `None` behind the viewer.
+fn seen_at(rect: Rect, camera: &Camera, point: Vec4) -> Option<Pos2> {
+    let aspect = rect.width() / rect.height().max(1.0);
+    let clip = camera.clip_from_frame(aspect) * point;
+    (clip.w > 0.0).then(|| rect.center() + egui::vec2(clip.x, -clip.y) / clip.w * 0.5 * rect.size())
+}
+
+/// A disc with rays where the sun stands.
+fn sun_marker(ui: &egui::Ui, rect: Rect, camera: &Camera, direction: Vec3) {
+    const RADIUS: f32 = 7.0;
+    let Some(at) = seen_at(rect, camera, direction.extend(0.0)) else {
+        return;
+    };
+    let painter = ui.painter().with_clip_rect(rect);
+    for (width, color) in [(4.0, Color32::from_black_alpha(160)), (2.0, theme::SUN)] {
+        painter.circle_filled(at, RADIUS + 0.5 * width - 1.0, color);
+        for turn in 0..8 {
+            let arm = egui::Vec2::angled(turn as f32 * std::f32::consts::FRAC_PI_4);
+            let ray = [at + arm * (RADIUS + 3.0), at + arm * (RADIUS + 9.0)];
+            painter.line_segment(ray, egui::Stroke::new(width, color));
+        }
+    }
+}
+
 /// A ring around the picked point.
 fn mark(ui: &egui::Ui, rect: Rect, camera: &Camera, pick: &Pick) {
-    let aspect = rect.width() / rect.height().max(1.0);
-    let clip = camera.clip_from_frame(aspect) * pick.point.extend(1.0);
-    if clip.w <= 0.0 {
+    let Some(at) = seen_at(rect, camera, pick.point.extend(1.0)) else {
         return;
-    }
-    let at = rect.center() + egui::vec2(clip.x, -clip.y) / clip.w * 0.5 * rect.size();
+    };
     let painter = ui.painter().with_clip_rect(rect);
     painter.circle_stroke(
         at,
