@@ -158,7 +158,7 @@ pub fn cutout(
     with_picture(subject, camera, &view, |picture| {
         renderer.render_cutout(&target, picture)
     })?;
-    Ok(target.read(renderer.gpu(), view.tone_map, exposure_factor)?)
+    Ok(target.read(renderer.gpu(), exposure_factor)?)
 }
 
 /// A view with the exposure that the picture asks for, where it is automatic.

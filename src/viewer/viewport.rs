@@ -246,7 +246,6 @@ impl Viewport {
             canvas,
             gpu,
             exposure_factor: key.view.exposure_factor() / state.radiance_unit(),
-            tone_map: key.view.tone_map,
         })
     }
 

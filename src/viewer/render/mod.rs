@@ -388,6 +388,11 @@ impl Renderer {
         ] {
             self.draw_linear(&mut encoder, target, Some(background), picture, uploads);
         }
+        {
+            let mut pass = target.over_nothing.begin_display(&mut encoder);
+            pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+            self.tonemap_pass.draw_cutout(&self.gpu, &mut pass, target);
+        }
         self.gpu.queue.submit([encoder.finish()]);
     }
 
