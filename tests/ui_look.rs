@@ -191,7 +191,7 @@ fn a_saved_sky_whose_picture_is_gone_is_a_warning() {
     let harness = opened(SceneSource::File(path));
     assert!(is_told(
         &harness,
-        "the saved sky was not used: there is no such picture"
+        "The saved sky was not used: there is no such picture"
     ));
     let loaded = harness.state().state.loaded.as_ref().unwrap();
     assert!(loaded.scene.environment.is_default);
