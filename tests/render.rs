@@ -106,6 +106,7 @@ fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<
         snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     unless_no_adapter(headless::picture(subject, &camera(), view, SIZE))
 }
@@ -484,6 +485,7 @@ fn a_picture_that_is_too_large_is_one_sentence() {
         snapshot: &snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     match headless::picture(subject, &camera(), &view, [1_000_000, 2]) {
         Err(HeadlessError::NoAdapter(_)) => {}
@@ -554,6 +556,7 @@ fn edges_within_a_picture_are_the_same_without_its_background() {
         snapshot: &snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     let cutout = headless::cutout(subject, &camera(), &view, SIZE).expect("drawn before");
     let (mut between, mut covered) = (0, 0);
@@ -609,6 +612,7 @@ fn the_sky_is_seen_behind_the_scene_from_where_its_light_comes() {
             snapshot: &snapshot,
             errors: None,
             interior: None,
+            is_dark: false,
         };
         // Away from the walls, and slanted.
         let camera = Camera::looking(

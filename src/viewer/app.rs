@@ -197,6 +197,7 @@ impl eframe::App for App {
                     panels::scene::empty_ui(ui, rect, &mut self.state, &mut actions);
                 }
                 panels::scene::waiting_ui(ui, rect, &self.state);
+                panels::dark::dark_ui(ui, rect, &self.state, &mut actions);
                 panels::legend::legend_ui(ui, rect, &self.state);
                 picked
             })

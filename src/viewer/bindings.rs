@@ -252,7 +252,7 @@ pub fn bindings() -> Vec<Binding> {
         command(
             Key::S,
             File,
-            "Save camera and settings beside the scene",
+            "Save camera, settings and changed lights beside the scene",
             Action::SaveSidecar,
         ),
         command(Key::E, File, "Export the lit mesh…", Action::MeshDialog),

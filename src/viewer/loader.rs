@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     camera::Camera,
-    first_look::{Interior, first_look},
+    first_look::{Interior, first_look, shows_light},
 };
 use crate::{
     geometry::RayTree,
@@ -101,6 +101,7 @@ impl LoadedScene {
         let scene = scene.in_environment(environment);
         Self {
             lighting: lighting.clone(),
+            is_lit: self.is_lit || shows_light(&scene, &self.rays, &self.viewpoint),
             is_grey: is_grey(&scene),
             scene: Arc::new(scene),
             ..self.clone()

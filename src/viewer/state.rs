@@ -128,6 +128,17 @@ impl State {
         Some(self.lighting.sun.unwrap_or_else(own))
     }
 
+    /// Whether no light reaches what the scene shows first. The light that numerical errors let through is not exposed
+    /// then: surfaces are shown instead, unless somebody sets the exposure.
+    pub fn is_dark(&self) -> bool {
+        let mut materials = 0..self.materials.now.len();
+        let is_dark = self.loaded.as_ref().is_some_and(|loaded| !loaded.is_lit);
+        is_dark
+            && self.view.auto_exposure
+            && self.view.mode.is_light()
+            && !materials.any(|index| self.materials.is_lamp(index))
+    }
+
     /// Go back to the view that the scene opened with, with the axis up that is up now.
     pub fn look_first(&mut self) {
         if let Some(loaded) = &self.loaded {

@@ -79,6 +79,8 @@ impl MeterKey {
 #[derive(Clone)]
 struct PictureKey {
     staged: Arc<Staged>,
+    /// Whether there is no light to show.
+    is_unlit: bool,
     segments: Arc<Vec<SegmentInstance>>,
     camera: Camera,
     view: ViewSettings,
@@ -90,6 +92,7 @@ struct PictureKey {
 impl PartialEq for PictureKey {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.staged, &other.staged)
+            && self.is_unlit == other.is_unlit
             && Arc::ptr_eq(&self.segments, &other.segments)
             && self.camera == other.camera
             && self.view == other.view
@@ -169,7 +172,7 @@ impl Viewport {
         let is_first = state.exposure.target.is_none();
         // Lights that are dimmed would look as bright as before.
         let is_due = key.view.mode.is_light()
-            && key.staged.is_lit
+            && !key.is_unlit
             && (is_first || !state.materials.are_changed());
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
@@ -262,6 +265,7 @@ impl Viewport {
         let segments = lines.segments(state, &snapshot.clusters, marks_selection);
         Some(PictureKey {
             staged: staged.clone(),
+            is_unlit: !staged.is_lit || state.is_dark(),
             segments: segments.clone(),
             camera: state.rig.current,
             view: ViewSettings {
@@ -295,7 +299,7 @@ impl Viewport {
             errors: wanted.errors.as_ref(),
             camera: &key.camera,
             view: &key.view,
-            is_unlit: !key.staged.is_lit,
+            is_unlit: key.is_unlit,
             range: wanted.range,
             interior: key.interior,
             overlay: &overlay,

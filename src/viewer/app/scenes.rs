@@ -54,10 +54,6 @@ impl App {
             let text = wording::without_flags(&sentence);
             self.state.messages.push(Severity::Note, text);
         }
-        if loaded.scene.has_light() && !loaded.is_lit {
-            let text = "no light reaches what is seen first; make a lamp of a material: click a surface, then “Lamp”";
-            self.state.messages.push(Severity::Warning, text);
-        }
         if let Some(path) = loaded.source.path() {
             self.state.recent.push(path);
         }
