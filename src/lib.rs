@@ -6,6 +6,7 @@
 //!
 //! * [`scene`]: what is lit;
 //! * [`geometry`]: area vectors, exact polygon irradiance, sampling, rays;
+//! * [`sampling`]: random points of surfaces and emitters;
 //! * [`hierarchy`]: clusters, patches, elements and their directional tables;
 //! * [`transport`]: node pairs, that is kernel, link, oracle and refinement;
 //! * [`solver`]: one progressive step after the other, as a value without threads, clocks or globals;
@@ -26,6 +27,7 @@ pub mod geometry;
 pub mod hierarchy;
 pub mod metrics;
 pub mod reference;
+pub mod sampling;
 pub mod scene;
 pub mod solver;
 pub mod transport;

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::{
     light_flags::LightFlags,
-    values::{at_least_zero, name_of, number},
+    values::{at_least_zero, name_of, number, per_cent},
 };
 use crate::{
     export::{ColorOptions, MeshOptions, ToneMap},
@@ -97,6 +97,10 @@ pub struct SettingFlags {
     /// Settings to start from; single flags override it [default: normal]
     #[arg(long, value_enum, help_heading = "Settings")]
     pub preset: Option<Preset>,
+    /// Refine until the estimated error (trimmed RMS, upper end of its 95 % interval) is at most this, in per cent of the root
+    /// mean square of the light: 2 or 2% [default: none, the preset ends the run]
+    #[arg(long, value_name = "PERCENT", value_parser = per_cent, conflicts_with_all = ["preset", "max_steps"], help_heading = "Settings")]
+    pub error: Option<f32>,
     /// How clusters store power and area
     #[arg(
         long,
@@ -197,10 +201,11 @@ pub struct SettingFlags {
 impl SettingFlags {
     /// The preset with every given flag put in.
     pub fn settings(&self) -> SolveSettings {
-        let preset = match self.preset.unwrap_or_default() {
-            Preset::Draft => SolveSettings::draft(),
-            Preset::Normal => SolveSettings::normal(),
-            Preset::Final => SolveSettings::finest(),
+        let preset = match (self.error, self.preset.unwrap_or_default()) {
+            (Some(error), _) => SolveSettings::towards(error),
+            (None, Preset::Draft) => SolveSettings::draft(),
+            (None, Preset::Normal) => SolveSettings::normal(),
+            (None, Preset::Final) => SolveSettings::finest(),
         };
         SolveSettings {
             method: self.method.unwrap_or(preset.method),
@@ -218,6 +223,7 @@ impl SettingFlags {
             mesh_tolerance: preset.mesh_tolerance,
             crease_degrees: preset.crease_degrees,
             tolerance: preset.tolerance,
+            error: preset.error,
         }
     }
 
@@ -232,6 +238,7 @@ impl SettingFlags {
     pub fn are_given(&self) -> bool {
         let Self {
             preset,
+            error,
             method,
             oracle,
             direct,
@@ -244,6 +251,7 @@ impl SettingFlags {
             keep_all,
         } = self;
         preset.is_some()
+            || error.is_some()
             || method.is_some()
             || oracle.is_some()
             || direct.is_some()

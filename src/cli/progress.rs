@@ -34,8 +34,11 @@ impl Progress {
 
     /// A step is done.
     pub(super) fn stepped(&mut self, report: &StepReport) {
+        let error = report
+            .estimated_error
+            .map_or_else(String::new, |error| format!(", error {}", error.text()));
         self.step = format!(
-            "step {}, ε {:.4}, {} links, residual {:.1e}",
+            "step {}{error}, ε {:.4}, {} links, residual {:.1e}",
             report.step, report.epsilon, report.links, report.residual
         );
         self.show();

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::{
     export::ColorOptions,
     metrics::ErrorMeasures,
-    reference::SampledSurfaces,
+    sampling::SampledSurfaces,
     scene::{Frame, Scene, Sky, Warning},
     solver::{Omitted, SolveSettings, StepReport},
     worker::StopReason,

@@ -15,8 +15,9 @@ use crate::{
     metrics::{ErrorMeasures, MeshLookup, measure_error},
     reference::{
         MatrixError, MatrixPatch, MatrixSettings, PathSettings, PathTracer, ReferencePoint,
-        sample_points, solve_matrix,
+        solve_matrix,
     },
+    sampling::{SurfacePoint, sample_points},
     scene::{Scene, TriangleId},
     solver::Snapshot,
     worker::MakeStepper,
@@ -92,7 +93,7 @@ impl Truth {
             .collect();
         let (chosen, surfaces) = sample_points(scene, &rays, MATRIX_POINTS, seed);
         let (mut points, mut probes) = (Vec::new(), Vec::new());
-        let patch_of = |point: &ReferencePoint| patches.get(&(point.triangle, point.is_back));
+        let patch_of = |point: &SurfacePoint| patches.get(&(point.triangle, point.is_back));
         for patch in chosen.iter().filter_map(patch_of) {
             points.push(matrix_point(scene, patch, Vec3::splat(1.0 / 3.0)));
             for probe in 0..MATRIX_PROBES {

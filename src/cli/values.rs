@@ -78,6 +78,15 @@ pub(super) fn at_least_zero(text: &str) -> Result<f32, String> {
     })
 }
 
+/// A share above 0 and up to 1, given in per cent, with or without its sign.
+pub(super) fn per_cent(text: &str) -> Result<f32, String> {
+    let text = text.trim_end_matches('%').trim_end();
+    number(text).and_then(|value| match value > 0.0 && value <= 100.0 {
+        true => Ok(value / 100.0),
+        false => Err("must be above 0 and at most 100".to_owned()),
+    })
+}
+
 /// The name of a value on the command line.
 pub(super) fn name_of(value: &impl ValueEnum) -> String {
     let value = value.to_possible_value();

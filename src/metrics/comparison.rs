@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Measurement, Runner, Trajectory, error_text, smallest_error};
-use crate::reference::SampledSurfaces;
+use crate::sampling::SampledSurfaces;
 
 /// Errors for which the table has the time.
 pub const TARGETS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];

@@ -2,7 +2,7 @@
 //!
 //! With x the luminance measured, r that of the reference and s its standard error, over n points:
 //! `E[(x − r)²]` is the squared error of x plus s², so s² is subtracted. The surfaces that means over the points stand for are given
-//! by [`SampledSurfaces`](crate::reference::SampledSurfaces). Points that emit are omitted, since their own light would
+//! by [`SampledSurfaces`](crate::sampling::SampledSurfaces). Points that emit are omitted, since their own light would
 //! dwarf the rest; where every point emits, all count.
 
 use glam::Vec3;

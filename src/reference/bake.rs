@@ -8,12 +8,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    emitters::Emitters,
     estimator::{Bounce, Estimator},
     outside::{Outside, Place},
 };
 use crate::{
     geometry::{Random, RayTree, centroid, low_discrepancy_2d},
+    sampling::Emitters,
     scene::{Scene, TriangleId},
 };
 

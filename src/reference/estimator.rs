@@ -9,12 +9,10 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::{Vec2, Vec3};
 
-use super::{
-    emitters::Emitters,
-    outside::{Outside, OutsideSquares, Place},
-};
+use super::outside::{Outside, OutsideSquares, Place};
 use crate::{
     geometry::{Hit, Random, RayTree, barycentric, cosine_direction},
+    sampling::Emitters,
     scene::{Scene, TriangleId},
 };
 

@@ -1,6 +1,6 @@
 //! Irradiance at random surface points by path tracing, pass by pass, with its standard error.
 //!
-//! For the points, and the surfaces that they stand for, see [`super::points`]. Each takes its samples in
+//! For the points, and the surfaces that they stand for, see [`crate::sampling`]. Each takes its samples in
 //! groups; a group covers the hemisphere with a randomly shifted low-discrepancy sequence, and since groups are
 //! independent their scatter gives an unbiased variance. All random numbers belong to a point and a group, so the
 //! result does not depend on threads.
@@ -11,14 +11,13 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    emitters::Emitters,
     estimator::{Bounce, Estimator},
     outside::{Outside, Place},
     point::ReferencePoint,
-    points::{SampledSurfaces, sample_points},
 };
 use crate::{
     geometry::{Random, RayTree, low_discrepancy_2d},
+    sampling::{Emitters, SampledSurfaces, sample_points},
     scene::{Scene, luminance},
 };
 
@@ -85,6 +84,7 @@ impl PathTracer {
     /// Choose the points. `rays` is the ray tree of the scene.
     pub fn new(scene: Arc<Scene>, rays: Arc<RayTree>, settings: PathSettings) -> Self {
         let (points, surfaces) = sample_points(&scene, &rays, settings.point_count, settings.seed);
+        let points: Vec<ReferencePoint> = points.into_iter().map(ReferencePoint::from).collect();
         Self {
             emitters: Emitters::new(&scene),
             outside: Outside::new(&scene),

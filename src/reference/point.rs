@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scene::TriangleId;
+use crate::{sampling::SurfacePoint, scene::TriangleId};
 
 /// A point of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +27,24 @@ pub struct ReferencePoint {
     pub irradiance_error: f32,
     /// Standard error of the luminance of the radiance, W·sr⁻¹·m⁻².
     pub standard_error: f32,
+}
+
+impl From<SurfacePoint> for ReferencePoint {
+    /// A point whose light is not yet known.
+    fn from(point: SurfacePoint) -> Self {
+        Self {
+            triangle: point.triangle,
+            is_back: point.is_back,
+            barycentric: point.barycentric,
+            position: point.position,
+            normal: point.normal,
+            reflectance: point.reflectance,
+            emission: point.emission,
+            irradiance: Vec3::ZERO,
+            irradiance_error: 0.0,
+            standard_error: 0.0,
+        }
+    }
 }
 
 impl ReferencePoint {

@@ -11,6 +11,10 @@ pub(super) const CONTRAST_TOLERANCE: f32 = 4.0;
 /// smaller costs rays, as one over its square.
 const NOISE_SHARE: f32 = 0.5;
 
+/// Power of the threshold with which the smallest area of elements falls in steps beyond the settings, as it does from preset
+/// to preset. Smaller, and the mesh cannot follow the links; larger, and elements become tiny.
+const AREA_EXPONENT: f32 = 1.5;
+
 /// Tolerances and limits of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
@@ -42,13 +46,13 @@ impl Limits {
         let tolerance = settings.mesh_tolerance * threshold_scale;
         Self {
             tolerance,
-            finest_tolerance: settings.mesh_tolerance,
+            finest_tolerance: settings.mesh_tolerance * threshold_scale.min(1.0),
             // Coarse steps are displayed only briefly.
             contrast: match is_coarse(threshold_scale) {
                 true => f32::INFINITY,
                 false => CONTRAST_TOLERANCE * tolerance,
             },
-            min_area: min_area(settings, hierarchy),
+            min_area: min_area(settings, hierarchy) * threshold_scale.min(1.0).powf(AREA_EXPONENT),
             shadow_samples: shadow_samples(settings, is_coarse(threshold_scale)),
             seed: settings.seed,
             most_elements,

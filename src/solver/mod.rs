@@ -4,10 +4,12 @@
 //! A step lowers the threshold, divides elements where linear interpolation of the light errs, refines the existing
 //! links, iterates gathering and pushing until the light converges, and gathers once more for the vertices.
 
+mod accuracy;
 mod budget;
 mod cancel;
 mod coverage;
 mod direct;
+mod estimate;
 mod iteration;
 mod limits;
 mod omission;
@@ -29,8 +31,8 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, InspectedLink, Inspection, Note, Omitted, PathNode, Place, Relit,
-    Snapshot, StepReport, Subject, VertexLight,
+    ClusterBox, DisplayMesh, EstimatedError, InspectedLink, Inspection, Note, Obstacle, Omitted,
+    PathNode, Place, Relit, Snapshot, StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

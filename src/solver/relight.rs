@@ -6,11 +6,12 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Relit, Solver, StepReport,
+    Cancel, Direct, Relit, Solver, StepReport,
     direct::{Shooting, Surfaces},
     relighting,
     schedule::threshold_scale,
     shown,
+    vertices::{self, FinalGather},
 };
 use crate::scene::Appearance;
 
@@ -27,7 +28,33 @@ impl Solver {
             self.vertex_factors = before;
             return None;
         }
+        report.estimated_error = self.estimate_error(cancel);
         Some(report)
+    }
+
+    /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.
+    pub(super) fn final_gather(
+        &mut self,
+        threshold_scale: f32,
+        cancel: &Cancel,
+    ) -> Option<Vec<Vec4>> {
+        let tolerance = threshold_scale * self.settings.tolerance;
+        let squares = match self.settings.direct {
+            Direct::Linked => self.gathered(&self.linked.squares(&self.hierarchy), cancel)?,
+            Direct::Sampled => Vec::new(),
+        };
+        let gather = FinalGather {
+            surfaces: self.surfaces(),
+            leaves: &self.leaves,
+            squares: &squares,
+            rays: &self.rays,
+            limits: self.limits(threshold_scale),
+            converged_change: vertices::converged_change(tolerance, self.mean_irradiance),
+            cancel,
+        };
+        let found = gather.run()?;
+        self.ray_count += found.ray_count;
+        Some(found.factors)
     }
 
     /// Light the scene with these appearances, one for each material (see
@@ -57,6 +84,9 @@ impl Solver {
                 cancel,
             };
             self.ray_count += self.relighting.mix_direct(field, shooting, &appearances)?;
+        }
+        if let Some(estimator) = &mut self.estimator {
+            estimator.forget_direct_light();
         }
         // The new colours.
         let emitted_before = relighting::emitted(&self.hierarchy);

@@ -93,6 +93,7 @@ impl Relighting {
             sweeps: 0,
             is_final: false,
             is_full: false,
+            estimated_error: None,
             ..self.last_report()
         }
     }

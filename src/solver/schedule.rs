@@ -8,9 +8,9 @@ pub(super) const THRESHOLD_FACTOR: f32 = 2.0;
 /// pictures are rougher than their links; larger, and they come later.
 const COARSE_THRESHOLD_SCALE: f32 = 4.0;
 
-/// The threshold of a step (counted from 1) over that of the last of `step_count` steps; at least 1.
+/// The threshold of a step (counted from 1) over that of the last of `step_count` steps; below 1 for steps beyond these.
 pub(super) fn threshold_scale(step: u32, step_count: u32) -> f32 {
-    THRESHOLD_FACTOR.powi(step_count.saturating_sub(step) as i32)
+    THRESHOLD_FACTOR.powi(step_count as i32 - step as i32)
 }
 
 /// Whether a step of this threshold scale is coarse.

@@ -105,6 +105,10 @@ pub struct SolveSettings {
     /// Sweeps stop when the residual, and the step to the accelerated solution, are below this fraction of the total
     /// power; above 0.
     pub tolerance: f32,
+    /// Error at which the solve ends, if one is asked for: the upper end of the interval of the trimmed RMS error (see
+    /// [`EstimatedError`](super::EstimatedError)), above 0. Steps then go on beyond `max_steps` with thresholds below
+    /// `epsilon`.
+    pub error: Option<f32>,
     /// Seed of every random choice.
     pub seed: u64,
     /// Parts that are computed even where the scene does not need them.
@@ -139,8 +143,19 @@ impl SolveSettings {
             crease_degrees: 30.0,
             max_steps: 5,
             tolerance: 1e-3,
+            error: None,
             seed: 1,
             keep: Keep::NONE,
+        }
+    }
+
+    /// Steps until the estimated error is this small, relative; above 0.
+    pub const fn towards(error: f32) -> Self {
+        Self {
+            shadow_samples: 32,
+            min_area: 1e-6,
+            error: Some(error),
+            ..Self::draft()
         }
     }
 
@@ -201,6 +216,7 @@ impl SolveSettings {
             crease_degrees,
             max_steps,
             tolerance,
+            error,
         } = self;
         // A NaN is out of every range.
         for (name, value) in [("epsilon", *epsilon), ("min_area", *min_area)] {
@@ -211,6 +227,7 @@ impl SolveSettings {
         for (name, value) in [
             ("mesh_tolerance", *mesh_tolerance),
             ("tolerance", *tolerance),
+            ("error", error.unwrap_or(1.0)),
         ] {
             if !(f32::MIN_POSITIVE..=f32::MAX).contains(&value) {
                 return sentence(name, &value, "a number above 0");

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Direct, Snapshot, SolveSettings, StepReport,
+    Cancel, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, CoverageMap},
     direct::{self, DirectFields, Surfaces},
+    estimate::ErrorEstimator,
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
     places,
@@ -18,7 +19,7 @@ use super::{
     schedule::{is_coarse, threshold_scale},
     shown::{self, View},
     textures::Painted,
-    vertices::{self, FinalGather, LeafLight},
+    vertices::{self, LeafLight},
 };
 use crate::{
     geometry::RayTree,
@@ -57,8 +58,10 @@ pub struct Solver {
     pub(super) step: u32,
     pub(super) ray_count: u64,
     /// Whether the memory limit prevented finer links or elements in the last step.
-    is_full: bool,
+    pub(super) is_full: bool,
     pub(super) relighting: Relighting,
+    /// Points and rays that estimate the error of a step; `None` before the first.
+    pub(super) estimator: Option<ErrorEstimator>,
     pub(super) snapshot: Snapshot,
 }
 
@@ -118,6 +121,7 @@ impl Solver {
             ray_count,
             is_full: false,
             relighting: Relighting::new(&scene),
+            estimator: None,
             snapshot: Snapshot::default(),
             scene,
             settings,
@@ -202,16 +206,25 @@ impl Solver {
         // Light at the corners of each leaf, from its links.
         self.gather_for_leaves(cancel)?;
         cancel.proceed()?;
-        // In the last step, factors of the linked light from rays at the vertices.
+        // Where the error is small enough, this step is the last.
         self.vertex_factors.clear();
-        if self.is_full || report.step >= step_count {
-            self.vertex_factors = self.final_gather(1.0, cancel)?;
+        let mut is_last = self.is_full || report.step >= step_count;
+        if self.settings.error.is_some() && !is_last {
+            self.show(report.step, cancel)?;
+            let estimated = self.estimate_error(cancel)?;
+            is_last = self.is_error_reached(estimated);
+        }
+        // In the last step, factors of the linked light from rays at the vertices.
+        if is_last {
+            self.vertex_factors = self.final_gather(threshold_scale.min(1.0), cancel)?;
         }
         // Figures and picture.
         self.fill(&mut report);
         self.show(report.step, cancel)?;
+        let estimated = self.estimate_error(cancel)?;
+        report.estimated_error = Some(estimated);
         self.step = report.step;
-        report.is_final = report.is_full || self.step >= step_count;
+        report.is_final = is_last && self.ends_with(estimated, &mut report);
         self.relighting.end_step(&report);
         Some(report)
     }
@@ -227,6 +240,10 @@ impl Solver {
             + size_of_val(self.leaves.as_slice())
             + size_of_val(self.vertex_factors.as_slice())
             + self.relighting.memory_bytes()
+            + self
+                .estimator
+                .as_ref()
+                .map_or(0, ErrorEstimator::memory_bytes)
             + self.snapshot.memory_bytes();
         Budget {
             limit: self.memory_limit,
@@ -234,7 +251,7 @@ impl Solver {
         }
     }
 
-    fn limits(&self, threshold_scale: f32) -> Limits {
+    pub(super) fn limits(&self, threshold_scale: f32) -> Limits {
         let most = self.budget().most_elements(self.surfaces(), &self.linked);
         Limits::new(&self.settings, &self.hierarchy, threshold_scale, most)
     }
@@ -372,7 +389,7 @@ impl Solver {
     }
 
     /// Light of the leaves, gathered over the links from these source tables.
-    fn gathered(&self, tables: &Tables, cancel: &Cancel) -> Option<Vec<LeafLight>> {
+    pub(super) fn gathered(&self, tables: &Tables, cancel: &Cancel) -> Option<Vec<LeafLight>> {
         let kernel = Kernel {
             hierarchy: &self.hierarchy,
             tables,
@@ -380,31 +397,6 @@ impl Solver {
         };
         let (surfaces, links) = (self.surfaces(), &self.linked.links);
         vertices::gather_leaves(kernel, surfaces, links, &self.coverage, cancel)
-    }
-
-    /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.
-    pub(super) fn final_gather(
-        &mut self,
-        threshold_scale: f32,
-        cancel: &Cancel,
-    ) -> Option<Vec<Vec4>> {
-        let tolerance = threshold_scale * self.settings.tolerance;
-        let squares = match self.settings.direct {
-            Direct::Linked => self.gathered(&self.linked.squares(&self.hierarchy), cancel)?,
-            Direct::Sampled => Vec::new(),
-        };
-        let gather = FinalGather {
-            surfaces: self.surfaces(),
-            leaves: &self.leaves,
-            squares: &squares,
-            rays: &self.rays,
-            limits: self.limits(threshold_scale),
-            converged_change: vertices::converged_change(tolerance, self.mean_irradiance),
-            cancel,
-        };
-        let found = gather.run()?;
-        self.ray_count += found.ray_count;
-        Some(found.factors)
     }
 
     /// Fill in the figures of the present state.

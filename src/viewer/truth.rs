@@ -248,7 +248,7 @@ mod tests {
         Event::Stepped(StepReport {
             step,
             elapsed_s: f64::from(step),
-            estimated_error: 0.5,
+            error_bound: 0.5,
             ..StepReport::default()
         })
     }

@@ -21,7 +21,8 @@ pub enum Effect {
 ///   vertices that exist were made by the old value;
 /// * `samples`: restarts where the oracle uses it, else continues;
 /// * `epsilon`, `min_area`, `mesh_tolerance`, `tolerance`: lower refines, higher continues;
-/// * `max_steps`: more refines, fewer continues.
+/// * `max_steps`: more refines, fewer continues;
+/// * `error`: refines, since steps go on or end by it.
 pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
     if old == new {
         return Effect::Nothing;
@@ -40,6 +41,7 @@ pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
         crease_degrees,
         max_steps,
         tolerance,
+        error,
         seed,
         keep,
     } = new;
@@ -56,7 +58,8 @@ pub fn effect_of_change(old: &SolveSettings, new: &SolveSettings) -> Effect {
         || *min_area < old.min_area
         || *mesh_tolerance < old.mesh_tolerance
         || *tolerance < old.tolerance
-        || *max_steps > old.max_steps;
+        || *max_steps > old.max_steps
+        || *error != old.error;
     if restarts {
         Effect::Restarts
     } else if refines {

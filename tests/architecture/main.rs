@@ -14,9 +14,10 @@ use std::{
 use circles::{ModulePath, SiblingImports, circle, sibling_imports, upward};
 
 /// From the top of the house to its foundation's users; a room may import those before it.
-const ROOMS: [&str; 11] = [
+const ROOMS: [&str; 12] = [
     "scene",
     "geometry",
+    "sampling",
     "hierarchy",
     "transport",
     "solver",
@@ -66,9 +67,11 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "budget",
             "refine",
             "relighting",
+            "estimate",
             "shown",
             "state",
             "queries",
+            "accuracy",
             "relight",
         ],
     ),

@@ -5,13 +5,16 @@
 
 use glam::Vec4;
 
-use super::{field::DirectField, lights::Lights};
+use super::{field::DirectField, lights::Lights, samples::DirectLight};
 use crate::{
     geometry::RayTree,
     hierarchy::{Channels as _, Hierarchy},
     scene::Scene,
     solver::{
-        Cancel, Direct, SolveSettings, limits::Limits, places::OffsetPlaces, sums::area_total,
+        Cancel, Direct, SolveSettings,
+        limits::Limits,
+        places::{OffsetPlaces, Receiver},
+        sums::area_total,
     },
 };
 
@@ -22,6 +25,10 @@ pub(crate) struct DirectFields {
     /// Stands for the offset places where nothing is sampled.
     no_offsets: OffsetPlaces,
 }
+
+/// Direct light at points apart from the mesh: by field, and by point.
+#[derive(Default)]
+pub(crate) struct PointLight(Vec<Vec<DirectLight>>);
 
 impl DirectFields {
     /// The fields before any sample. Emission that is linked has none; the sky and the sun are then read from
@@ -234,6 +241,50 @@ impl DirectFields {
             .enumerate()
             .filter(|&(other, _)| other != index);
         others.map(|(_, field)| field.mean(hierarchy)).sum()
+    }
+
+    /// Number of fields.
+    pub(crate) fn count(&self) -> usize {
+        self.fields.len()
+    }
+
+    /// Shoot shadow rays of each field from points until each has had the number `wanted` for it. Returns the rays shot; `None` when
+    /// cancelled.
+    pub(crate) fn sample_points(
+        &self,
+        rays: &RayTree,
+        points: &[Receiver],
+        wanted: &[u32],
+        seed: u64,
+        known: &mut PointLight,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let shot = |known: &PointLight| -> u64 {
+            let all = known.0.iter().flatten();
+            all.map(|light| u64::from(light.shot)).sum()
+        };
+        let before = shot(known);
+        let dark = || vec![DirectLight::default(); points.len()];
+        known.0.resize_with(self.fields.len(), dark);
+        for (field, known) in self.fields.iter().zip(&mut known.0) {
+            let wanted = |point: usize, _: &DirectLight| wanted[point];
+            field
+                .lights
+                .shoot(rays, points, wanted, seed, known, cancel);
+        }
+        if cancel.is_cancelled() {
+            *known = PointLight::default();
+            return None;
+        }
+        Some(shot(known).saturating_sub(before))
+    }
+
+    /// Direct irradiance of a point that was sampled, W/m².
+    pub(crate) fn at_point(&self, known: &PointLight, point: usize) -> Vec4 {
+        let fields = self.fields.iter().zip(&known.0);
+        fields
+            .map(|(field, known)| field.lights.bounded(known[point].irradiance()))
+            .sum()
     }
 
     /// Memory in bytes.

@@ -23,6 +23,6 @@ mod vertex_samples;
 pub(crate) use adapt::divide_coarse;
 pub(crate) use border::SPREAD_SHARE;
 pub(crate) use field::DirectField;
-pub(crate) use fields::DirectFields;
+pub(crate) use fields::{DirectFields, PointLight};
 pub(crate) use light_parts::{LightParts, Shooting, common_ratio};
 pub(crate) use surfaces::Surfaces;

@@ -1,5 +1,6 @@
 //! Plain data that a solve hands out: snapshots, reports, inspections, omissions.
 
+mod estimated_error;
 mod inspection;
 mod note;
 mod omitted;
@@ -7,8 +8,9 @@ mod relit;
 mod snapshot;
 mod step_report;
 
+pub use estimated_error::EstimatedError;
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
-pub use note::Note;
+pub use note::{Note, Obstacle};
 pub use omitted::Omitted;
 pub use relit::Relit;
 pub use snapshot::{ClusterBox, DisplayMesh, Snapshot, VertexLight};

@@ -25,6 +25,24 @@ pub enum Note {
     },
     /// The memory limit prevented finer links or elements.
     MemoryLimit,
+    /// The error that was asked for is not reached, and further steps do not lead there.
+    ErrorNotReached {
+        /// The error that was asked for, relative.
+        wanted: f32,
+        /// What stands in the way.
+        obstacle: Obstacle,
+    },
+}
+
+/// What stands in the way of a smaller error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// The memory limit.
+    Memory,
+    /// The estimate says that the error is small enough, but its interval is too wide.
+    Noise,
+    /// Finer links and elements no longer reduce the error.
+    Mesh,
 }
 
 impl fmt::Display for Note {
@@ -44,6 +62,17 @@ impl fmt::Display for Note {
                 out,
                 "the links are too coarse to conserve energy: unscaled, they would return {gain:.2} times the light \
                  that is sent in each sweep; scaled to the hemisphere coverage, they do not"
+            ),
+            Self::ErrorNotReached { wanted, obstacle } => write!(
+                out,
+                "an error of {} % is not reached: {}",
+                100.0 * wanted,
+                match obstacle {
+                    Obstacle::Memory => "the memory limit allows no finer links and elements",
+                    Obstacle::Noise =>
+                        "the estimated error is that small, but its interval is not, and no more rays are shot for it",
+                    Obstacle::Mesh => "finer links and elements no longer reduce the error",
+                }
             ),
             Self::MemoryLimit => {
                 out.write_str("the memory limit is reached; refinement stops here with what fits")

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::note::Note;
+use super::{estimated_error::EstimatedError, note::Note};
 
 /// Figures of one step. Quantities in world units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -43,7 +43,9 @@ pub struct StepReport {
     /// Largest sum of form factors of an element.
     pub row_sum_max: f32,
     /// Sum of the estimated errors of the links, root mean square over the area, relative to the mean irradiance.
-    pub estimated_error: f32,
+    pub error_bound: f32,
+    /// Estimated error of the light shown; `None` where it was not estimated.
+    pub estimated_error: Option<EstimatedError>,
     /// Whether this is the last step.
     pub is_final: bool,
     /// Whether the memory limit prevented finer links or elements; further steps would be limited alike.

@@ -26,7 +26,7 @@ pub(crate) fn fill(
     report.elements = leaves.len() as u64;
     report.vertices = hierarchy.mesh.vertices.len() as u64;
     report.energy_balance = energy_balance(surfaces, linked);
-    report.estimated_error = estimated_error(surfaces, linked, leaves);
+    report.error_bound = error_bound(surfaces, linked, leaves);
     fill_row_sums(report, hierarchy, linked);
 }
 
@@ -50,7 +50,7 @@ fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
 }
 
 /// Root mean square over the area of the sum of link errors, relative to the mean irradiance.
-fn estimated_error(surfaces: Surfaces<'_>, linked: &LinkedLight, leaves: &[LeafLight]) -> f32 {
+fn error_bound(surfaces: Surfaces<'_>, linked: &LinkedLight, leaves: &[LeafLight]) -> f32 {
     let hierarchy = surfaces.hierarchy;
     let sum: f64 = leaves
         .iter()

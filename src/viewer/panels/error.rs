@@ -124,7 +124,7 @@ fn figures_ui(ui: &mut egui::Ui, truth: &Truth) {
         row::figure(
             ui,
             "Error bound",
-            bound(f64::from(report.estimated_error)),
+            bound(f64::from(report.error_bound)),
             "What the solver guarantees by itself, of the irradiance; the same as under 'Progress'",
         );
     });
@@ -151,7 +151,7 @@ fn steps_ui(ui: &mut egui::Ui, truth: &Truth) {
             for (step, report, error) in truth.steps_of(run) {
                 ui.label(step.to_string());
                 ui.label(seconds(report.elapsed_s));
-                ui.label(bound(f64::from(report.estimated_error)));
+                ui.label(bound(f64::from(report.error_bound)));
                 ui.label(measured(error.relative_rms, error));
                 ui.label(measured(error.relative_rms_trimmed, error));
                 ui.end_row();

@@ -33,7 +33,7 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         (
             "Error bound",
             theme::SELECTED,
-            (|report| report.estimated_error) as fn(&StepReport) -> f32,
+            (|report| report.error_bound) as fn(&StepReport) -> f32,
         ),
         ("Residual", theme::axis_color(2), |report| report.residual),
     ];

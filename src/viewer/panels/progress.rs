@@ -162,7 +162,7 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
         );
         row(
             "Error bound",
-            &|report| bound(f64::from(report.estimated_error)),
+            &|report| bound(f64::from(report.error_bound)),
             "Worst case over the intervals of all links, relative to the mean irradiance. The real error is far below: \
              'Measured error' in the panel on the right shows it once a reference is traced",
         );

@@ -79,6 +79,7 @@ fn with_quality_of(preset: &SolveSettings, settings: &SolveSettings) -> SolveSet
         mesh_tolerance: preset.mesh_tolerance,
         max_steps: preset.max_steps,
         tolerance: preset.tolerance,
+        error: preset.error,
     }
 }
 

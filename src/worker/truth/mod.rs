@@ -21,7 +21,7 @@ use super::{Generation, Wake, Watch, request::describe};
 use crate::{
     geometry::RayTree,
     metrics::ErrorMeasures,
-    reference::SampledSurfaces,
+    sampling::SampledSurfaces,
     scene::Scene,
     solver::{DisplayMesh, Snapshot},
 };

@@ -8,17 +8,17 @@ use crate::{
 };
 
 /// A point on an emitter.
-pub(super) struct EmitterPoint {
+pub struct EmitterPoint {
     /// Where it lies.
-    pub(super) triangle: TriangleId,
+    pub triangle: TriangleId,
     /// Its position in frame units.
-    pub(super) position: Vec3,
+    pub position: Vec3,
     /// Its place in the triangle.
-    pub(super) barycentric: Vec3,
+    pub barycentric: Vec3,
 }
 
 /// Chooses points of emitters with a density proportional to the luminance that their triangle emits from both sides.
-pub(super) struct Emitters {
+pub struct Emitters {
     triangles: Vec<TriangleId>,
     /// Running sums of power; the last is the total.
     cumulative: Vec<f64>,
@@ -28,7 +28,7 @@ pub(super) struct Emitters {
 
 impl Emitters {
     /// All emitters of a scene.
-    pub(super) fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene) -> Self {
         let mut emitters = Self {
             triangles: Vec::new(),
             cumulative: Vec::new(),
@@ -51,17 +51,17 @@ impl Emitters {
     }
 
     /// Whether nothing emits.
-    pub(super) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
     /// Probability per area of choosing a point of this triangle.
-    pub(super) fn density(&self, triangle: TriangleId) -> f32 {
+    pub fn density(&self, triangle: TriangleId) -> f32 {
         self.density[triangle.index()]
     }
 
     /// The point that belongs to a number in 0…1 and a point of the unit square, if anything emits.
-    pub(super) fn sample(&self, scene: &Scene, choice: f64, square: Vec2) -> Option<EmitterPoint> {
+    pub fn sample(&self, scene: &Scene, choice: f64, square: Vec2) -> Option<EmitterPoint> {
         let total = *self.cumulative.last()?;
         let index = self
             .cumulative

@@ -1,4 +1,4 @@
-//! The points of the reference: random points of the surfaces whose light is to be measured.
+//! Random points of the surfaces whose light is to be measured.
 //!
 //! Points lie on sides that reflect and do not emit all over: elsewhere there is no error to see, and a sky would take
 //! nearly all of them. They are uniform over the area, so plain means over them are area-weighted. Where most of the area
@@ -11,13 +11,13 @@ use std::{cell::LazyCell, collections::HashMap, fmt};
 use glam::{DVec3, Vec2, Vec3};
 use serde::Serialize;
 
-use super::{ReferencePoint, emitters::Emitters};
+use super::{SurfacePoint, emitters::Emitters};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     scene::{DisjointSets, Scene, TriangleId},
 };
 
-/// The surfaces that the points of a reference stand for.
+/// The surfaces that the points stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SampledSurfaces {
     /// Whether nothing reflects without emitting, so that all surfaces count.
@@ -74,13 +74,13 @@ const LIGHT_RAYS: u32 = 256;
 /// Their stream of random numbers, apart from those of points.
 const LIGHT_STREAM: u64 = 1 << 63;
 
-/// Choose `count` points, not yet lit; fewer where there is no surface. The same for the same seed.
+/// Choose `count` points; fewer where there is no surface. The same for the same seed.
 pub fn sample_points(
     scene: &Scene,
     rays: &RayTree,
     count: u32,
     seed: u64,
-) -> (Vec<ReferencePoint>, SampledSurfaces) {
+) -> (Vec<SurfacePoint>, SampledSurfaces) {
     let all: Vec<Side> = lit_sides(scene).collect();
     let mut counted: Vec<Side> = all
         .iter()
@@ -91,7 +91,7 @@ pub fn sample_points(
     if all_emit {
         counted.clone_from(&all);
     }
-    let counts = |point: &ReferencePoint| all_emit || shows_error(scene, point.triangle);
+    let counts = |point: &SurfacePoint| all_emit || shows_error(scene, point.triangle);
     // One run over all lit sides serves most scenes: few of its points are lost on emitters.
     let whole = |sides: &[Side]| -> Vec<Piece> {
         let pieces = sides.iter().map(|&side| Piece::whole(scene, side));
@@ -106,7 +106,7 @@ pub fn sample_points(
             let outer = (f64::from(count) * SURROUNDINGS_SHARE) as u32;
             let (near, far) = drawn
                 .into_iter()
-                .partition(|point: &ReferencePoint| region.contains(point.position.as_dvec3()));
+                .partition(|point: &SurfacePoint| region.contains(point.position.as_dvec3()));
             let (inside, outside) = region.split(scene, &counted);
             vec![(near, inside, count - outer), (far, outside, outer)]
         }
@@ -194,7 +194,7 @@ fn area_of(scene: &Scene, triangle: TriangleId) -> f64 {
 }
 
 /// Points uniform over the area: systematically along the running area, low-discrepancy within a piece.
-fn draw(scene: &Scene, pieces: &[Piece], count: u32, random: &mut Random) -> Vec<ReferencePoint> {
+fn draw(scene: &Scene, pieces: &[Piece], count: u32, random: &mut Random) -> Vec<SurfacePoint> {
     let offset = f64::from(random.uniform());
     let shift = random.uniform_2d();
     let total: f64 = pieces.iter().map(|piece| piece.area).sum();
@@ -212,7 +212,7 @@ fn draw(scene: &Scene, pieces: &[Piece], count: u32, random: &mut Random) -> Vec
 }
 
 /// As many of the points as wanted, evenly chosen; all where there are fewer.
-fn thinned(points: Vec<ReferencePoint>, wanted: usize) -> Vec<ReferencePoint> {
+fn thinned(points: Vec<SurfacePoint>, wanted: usize) -> Vec<SurfacePoint> {
     let count = points.len();
     if count <= wanted {
         return points;
@@ -222,8 +222,8 @@ fn thinned(points: Vec<ReferencePoint>, wanted: usize) -> Vec<ReferencePoint> {
         .collect()
 }
 
-/// The point of a piece that belongs to a point of the unit square, not yet lit.
-fn point_of(scene: &Scene, piece: &Piece, square: Vec2) -> ReferencePoint {
+/// The point of a piece that belongs to a point of the unit square.
+fn point_of(scene: &Scene, piece: &Piece, square: Vec2) -> SurfacePoint {
     let within = triangle_point(square);
     let [u, v, w] = piece.corners;
     let barycentric = if piece.corners == WHOLE {
@@ -237,7 +237,7 @@ fn point_of(scene: &Scene, piece: &Piece, square: Vec2) -> ReferencePoint {
     let front = scene.surfaces[triangle.index()]
         .area_vector
         .normalize_or_zero();
-    ReferencePoint {
+    SurfacePoint {
         triangle,
         is_back,
         barycentric,
@@ -245,9 +245,6 @@ fn point_of(scene: &Scene, piece: &Piece, square: Vec2) -> ReferencePoint {
         normal: if is_back { -front } else { front },
         reflectance: scene.reflectance_at(triangle, barycentric),
         emission: scene.emission_at(triangle, barycentric),
-        irradiance: Vec3::ZERO,
-        irradiance_error: 0.0,
-        standard_error: 0.0,
     }
 }
 
@@ -503,7 +500,7 @@ mod tests {
             }
         }
 
-        fn sample(self) -> (Scene, Vec<ReferencePoint>, SampledSurfaces) {
+        fn sample(self) -> (Scene, Vec<SurfacePoint>, SampledSurfaces) {
             let scene = self
                 .0
                 .finish(&SceneOptions::with_sides(Sides::One))
@@ -520,9 +517,9 @@ mod tests {
     }
 
     /// How many of the points lie this near to a world point.
-    fn near(scene: &Scene, points: &[ReferencePoint], at: DVec3, radius: f64) -> usize {
+    fn near(scene: &Scene, points: &[SurfacePoint], at: DVec3, radius: f64) -> usize {
         let is_near =
-            |point: &&ReferencePoint| scene.frame.to_world(point.position).distance(at) <= radius;
+            |point: &&SurfacePoint| scene.frame.to_world(point.position).distance(at) <= radius;
         points.iter().filter(is_near).count()
     }
 

@@ -1,0 +1,60 @@
+//! The estimated error of `Solver`, and the end of a solve by the error that is asked for.
+
+use super::{
+    Cancel, EstimatedError, Note, Obstacle, Solver, StepReport,
+    direct::Surfaces,
+    estimate::{self, ErrorEstimator},
+    settings::FINEST_THRESHOLD,
+};
+
+impl Solver {
+    /// Whether an error is as small as was asked for.
+    pub(super) fn is_error_reached(&self, estimated: EstimatedError) -> bool {
+        let wanted = self.settings.error;
+        wanted.is_some_and(|wanted| estimated.trimmed_high <= f64::from(wanted))
+    }
+
+    /// Whether the solve ends with a step as fine as the settings ask, or goes on to the error that is asked for. Notes
+    /// where that error cannot be reached.
+    pub(super) fn ends_with(&mut self, estimated: EstimatedError, report: &mut StepReport) -> bool {
+        let Some(wanted) = self.settings.error else {
+            return true;
+        };
+        if self.is_error_reached(estimated) {
+            return true;
+        }
+        let advances = self
+            .estimator
+            .as_mut()
+            .is_some_and(|estimator| estimator.advances(estimated));
+        let obstacle = match () {
+            () if self.is_full => Obstacle::Memory,
+            () if advances && report.epsilon > FINEST_THRESHOLD => return false,
+            () if estimated.trimmed_rms <= f64::from(wanted) => Obstacle::Noise,
+            () => Obstacle::Mesh,
+        };
+        report
+            .notes
+            .push(Note::ErrorNotReached { wanted, obstacle });
+        true
+    }
+
+    /// Estimate the error of the light shown.
+    pub(super) fn estimate_error(&mut self, cancel: &Cancel) -> Option<EstimatedError> {
+        let (scene, rays) = (&self.scene, &self.rays);
+        let shown = estimate::Shown {
+            scene,
+            settings: &self.settings,
+            surfaces: Surfaces::new(&self.hierarchy, &self.direct),
+            sees_outside: self.plan.sees_outside,
+            irradiance: &self.snapshot.light.irradiance,
+            solve_rays: self.ray_count,
+            cancel,
+        };
+        let seed = self.settings.seed;
+        let estimator = self
+            .estimator
+            .get_or_insert_with(|| ErrorEstimator::new(scene, &self.hierarchy, rays, seed));
+        estimator.estimate(shown)
+    }
+}

@@ -1,0 +1,113 @@
+//! Figures of an estimate from the errors at its points.
+
+use glam::Vec3;
+
+use super::samples::Stored;
+use crate::{hierarchy::luminance, solver::EstimatedError};
+
+/// Standard errors to either side that hold 95 %.
+const DEVIATIONS: f64 = 1.96;
+
+/// One in so many points is omitted by trimmed figures.
+const TRIMMED_PART: usize = 100;
+
+/// Standard errors by which a point must be wrong to be omitted: the product of two errors is large where their noise
+/// agrees by chance. Smaller, and such points are omitted and the others are too small; larger, and nothing is.
+const OUTLIER_DEVIATIONS: f64 = 4.0;
+
+/// Reflected light at a point, luminance; the common factor 1/π is left out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reflected {
+    stored: f64,
+    /// Its error, by two independent estimates.
+    errors: [f64; 2],
+}
+
+impl Reflected {
+    /// From the light stored and two estimates of the error of its irradiance.
+    pub(super) fn new(stored: &Stored, errors: [Vec3; 2]) -> Self {
+        let of =
+            |irradiance: Vec3| f64::from(luminance((stored.reflectance * irradiance).extend(0.0)));
+        Self {
+            stored: of(stored.irradiance),
+            errors: errors.map(of),
+        }
+    }
+
+    fn error(&self) -> f64 {
+        0.5 * (self.errors[0] + self.errors[1])
+    }
+
+    fn square(&self) -> f64 {
+        self.errors[0] * self.errors[1]
+    }
+}
+
+/// A mean and its standard error.
+struct Mean {
+    mean: f64,
+    error: f64,
+}
+
+impl Mean {
+    fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
+        let count = values.clone().count().max(1) as f64;
+        let mean = values.clone().sum::<f64>() / count;
+        let square = values.map(|value| (value - mean).powi(2)).sum::<f64>();
+        Self {
+            mean,
+            error: (square / (count * (count - 1.0).max(1.0))).sqrt(),
+        }
+    }
+
+    /// The root of the mean and of both ends of its interval, over a scale.
+    fn roots(&self, scale: f64) -> [f64; 3] {
+        let half = DEVIATIONS * self.error;
+        [self.mean, self.mean - half, self.mean + half]
+            .map(|square| (square.max(0.0).sqrt() / scale).min(f64::MAX))
+    }
+}
+
+/// All figures but the counts.
+pub(super) fn estimated(points: &[Reflected]) -> EstimatedError {
+    // The true light, squared by two estimates.
+    let truth = |point: &Reflected| {
+        let [first, second] = point.errors.map(|error| point.stored - error);
+        first * second
+    };
+    let scale = Mean::of(points.iter().map(truth)).mean.max(0.0).sqrt();
+    let scale = scale.max(1e-300);
+    let squares = Mean::of(points.iter().map(Reflected::square));
+    let [rms, rms_low, rms_high] = squares.roots(scale);
+    // Without the worst points, as far as noise does not explain them.
+    let noise = |point: &Reflected| (0.5 * (point.errors[0] - point.errors[1])).powi(2);
+    let noise = Mean::of(points.iter().map(noise)).mean.sqrt();
+    let mut kept: Vec<&Reflected> = points.iter().collect();
+    kept.sort_by(|a, b| b.error().abs().total_cmp(&a.error().abs()));
+    let is_outlier = |point: &&&Reflected| point.error().abs() > OUTLIER_DEVIATIONS * noise;
+    let outliers = kept.iter().take_while(is_outlier).count();
+    let trimmed = &kept[outliers.min(points.len() / TRIMMED_PART)..];
+    let squares = Mean::of(trimmed.iter().map(|point| point.square()));
+    let [trimmed_rms, trimmed_low, trimmed_high] = squares.roots(scale);
+    // Energy.
+    let stored = Mean::of(points.iter().map(|point| point.stored)).mean;
+    let error = Mean::of(points.iter().map(Reflected::error));
+    let energy = |error: f64| {
+        let truth = stored - error;
+        if truth > 0.0 { stored / truth } else { 1.0 }
+    };
+    let half = DEVIATIONS * error.error;
+    EstimatedError {
+        rms,
+        rms_low,
+        rms_high,
+        trimmed_rms,
+        trimmed_low,
+        trimmed_high,
+        energy: energy(error.mean),
+        energy_low: energy(error.mean - half),
+        energy_high: energy(error.mean + half),
+        points: 0,
+        rays: 0,
+    }
+}
