@@ -39,6 +39,9 @@ pub struct Viewport {
     lines: LineCache,
     metered: Option<MeterKey>,
     metering: Option<Metering>,
+    /// The light that was there when nothing but errors lit the scene. It is not shown while that of new lamps is on its
+    /// way, or the exposure would follow it.
+    dark: Option<Weak<VertexLight>>,
 }
 
 /// Everything that the automatic exposure depends on.
@@ -117,6 +120,7 @@ impl Viewport {
             lines: LineCache::default(),
             metered: None,
             metering: None,
+            dark: None,
         }
     }
 
@@ -261,11 +265,17 @@ impl Viewport {
     ) -> Option<PictureKey> {
         let staged = state.staged.as_ref()?;
         let snapshot = &staged.wanted.snapshot;
+        let light = &snapshot.light;
+        if state.is_dark() {
+            self.dark = Some(Arc::downgrade(light));
+        }
+        let mut dark = self.dark.iter();
+        let is_dark = dark.any(|dark| dark.ptr_eq(&Arc::downgrade(light)));
         let lines = &mut self.lines;
         let segments = lines.segments(state, &snapshot.clusters, marks_selection);
         Some(PictureKey {
             staged: staged.clone(),
-            is_unlit: !staged.is_lit || state.is_dark(),
+            is_unlit: !staged.is_lit || is_dark,
             segments: segments.clone(),
             camera: state.rig.current,
             view: ViewSettings {

@@ -156,9 +156,14 @@ fn kind_ui(
     }
     let explanation = "Where the light of the sky comes from";
     let before = kind;
-    row::setting(ui, "Sky", explanation, &mut kind, &before, |ui, value| {
-        row::choice(ui, "Kind of sky", value, &options)
-    });
+    row::setting(
+        ui,
+        "Kind of sky",
+        explanation,
+        &mut kind,
+        &before,
+        |ui, value| row::choice(ui, "Kind of sky", value, &options),
+    );
     if kind == before {
         return false;
     }
