@@ -214,16 +214,17 @@ impl DirectField {
         let probed: Vec<(usize, bool, Option<f32>)> = candidates
             .map(|leaf| {
                 let mut at_centre = self.unoccluded_at_centres[leaf];
+                // The light at the centroid takes longest.
                 let is_wanted = self.spread(hierarchy, leaf, mean) > limits.tolerance
+                    || self.may_error_be_visible(hierarchy, leaf, limits, mean)
+                    || self.hidden(hierarchy, leaf, mean) > limits.tolerance
                     || self.unoccluded_interpolation_error(
                         hierarchy,
                         leaf,
                         limits,
                         mean,
                         &mut at_centre,
-                    ) > limits.tolerance
-                    || self.may_error_be_visible(hierarchy, leaf, limits, mean)
-                    || self.hidden(hierarchy, leaf, mean) > limits.tolerance;
+                    ) > limits.tolerance;
                 (leaf, is_wanted, at_centre)
             })
             .collect();

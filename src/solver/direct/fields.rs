@@ -3,6 +3,8 @@
 //! Direct light is linear in its sources. Each kind has shadow rays, noise and shadow borders of its own, so that a sky
 //! or a sun that most places do not see takes no rays from the lamps of a room.
 
+use std::collections::HashMap;
+
 use glam::Vec4;
 
 use super::{field::DirectField, lights::Lights, samples::DirectLight};
@@ -26,9 +28,9 @@ pub(crate) struct DirectFields {
     no_offsets: OffsetPlaces,
 }
 
-/// Direct light at points apart from the mesh: by field, and by point.
+/// Direct light at points apart from the mesh, by index and field.
 #[derive(Default)]
-pub(crate) struct PointLight(Vec<Vec<DirectLight>>);
+pub(crate) struct PointLight(HashMap<usize, Vec<DirectLight>>);
 
 impl DirectFields {
     /// The fields before any sample. Emission that is linked has none; the sky and the sun are then read from
@@ -248,42 +250,55 @@ impl DirectFields {
         self.fields.len()
     }
 
-    /// Shoot shadow rays of each field from points until each has had the number `wanted` for it. Returns the rays shot; `None` when
-    /// cancelled.
+    /// Shoot shadow rays of each field from points, given with their index, until each has had `samples`. Returns the rays
+    /// shot; `None` when cancelled, and all light is then forgotten.
     pub(crate) fn sample_points(
         &self,
         rays: &RayTree,
-        points: &[Receiver],
-        wanted: &[u32],
+        points: impl Iterator<Item = (usize, Receiver)>,
+        samples: u32,
         seed: u64,
         known: &mut PointLight,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let shot = |known: &PointLight| -> u64 {
-            let all = known.0.iter().flatten();
-            all.map(|light| u64::from(light.shot)).sum()
-        };
-        let before = shot(known);
-        let dark = || vec![DirectLight::default(); points.len()];
-        known.0.resize_with(self.fields.len(), dark);
-        for (field, known) in self.fields.iter().zip(&mut known.0) {
-            let wanted = |point: usize, _: &DirectLight| wanted[point];
+        let (indices, points): (Vec<usize>, Vec<Receiver>) = points.unzip();
+        let mut shot = 0;
+        for (number, field) in self.fields.iter().enumerate() {
+            let before = |index: &usize| {
+                let known = known.0.get(index).and_then(|known| known.get(number));
+                known.copied().unwrap_or_default()
+            };
+            let mut lights: Vec<DirectLight> = indices.iter().map(before).collect();
+            let count = |lights: &[DirectLight]| -> u64 {
+                lights.iter().map(|light| u64::from(light.shot)).sum()
+            };
+            let had = count(&lights);
+            let wanted = |_: usize, _: &DirectLight| samples;
             field
                 .lights
-                .shoot(rays, points, wanted, seed, known, cancel);
+                .shoot(rays, &points, wanted, seed, &mut lights, cancel);
+            shot += count(&lights) - had;
+            for (index, light) in indices.iter().zip(lights) {
+                let known = known.0.entry(*index).or_default();
+                known.resize(self.fields.len(), DirectLight::default());
+                known[number] = light;
+            }
         }
         if cancel.is_cancelled() {
             *known = PointLight::default();
             return None;
         }
-        Some(shot(known).saturating_sub(before))
+        Some(shot)
     }
 
-    /// Direct irradiance of a point that was sampled, W/m².
-    pub(crate) fn at_point(&self, known: &PointLight, point: usize) -> Vec4 {
-        let fields = self.fields.iter().zip(&known.0);
+    /// Direct irradiance of a point that was sampled, W/m²; 0 for others.
+    pub(crate) fn at_point(&self, known: &PointLight, index: usize) -> Vec4 {
+        let Some(known) = known.0.get(&index) else {
+            return Vec4::ZERO;
+        };
+        let fields = self.fields.iter().zip(known);
         fields
-            .map(|(field, known)| field.lights.bounded(known[point].irradiance()))
+            .map(|(field, known)| field.lights.bounded(known.irradiance()))
             .sum()
     }
 

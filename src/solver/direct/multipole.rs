@@ -6,7 +6,7 @@
 //! colour, and to the second for their sum, which counts as spread alike for all directions. Where some face away,
 //! directional moments as those of clusters bound the projected power.
 
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use glam::{Mat3, Vec3, Vec4};
 
@@ -47,8 +47,8 @@ pub(super) struct Extent {
     radius: f32,
     /// Luminance of the power.
     pub(super) power: f32,
-    /// Root of the mean of `|e|²` over the power (luminance), with e the position relative to the centre.
-    spread: f32,
+    /// Error of the expansion, relative to the irradiance, times the cube of the distance.
+    truncation: f32,
     /// The normals of all emitters lie within this angle of the axis, radians; π for any normals.
     axis: Vec3,
     angle: f32,
@@ -75,6 +75,8 @@ pub(super) struct Sight {
     /// The centre relative to the point, and its squared distance.
     separation: Vec3,
     squared: f32,
+    /// One over the distance.
+    per_distance: f32,
     /// Height of the centre over the horizon of the point.
     height: f32,
     /// Largest cosines at the emitters and at the point, at most 1.
@@ -96,12 +98,13 @@ impl Multipole {
             centre,
             radius: lengths.into_iter().fold(0.0, f32::max),
             power: luminance(emitter.radiosity) * emitter.area,
-            spread: trace(&second).sqrt(),
+            truncation: 0.0,
             axis,
             angle: 0.0,
             sin_cos: (0.0, 1.0),
             thickness: 0.0,
-        };
+        }
+        .expanded(&second);
         let expansion = Expansion {
             second,
             directional: Moments::of(axis * emitter.area, emitter.radiosity),
@@ -124,7 +127,7 @@ impl Multipole {
             centre,
             radius: 0.0,
             power,
-            spread: 0.0,
+            truncation: 0.0,
             axis,
             angle,
             sin_cos: angle.sin_cos(),
@@ -154,43 +157,56 @@ impl Multipole {
                 }
             }
         }
-        extent.spread = trace(&expansion.second).sqrt();
+        let extent = extent.expanded(&expansion.second);
         Self { extent, expansion }
     }
 }
 
 impl Extent {
+    /// With the error of an expansion of this second moment.
+    fn expanded(mut self, second: &Mat3) -> Self {
+        self.truncation = TRUNCATION * trace(second) * self.radius;
+        self
+    }
+
     /// Its geometry relative to a receiver; `None` if it certainly gives no light there.
+    #[inline]
     pub(super) fn sight(&self, receiver: &Receiver) -> Option<Sight> {
         let separation = self.centre - receiver.point;
-        let squared = separation.length_squared();
-        let distance = squared.sqrt();
         let height = separation.dot(receiver.normal);
         if height <= -self.radius {
             return None;
         }
+        let squared = separation.length_squared();
+        let distance = squared.sqrt();
         // Heights of the receiver over the planes of the emitters, which are tilted by up to the angle.
         let along = -separation.dot(self.axis);
-        let across = (squared - along * along).max(0.0).sqrt();
         let (sin, cos) = self.sin_cos;
-        let slack = self.thickness + self.radius * if self.angle < FRAC_PI_2 { sin } else { 1.0 };
-        let most = if along >= distance * cos {
-            distance
+        let [most, least] = if self.angle <= 0.0 {
+            [along + self.thickness, along - self.thickness]
         } else {
-            along * cos + across * sin
-        } + slack;
+            let across = (squared - along * along).max(0.0).sqrt();
+            let is_narrow = self.angle < FRAC_PI_2;
+            let slack = self.thickness + self.radius * if is_narrow { sin } else { 1.0 };
+            let most = match along >= distance * cos {
+                true => distance,
+                false => along * cos + across * sin,
+            };
+            let least = match is_narrow {
+                true => along * cos - across * sin - slack,
+                false => -distance,
+            };
+            [most + slack, least]
+        };
         if most <= RESOLUTION {
             return None;
         }
-        let least = if self.angle < FRAC_PI_2 {
-            along * cos - across * sin - slack
-        } else {
-            -distance
-        };
-        let cosine = |height: f32| (height / distance).min(1.0);
+        let per_distance = 1.0 / distance;
+        let cosine = |height: f32| (height * per_distance).min(1.0);
         Some(Sight {
             separation,
             squared,
+            per_distance,
             height,
             most_cosines: [cosine(most), cosine(height + self.radius)],
             is_whole: least >= 0.0 && height >= self.radius,
@@ -198,29 +214,32 @@ impl Extent {
     }
 
     /// Approximate error of the irradiance (luminance) by an expansion; infinite where that is not used.
+    #[inline]
     pub(super) fn error(&self, expansion: &Expansion, sight: &Sight) -> f32 {
-        let distance = sight.squared.sqrt();
-        if distance <= NEAREST * self.radius {
+        if sight.squared <= NEAREST * NEAREST * self.radius * self.radius {
             return f32::INFINITY;
         }
+        let per_distance = sight.per_distance;
         let most = self.most_irradiance(sight);
-        let truncation =
-            TRUNCATION * self.spread * self.spread * self.radius / (distance * sight.squared);
+        let truncation = self.truncation * per_distance * per_distance * per_distance;
         if sight.is_whole {
             return most * truncation;
         }
-        let (least_shown, most_shown) = expansion.directional.bounds(-sight.separation / distance);
+        let towards = -sight.separation * per_distance;
+        let (least_shown, most_shown) = expansion.directional.bounds(towards);
         let unknown =
             luminance(most_shown - least_shown) * sight.most_cosines[1] / (PI * sight.squared);
         // Without terms of first and second order, and clamped at the horizon.
-        let ratio = self.radius / distance;
+        let ratio = self.radius * per_distance;
         most * (truncation + ratio) + unknown
     }
 
     /// Upper bound of the unoccluded irradiance (luminance), if all emitters were as far away as the centre.
+    #[inline]
     pub(super) fn most_irradiance(&self, sight: &Sight) -> f32 {
         let [of_emitters, of_receiver] = sight.most_cosines;
-        self.power * of_emitters * of_receiver / (PI * sight.squared)
+        let per_area = sight.per_distance * sight.per_distance * FRAC_1_PI;
+        self.power * of_emitters * of_receiver * per_area
     }
 
     /// Whether a point is further away than the diameter.

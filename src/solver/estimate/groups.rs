@@ -1,10 +1,10 @@
-//! Groups of neighbouring points, for whose mean errors the error equation is solved.
+//! Groups of neighbouring places, for whose mean errors the error equation is solved.
 
 use glam::Vec3;
 
-/// Points of a group. Fewer, and noise of the residuals returns from group to group; more, and errors of light that
+/// Places of a group. Fewer, and noise of the residuals returns from group to group; more, and errors of light that
 /// differs within a group are spread over all of it.
-const GROUP_POINTS: usize = 8;
+const GROUP_PLACES: usize = 8;
 
 /// Most rounds of the iteration. Fewer leave light in white rooms; more change nothing.
 const MOST_ROUNDS: u32 = 200;
@@ -12,44 +12,65 @@ const MOST_ROUNDS: u32 = 200;
 /// Largest change at which it ends, of the largest error.
 const TOLERANCE: f32 = 1e-3;
 
-/// Light that the rays of a point met.
-pub(super) struct Gather {
-    /// Irradiance, W/m².
-    pub irradiance: Vec3,
-    /// The factor of the irradiance of each group of points, by channel.
+/// The residual at a place, and how errors elsewhere reach it.
+pub(super) struct Residual {
+    /// Irradiance stored less irradiance gathered, W/m².
+    pub residual: Vec3,
+    /// The factor of the error of each group, by channel.
     pub row: Vec<Vec3>,
 }
 
-/// Consecutive points by patch.
+impl Residual {
+    /// The error of the irradiance there if the groups have these errors, W/m².
+    pub(super) fn explained_by(&self, errors: &[Vec3]) -> Vec3 {
+        let received = self.row.iter().zip(errors);
+        self.residual + received.map(|(factor, error)| factor * error).sum::<Vec3>()
+    }
+
+    /// The mean of several; `groups` is their number of groups.
+    fn mean(residuals: &[Self], groups: usize) -> Self {
+        let share = 1.0 / residuals.len().max(1) as f32;
+        let mut mean = Self {
+            residual: Vec3::ZERO,
+            row: vec![Vec3::ZERO; groups],
+        };
+        for Self { residual, row } in residuals {
+            mean.residual += residual * share;
+            for (sum, factor) in mean.row.iter_mut().zip(row) {
+                *sum += factor * share;
+            }
+        }
+        mean
+    }
+}
+
+/// Consecutive places by patch.
 pub(super) struct Groups {
-    /// The first point of each, and one past the last.
-    first_point: Vec<usize>,
+    /// The first place of each, and one past the last.
+    first_place: Vec<usize>,
     /// The first patch of each.
     first_patch: Vec<u32>,
 }
 
 impl Groups {
-    /// Groups of points by the patches that they lie on, in order; a patch is never divided.
-    pub(super) fn new(patches: &[Option<u32>]) -> Self {
-        let (mut first_point, mut first_patch) = (Vec::new(), Vec::new());
-        for (point, patch) in patches.iter().enumerate() {
-            let Some(patch) = *patch else {
-                continue;
-            };
-            let is_first = first_point
-                .last()
-                .is_none_or(|&first| point - first >= GROUP_POINTS);
-            let is_new = point == 0 || patches[point - 1] != Some(patch);
-            if is_first && is_new {
-                first_point.push(point);
-                first_patch.push(patch);
+    /// Groups of places by the patches that they lie on, in order; a patch is never divided.
+    pub(super) fn new(patches: impl Iterator<Item = u32>) -> Self {
+        let mut groups = Self {
+            first_place: Vec::new(),
+            first_patch: Vec::new(),
+        };
+        let (mut count, mut last) = (0, None);
+        for patch in patches {
+            let begun = groups.first_place.last();
+            let is_full = begun.is_none_or(|&first| count - first >= GROUP_PLACES);
+            if is_full && last != Some(patch) {
+                groups.first_place.push(count);
+                groups.first_patch.push(patch);
             }
+            (count, last) = (count + 1, Some(patch));
         }
-        first_point.push(patches.len());
-        Self {
-            first_point,
-            first_patch,
-        }
+        groups.first_place.push(count);
+        groups
     }
 
     /// Number of groups.
@@ -57,33 +78,23 @@ impl Groups {
         self.first_patch.len()
     }
 
-    /// The group that a patch belongs to, the nearest for a patch without points.
+    /// The group that a patch belongs to, the nearest for a patch without places.
     pub(super) fn of_patch(&self, patch: u32) -> usize {
         let after = self.first_patch.partition_point(|&first| first <= patch);
         after.saturating_sub(1)
     }
 
-    /// The error of the irradiance at each point, from the residuals: e = s + T e, W/m².
-    pub(super) fn errors(&self, gathers: &[Gather], residuals: &[Vec3]) -> Vec<Vec3> {
-        // Means over groups.
-        let mean = |group: usize| {
-            let points = self.first_point[group]..self.first_point[group + 1];
-            let number = points.len().max(1) as f32;
-            let residual = residuals[points.clone()].iter().sum::<Vec3>() / number;
-            let mut row = vec![Vec3::ZERO; self.count()];
-            for gather in &gathers[points] {
-                for (sum, factor) in row.iter_mut().zip(&gather.row) {
-                    *sum += factor / number;
-                }
-            }
-            (residual, row)
-        };
-        let groups: Vec<(Vec3, Vec<Vec3>)> = (0..self.count()).map(mean).collect();
-        let mut errors: Vec<Vec3> = groups.iter().map(|(residual, _)| *residual).collect();
+    /// The mean error of the irradiance in each group, from the residuals of all places: e = s + T e, W/m².
+    pub(super) fn errors(&self, residuals: &[Residual]) -> Vec<Vec3> {
+        let places = self.first_place.windows(2);
+        let means: Vec<Residual> = places
+            .map(|ends| Residual::mean(&residuals[ends[0]..ends[1]], self.count()))
+            .collect();
+        let mut errors: Vec<Vec3> = means.iter().map(|mean| mean.residual).collect();
         for _ in 0..MOST_ROUNDS {
-            let next: Vec<Vec3> = groups
+            let next: Vec<Vec3> = means
                 .iter()
-                .map(|(residual, row)| residual + received(row, &errors))
+                .map(|mean| mean.explained_by(&errors))
                 .collect();
             let change = largest(next.iter().zip(&errors).map(|(a, b)| a - b));
             errors = next;
@@ -91,21 +102,8 @@ impl Groups {
                 break;
             }
         }
-        // At each point.
-        residuals
-            .iter()
-            .zip(gathers)
-            .map(|(residual, gather)| residual + received(&gather.row, &errors))
-            .collect()
+        errors
     }
-}
-
-/// What arrives of the errors of all groups.
-fn received(row: &[Vec3], errors: &[Vec3]) -> Vec3 {
-    row.iter()
-        .zip(errors)
-        .map(|(factor, error)| factor * error)
-        .sum()
 }
 
 /// Largest absolute value of any channel.

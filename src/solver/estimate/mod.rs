@@ -3,9 +3,9 @@
 //! At random points x of the reflecting surfaces the irradiance is gathered once more by rays, directly from emitters and
 //! sky, and over the hemisphere from the light shown, E′ = D + T b. The light shown is b, the truth b*, its error
 //! e = b − b*. From b* = D + T b* follows e = s + T e with the residual s = b − E′. So the residual alone is not the
-//! error: light that is wrong everywhere by a little has a small residual. The rays that measured the residual know which
-//! surfaces send light to which, so the equation is solved for the mean errors of groups of neighbouring points (`groups`), and
-//! e follows at each point.
+//! error: light that is wrong everywhere by a little has a small residual. The residual is measured also where rays from the
+//! points arrive, and the rays from there know which places send light to which: so the equation is solved for the mean
+//! errors of groups of such places (`groups`), and e follows at each point.
 //!
 //! Two independent sets of rays give two estimates e₁ and e₂ with independent noise, and e₁e₂ is e² in expectation for any
 //! number of rays (`statistics`). The hits are kept, so that later steps only look up their light again and add rays where
@@ -18,21 +18,21 @@ mod statistics;
 use std::sync::Arc;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use self::{
-    groups::{Gather, Groups},
-    samples::Samples,
+    groups::{Groups, Residual},
+    samples::{Place, Samples, Scenery},
     statistics::Reflected,
 };
 use super::{
     Cancel, Direct, EstimatedError, SolveSettings,
     direct::{DirectFields, Surfaces},
-    places::Receiver,
 };
 use crate::{
     geometry::{Random, RayTree},
     hierarchy::Hierarchy,
-    sampling::{SurfacePoint, sample_points},
+    sampling::sample_points,
     scene::Scene,
 };
 
@@ -48,11 +48,12 @@ const LEVELS: [(usize, u32); 9] = [
     (256, 256),
     (512, 256),
     (512, 512),
-    (MOST_POINTS, 512),
+    (1024, 512),
 ];
 
-/// Points in the finest level.
-const MOST_POINTS: usize = 1024;
+/// Points at which only stored light is looked up, among them those with rays: a few bright places beside lamps hold much
+/// of its mean square, and no interval tells that they were missed. Fewer miss them; more take longer.
+const STORED_POINTS: u32 = 8192;
 
 /// Rays of the estimate by the rays of the solve. More takes longer; fewer makes the interval wide.
 const RAY_SHARE: f64 = 0.05;
@@ -64,6 +65,9 @@ const MOST_RAY_SHARE: f64 = 0.4;
 /// The error of a step relative to that of the second before, below which steps still help. Smaller, and slow progress is
 /// given up; larger, and noise is taken for progress.
 const ADVANCE: f64 = 0.9;
+
+/// Rays of a point for each ray from a place that it sees. Smaller takes longer; larger makes the errors of groups noisy.
+const SEEN_DIVISOR: u32 = 4;
 
 /// Added to the seed, so that neither these points nor their rays are those of the solve or of a reference.
 const SEEDS: [u64; 3] = [
@@ -93,18 +97,25 @@ pub(super) struct Shown<'a> {
 
 /// Points and rays of the estimates of a solve, kept from step to step.
 pub(super) struct ErrorEstimator {
-    points: Vec<Receiver>,
-    /// The patch that each point lies on; `None` where it is omitted.
-    patches: Vec<Option<u32>>,
+    /// The points, in the order of their patches.
+    places: Vec<Option<Place>>,
     rays: Arc<RayTree>,
     seed: u64,
     /// Index in [`LEVELS`].
     level: usize,
     /// Two independent sets of rays.
-    halves: [Samples; 2],
+    halves: [Half; 2],
     ray_count: u64,
     /// Trimmed errors of steps beyond the settings.
     errors: Vec<f64>,
+}
+
+/// One set of rays.
+struct Half {
+    /// From the points.
+    from_points: Samples,
+    /// From what a ray of each point met: these places are distributed as those whose errors reach the points.
+    from_seen: Samples,
 }
 
 impl ErrorEstimator {
@@ -119,22 +130,23 @@ impl ErrorEstimator {
             true => Arc::new(RayTree::new(scene)),
             false => rays.clone(),
         };
-        let (points, _) = sample_points(scene, &rays, MOST_POINTS as u32, seed ^ SEEDS[0]);
-        let mut placed: Vec<(Option<u32>, Receiver)> = points
+        let (points, _) = sample_points(scene, &rays, STORED_POINTS, seed ^ SEEDS[0]);
+        let mut places: Vec<Option<Place>> = points
             .iter()
-            .map(|point| (patch_of(hierarchy, point), receiver(point)))
+            .map(|point| Place::of(hierarchy, point))
             .collect();
-        // In the order of the patches, neighbours lie beside each other.
-        placed.sort_by_key(|(patch, _)| patch.unwrap_or(u32::MAX));
-        let (patches, points): (Vec<Option<u32>>, Vec<Receiver>) = placed.into_iter().unzip();
-        let halves = [SEEDS[1], SEEDS[2]].map(|own| Samples::new(points.len(), seed ^ own));
+        // Neighbours lie beside each other.
+        places.sort_by_key(|place| place.map_or(u32::MAX, |place| place.patch));
+        let half = |own: u64| Half {
+            from_points: Samples::new(places.len(), seed ^ own),
+            from_seen: Samples::new(places.len(), (seed ^ own).wrapping_add(1)),
+        };
         Self {
-            points,
-            patches,
+            halves: [SEEDS[1], SEEDS[2]].map(half),
+            places,
             rays,
             seed: seed ^ SEEDS[0],
             level: 0,
-            halves,
             ray_count: 0,
             errors: Vec::new(),
         }
@@ -143,7 +155,8 @@ impl ErrorEstimator {
     /// Forget direct light, when emitters have changed.
     pub(super) fn forget_direct_light(&mut self) {
         for half in &mut self.halves {
-            half.forget_direct_light();
+            half.from_points.forget_direct_light();
+            half.from_seen.forget_direct_light();
         }
     }
 
@@ -182,70 +195,54 @@ impl ErrorEstimator {
             };
             DirectFields::new(shown.scene, hierarchy, &settings, shown.sees_outside)
         });
-        let direct = own.as_ref().unwrap_or(direct);
+        let scene = Scenery {
+            hierarchy,
+            direct: own.as_ref().unwrap_or(direct),
+            rays: &self.rays,
+            irradiance: shown.irradiance,
+            cancel: shown.cancel,
+        };
         // As many points and rays as the solve pays for.
         let affordable = (shown.solve_rays as f64 * share) as u64;
-        self.level = self.affordable_level(direct, affordable);
+        self.level = self.affordable_level(scene.direct, affordable);
         let (_, count) = LEVELS[self.level];
         let chosen = self.chosen();
+        // The errors of the points by each set of rays.
+        let places: Vec<Option<Place>> = chosen.iter().map(|&point| self.places[point]).collect();
+        let mut errors = Vec::with_capacity(self.halves.len());
         for half in &mut self.halves {
-            let meet = samples::Meet {
-                hierarchy,
-                rays: &self.rays,
-                points: &self.points,
-                cancel: shown.cancel,
-            };
-            self.ray_count += half.shoot(meet, &chosen, direct, count)?;
+            let (found, shot) = half.errors(scene, &places, &chosen, count)?;
+            errors.push(found);
+            self.ray_count += shot;
         }
-        // Residuals, and the errors that explain them.
-        let light = samples::Light {
-            hierarchy,
-            irradiance: shown.irradiance,
+        let stored = |place: Option<Place>| {
+            place.and_then(|place| scene.stored(place.patch, place.receiver.point))
         };
-        let stored = |&point: &usize| {
-            let patch = self.patches[point]?;
-            light.at(patch, self.points[point].point)
+        let reflected = |(point, place): (usize, &Option<Place>)| {
+            let errors = [0, 1].map(|half| errors[half][point]);
+            stored(*place).map_or_else(Reflected::default, |stored| Reflected::new(&stored, errors))
         };
-        let stored: Vec<_> = chosen.iter().map(stored).collect();
-        let patches: Vec<_> = chosen.iter().map(|&point| self.patches[point]).collect();
-        let groups = Groups::new(&patches);
-        let [first, second] = [0, 1].map(|half| {
-            let gathers = self.halves[half].gathers(light, &chosen, &groups);
-            let residual = |(index, gather): (usize, &Gather)| match stored[index] {
-                Some(stored) => {
-                    let direct = self.halves[half].direct(direct, chosen[index]);
-                    stored.irradiance - gather.irradiance - direct
-                }
-                None => Vec3::ZERO,
-            };
-            let residuals: Vec<Vec3> = gathers.iter().enumerate().map(residual).collect();
-            groups.errors(&gathers, &residuals)
-        });
-        let errors = first.into_iter().zip(second);
-        let reflected: Vec<Reflected> = stored
-            .iter()
-            .zip(errors)
-            .map(|(stored, (first, second))| match stored {
-                Some(stored) => Reflected::new(stored, [first, second]),
-                None => Reflected::default(),
-            })
+        let reflected: Vec<Reflected> = places.iter().enumerate().map(reflected).collect();
+        let all = self.places.par_iter();
+        let all: Vec<f64> = all
+            .map(|place| stored(*place).map_or(0.0, |stored| statistics::stored_light(&stored)))
             .collect();
         Some(EstimatedError {
             points: chosen.len() as u64,
             rays: self.ray_count,
-            ..statistics::estimated(&reflected)
+            ..statistics::estimated(&reflected, &all)
         })
     }
 
     /// The points of the present level: one by chance of as many neighbours as there are times more points. Those of a
     /// level are among those of the next.
     fn chosen(&self) -> Vec<usize> {
-        let step = MOST_POINTS / LEVELS[self.level].0;
+        let step = (STORED_POINTS as usize).div_ceil(LEVELS[self.level].0);
         let chance = |point: &usize| Random::new(self.seed, *point as u64).next_u32();
-        (0..self.points.len())
+        (0..self.places.len())
             .step_by(step)
             .filter_map(|first| {
-                let end = (first + step).min(self.points.len());
+                let end = (first + step).min(self.places.len());
                 (first..end).min_by_key(chance)
             })
             .collect()
@@ -253,8 +250,9 @@ impl ErrorEstimator {
 
     /// The finest level whose rays are affordable; never one before the present.
     fn affordable_level(&self, direct: &DirectFields, affordable: u64) -> usize {
+        let rays = |count: u32| count + samples::shadow_rays(count) * direct.count() as u32;
         let cost = |&(points, count): &(usize, u32)| {
-            let each = count + samples::shadow_rays(count) * direct.count() as u32;
+            let each = rays(count) + rays(rays_from_seen(count));
             (points * self.halves.len()) as u64 * u64::from(each)
         };
         let within = LEVELS.iter().rposition(|level| cost(level) <= affordable);
@@ -263,23 +261,43 @@ impl ErrorEstimator {
 
     /// Memory in bytes.
     pub(super) fn memory_bytes(&self) -> usize {
-        self.halves.iter().map(Samples::memory_bytes).sum()
+        let of = |half: &Half| half.from_points.memory_bytes() + half.from_seen.memory_bytes();
+        self.halves.iter().map(of).sum()
     }
 }
 
-/// The patch under a point; `None` where it takes no part in the solve.
-fn patch_of(hierarchy: &Hierarchy, point: &SurfacePoint) -> Option<u32> {
-    let patch = hierarchy.side_met(point.triangle, -point.normal)?;
-    hierarchy
-        .active_patches()
-        .contains(&patch)
-        .then_some(patch as u32)
+/// Rays over the hemisphere from each place that a point sees, for so many from the point. Only means over groups of them
+/// count.
+fn rays_from_seen(count: u32) -> u32 {
+    count / SEEN_DIVISOR
 }
 
-fn receiver(point: &SurfacePoint) -> Receiver {
-    Receiver {
-        point: point.position,
-        normal: point.normal,
-        triangle: point.triangle,
+impl Half {
+    /// The error of the irradiance at some places, W/m² (0 where there is none), and the rays shot; `None` when cancelled.
+    fn errors(
+        &mut self,
+        scene: Scenery<'_>,
+        places: &[Option<Place>],
+        chosen: &[usize],
+        count: u32,
+    ) -> Option<(Vec<Vec3>, u64)> {
+        let mut shot = self.from_points.shoot(scene, places, chosen, count)?;
+        // What the points see, in the order of the patches.
+        let first_seen = |&point: &usize| self.from_points.first_met(scene.hierarchy, point);
+        let seen = chosen.iter().map(|point| (*point, first_seen(point)));
+        let mut seen: Vec<(usize, Option<Place>)> = seen.collect();
+        seen.retain(|(_, place)| place.is_some());
+        seen.sort_by_key(|(_, place)| place.map(|place| place.patch));
+        let (indices, seen): (Vec<usize>, Vec<Option<Place>>) = seen.into_iter().unzip();
+        shot += self
+            .from_seen
+            .shoot(scene, &seen, &indices, rays_from_seen(count))?;
+        // Errors of groups of it, and of the points.
+        let groups = Groups::new(seen.iter().flatten().map(|place| place.patch));
+        let of_seen = self.from_seen.residuals(scene, &seen, &indices, &groups);
+        let errors = groups.errors(&of_seen);
+        let of_points = self.from_points.residuals(scene, places, chosen, &groups);
+        let at_point = |residual: &Residual| residual.explained_by(&errors);
+        Some((of_points.iter().map(at_point).collect(), shot))
     }
 }

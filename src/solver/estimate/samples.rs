@@ -3,10 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::groups::{Gather, Groups};
+use super::groups::{Groups, Residual};
 use crate::{
     geometry::{Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Channels as _, Hierarchy},
+    sampling::SurfacePoint,
     solver::{
         Cancel,
         direct::{DirectFields, PointLight},
@@ -43,17 +44,43 @@ pub(super) struct Stored {
     pub reflectance: Vec3,
 }
 
-/// The light shown.
+/// A point of a surface that takes part in the solve.
 #[derive(Clone, Copy)]
-pub(super) struct Light<'a> {
-    pub hierarchy: &'a Hierarchy,
-    /// Irradiance by vertex, W/m².
-    pub irradiance: &'a [Vec3],
+pub(super) struct Place {
+    pub patch: u32,
+    pub receiver: Receiver,
 }
 
-impl Light<'_> {
+impl Place {
+    /// The place of a point; `None` where it takes no part.
+    pub(super) fn of(hierarchy: &Hierarchy, point: &SurfacePoint) -> Option<Self> {
+        let patch = hierarchy.side_met(point.triangle, -point.normal)?;
+        let is_active = hierarchy.active_patches().contains(&patch);
+        is_active.then_some(Self {
+            patch: patch as u32,
+            receiver: Receiver {
+                point: point.position,
+                normal: point.normal,
+                triangle: point.triangle,
+            },
+        })
+    }
+}
+
+/// The light shown, and what rays can meet.
+#[derive(Clone, Copy)]
+pub(super) struct Scenery<'a> {
+    pub hierarchy: &'a Hierarchy,
+    pub direct: &'a DirectFields,
+    pub rays: &'a RayTree,
+    /// Irradiance by vertex, W/m².
+    pub irradiance: &'a [Vec3],
+    pub cancel: &'a Cancel,
+}
+
+impl Scenery<'_> {
     /// The light stored at a point of a patch.
-    pub(super) fn at(&self, patch: u32, point: Vec3) -> Option<Stored> {
+    pub(super) fn stored(&self, patch: u32, point: Vec3) -> Option<Stored> {
         let mesh = &self.hierarchy.mesh;
         let leaf = mesh.leaf_at(patch as usize, point)?;
         let [a, b, c] = barycentric(point, mesh.corners(leaf)).to_array();
@@ -66,18 +93,7 @@ impl Light<'_> {
             reflectance: self.hierarchy.reflectance_of(leaf) * met,
         })
     }
-}
 
-/// Where rays start and what they can meet.
-#[derive(Clone, Copy)]
-pub(super) struct Meet<'a> {
-    pub hierarchy: &'a Hierarchy,
-    pub rays: &'a RayTree,
-    pub points: &'a [Receiver],
-    pub cancel: &'a Cancel,
-}
-
-impl Meet<'_> {
     /// What a ray meets, and its tint.
     fn meet(&self, from: &Receiver, direction: Vec3) -> (Kept, Vec3) {
         let start = Some(from.triangle);
@@ -95,10 +111,9 @@ impl Meet<'_> {
     }
 }
 
-/// One set of rays from all points.
+/// One set of rays from places, by their index.
 pub(super) struct Samples {
     seed: u64,
-    /// By point.
     kept: Vec<Vec<Kept>>,
     /// Tints of these rays; empty where no pane is coloured.
     tints: Vec<Vec<Vec3>>,
@@ -106,11 +121,11 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    pub(super) fn new(points: usize, seed: u64) -> Self {
+    pub(super) fn new(count: usize, seed: u64) -> Self {
         Self {
             seed,
-            kept: vec![Vec::new(); points],
-            tints: vec![Vec::new(); points],
+            kept: vec![Vec::new(); count],
+            tints: vec![Vec::new(); count],
             direct: PointLight::default(),
         }
     }
@@ -119,86 +134,110 @@ impl Samples {
         self.direct = PointLight::default();
     }
 
-    /// Shoot until each of some points has had `count` rays. Returns the rays shot; `None` when cancelled.
+    /// Shoot until each place has had `count` rays. Returns the rays shot; `None` when cancelled.
     pub(super) fn shoot(
         &mut self,
-        meet: Meet<'_>,
-        chosen: &[usize],
-        direct: &DirectFields,
+        scene: Scenery<'_>,
+        places: &[Option<Place>],
+        indices: &[usize],
         count: u32,
     ) -> Option<u64> {
-        let (seed, is_tinted) = (self.seed, meet.rays.has_coloured_panes());
+        let (seed, is_tinted) = (self.seed, scene.rays.has_coloured_panes());
+        // Over the hemisphere.
         let kept = &self.kept;
-        let added: Vec<Vec<(Kept, Vec3)>> = chosen
-            .par_iter()
-            .with_min_len(4)
-            .map(|&index| {
-                if meet.cancel.is_cancelled() {
-                    return Vec::new();
-                }
-                let point = &meet.points[index];
-                let shift = Random::new(seed, index as u64).uniform_2d();
-                let of = |ray| {
-                    let square = low_discrepancy_2d(ray, shift);
-                    meet.meet(point, cosine_direction(point.normal, square))
-                };
-                (kept[index].len() as u32..count).map(of).collect()
-            })
-            .collect();
-        meet.cancel.proceed()?;
-        let shot = added.iter().map(|added| added.len() as u64).sum::<u64>();
-        for (&index, added) in chosen.iter().zip(added) {
+        let of_place = |(&index, place): (&usize, &Option<Place>)| -> Vec<(Kept, Vec3)> {
+            let Some(place) = place.filter(|_| !scene.cancel.is_cancelled()) else {
+                return Vec::new();
+            };
+            let shift = Random::new(seed, index as u64).uniform_2d();
+            let of_ray = |ray| {
+                let square = low_discrepancy_2d(ray, shift);
+                let direction = cosine_direction(place.receiver.normal, square);
+                scene.meet(&place.receiver, direction)
+            };
+            let before = kept[index].len() as u32;
+            (before..count).map(of_ray).collect()
+        };
+        let all = indices.par_iter().zip(places).with_min_len(4);
+        let added: Vec<_> = all.map(of_place).collect();
+        scene.cancel.proceed()?;
+        let shot: u64 = added.iter().map(|added| added.len() as u64).sum();
+        for (&index, added) in indices.iter().zip(added) {
             self.kept[index].extend(added.iter().map(|(kept, _)| kept));
             if is_tinted {
                 self.tints[index].extend(added.iter().map(|(_, tint)| tint));
             }
         }
-        let mut wanted = vec![0; meet.points.len()];
-        for &index in chosen {
-            wanted[index] = shadow_rays(count);
-        }
-        let known = &mut self.direct;
-        let shadow =
-            direct.sample_points(meet.rays, meet.points, &wanted, seed, known, meet.cancel);
-        Some(shot + shadow?)
+        // To emitters and outside.
+        let placed = indices.iter().zip(places);
+        let placed = placed.filter_map(|(&index, place)| Some((index, place.as_ref()?.receiver)));
+        let shadow = shadow_rays(count);
+        let lit = scene.direct.sample_points(
+            scene.rays,
+            placed,
+            shadow,
+            seed,
+            &mut self.direct,
+            scene.cancel,
+        );
+        Some(shot + lit?)
     }
 
-    /// The light shown that the rays of some points met.
-    pub(super) fn gathers(
+    /// What the first ray of a place met that met anything.
+    pub(super) fn first_met(&self, hierarchy: &Hierarchy, index: usize) -> Option<Place> {
+        let mut kept = self.kept[index].iter();
+        let kept = kept.find(|kept| kept.patch != Kept::NOTHING.patch)?;
+        let patch = &hierarchy.patches[kept.patch as usize];
+        Some(Place {
+            patch: kept.patch,
+            receiver: Receiver {
+                point: kept.point,
+                normal: patch.normal,
+                triangle: patch.triangle,
+            },
+        })
+    }
+
+    /// The residuals at some places; 0 where there is none.
+    pub(super) fn residuals(
         &self,
-        light: Light<'_>,
-        chosen: &[usize],
+        scene: Scenery<'_>,
+        places: &[Option<Place>],
+        indices: &[usize],
         groups: &Groups,
-    ) -> Vec<Gather> {
-        let gather = |&point: &usize| {
-            let (kept, tints) = (&self.kept[point], &self.tints[point]);
-            let by_ray = 1.0 / kept.len().max(1) as f32;
-            let mut gather = Gather {
-                irradiance: Vec3::ZERO,
-                row: vec![Vec3::ZERO; groups.count()],
+    ) -> Vec<Residual> {
+        let residual = |(&index, place): (&usize, &Option<Place>)| {
+            let stored = place.and_then(|place| scene.stored(place.patch, place.receiver.point));
+            let mut row = vec![Vec3::ZERO; groups.count()];
+            let Some(stored) = stored else {
+                return Residual {
+                    residual: Vec3::ZERO,
+                    row,
+                };
             };
+            let (kept, tints) = (&self.kept[index], &self.tints[index]);
+            let by_ray = 1.0 / kept.len().max(1) as f32;
+            let mut gathered = scene.direct.at_point(&self.direct, index).color();
             for (ray, kept) in kept.iter().enumerate() {
                 if kept.patch == Kept::NOTHING.patch {
                     continue;
                 }
-                let Some(met) = light.at(kept.patch, kept.point) else {
+                let Some(met) = scene.stored(kept.patch, kept.point) else {
                     continue;
                 };
-                let factor =
-                    met.reflectance * tints.get(ray).copied().unwrap_or(Vec3::ONE) * by_ray;
-                gather.irradiance += factor * met.irradiance;
-                if let Some(factors) = gather.row.get_mut(groups.of_patch(kept.patch)) {
+                let tint = tints.get(ray).copied().unwrap_or(Vec3::ONE);
+                let factor = met.reflectance * tint * by_ray;
+                gathered += factor * met.irradiance;
+                if let Some(factors) = row.get_mut(groups.of_patch(kept.patch)) {
                     *factors += factor;
                 }
             }
-            gather
+            Residual {
+                residual: stored.irradiance - gathered,
+                row,
+            }
         };
-        chosen.par_iter().map(gather).collect()
-    }
-
-    /// Direct irradiance of a point, W/m².
-    pub(super) fn direct(&self, fields: &DirectFields, point: usize) -> Vec3 {
-        fields.at_point(&self.direct, point).color()
+        indices.par_iter().zip(places).map(residual).collect()
     }
 
     /// Memory in bytes.

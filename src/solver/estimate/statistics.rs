@@ -15,6 +15,9 @@ const TRIMMED_PART: usize = 100;
 /// agrees by chance. Smaller, and such points are omitted and the others are too small; larger, and nothing is.
 const OUTLIER_DEVIATIONS: f64 = 4.0;
 
+/// Least mean square of the true light over that of the light stored: noise of few points may leave nothing of it.
+const SMALLEST_SHARE: f64 = 0.1;
+
 /// Reflected light at a point, luminance; the common factor 1/π is left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reflected {
@@ -26,11 +29,9 @@ pub(super) struct Reflected {
 impl Reflected {
     /// From the light stored and two estimates of the error of its irradiance.
     pub(super) fn new(stored: &Stored, errors: [Vec3; 2]) -> Self {
-        let of =
-            |irradiance: Vec3| f64::from(luminance((stored.reflectance * irradiance).extend(0.0)));
         Self {
-            stored: of(stored.irradiance),
-            errors: errors.map(of),
+            stored: stored_light(stored),
+            errors: errors.map(|error| reflected(stored, error)),
         }
     }
 
@@ -41,6 +42,15 @@ impl Reflected {
     fn square(&self) -> f64 {
         self.errors[0] * self.errors[1]
     }
+}
+
+/// Luminance of the light that is reflected where light is stored; the common factor 1/π is left out.
+pub(super) fn stored_light(stored: &Stored) -> f64 {
+    reflected(stored, stored.irradiance)
+}
+
+fn reflected(stored: &Stored, irradiance: Vec3) -> f64 {
+    f64::from(luminance((stored.reflectance * irradiance).extend(0.0)))
 }
 
 /// A mean and its standard error.
@@ -68,15 +78,14 @@ impl Mean {
     }
 }
 
-/// All figures but the counts.
-pub(super) fn estimated(points: &[Reflected]) -> EstimatedError {
-    // The true light, squared by two estimates.
-    let truth = |point: &Reflected| {
-        let [first, second] = point.errors.map(|error| point.stored - error);
-        first * second
-    };
-    let scale = Mean::of(points.iter().map(truth)).mean.max(0.0).sqrt();
-    let scale = scale.max(1e-300);
+/// All figures but the counts, from the points with rays and the light stored at `all` points.
+pub(super) fn estimated(points: &[Reflected], all: &[f64]) -> EstimatedError {
+    // Mean square of the true light: that of the light stored, and what its error changes.
+    let change = |point: &Reflected| point.square() - 2.0 * point.stored * point.error();
+    let stored_square = Mean::of(all.iter().map(|stored| stored * stored)).mean;
+    let square = stored_square + Mean::of(points.iter().map(change)).mean;
+    let scale = square.max(SMALLEST_SHARE * stored_square).sqrt();
+    let scale = scale.max(f64::MIN_POSITIVE);
     let squares = Mean::of(points.iter().map(Reflected::square));
     let [rms, rms_low, rms_high] = squares.roots(scale);
     // Without the worst points, as far as noise does not explain them.
@@ -90,7 +99,7 @@ pub(super) fn estimated(points: &[Reflected]) -> EstimatedError {
     let squares = Mean::of(trimmed.iter().map(|point| point.square()));
     let [trimmed_rms, trimmed_low, trimmed_high] = squares.roots(scale);
     // Energy.
-    let stored = Mean::of(points.iter().map(|point| point.stored)).mean;
+    let stored = Mean::of(all.iter().copied()).mean;
     let error = Mean::of(points.iter().map(Reflected::error));
     let energy = |error: f64| {
         let truth = stored - error;
