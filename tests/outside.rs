@@ -400,8 +400,8 @@ fn assert_even(builder: SceneBuilder, level: f32, settings: SolveSettings, name:
 #[test]
 fn radiance_is_the_same_everywhere_where_surfaces_complete_the_sky() {
     // Emission L (1 − ρ) under a sky L: everything shows L, whatever stands where.
-    let scenes: [(&str, fn(f32, f32) -> SceneBuilder); 3] =
-        [("blocks", blocks), ("box", open_box), ("columns", columns)];
+    type Build = fn(f32, f32) -> SceneBuilder;
+    let scenes: [(&str, Build); 3] = [("blocks", blocks), ("box", open_box), ("columns", columns)];
     for (name, scene) in scenes {
         for (reflectance, level) in [(0.5, 1.0), (0.9, 2.0), (0.95, 0.5)] {
             for direct in [Direct::Sampled, Direct::Linked] {
