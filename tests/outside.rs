@@ -377,8 +377,8 @@ fn columns(reflectance: f32, emission: f32) -> SceneBuilder {
     builder
 }
 
-/// Checks that everything shows the level of the sky, on average and in root mean square.
-fn assert_even(builder: SceneBuilder, level: f32, settings: SolveSettings, name: &str) {
+/// Checks that everything shows the level of the sky, on average within `most` of it, and in root mean square within twice that.
+fn assert_even(builder: SceneBuilder, level: f32, settings: SolveSettings, name: &str, most: f32) {
     let scene = under(builder, Sides::Two, uniform(level));
     let what = format!(
         "{name}, {:?}, {:?}, {}",
@@ -388,21 +388,24 @@ fn assert_even(builder: SceneBuilder, level: f32, settings: SolveSettings, name:
     let light = &solver.snapshot().light.irradiance;
     let count = light.len() as f32;
     let mean = light.iter().map(|light| light.x / PI).sum::<f32>() / count;
-    assert_close(mean, level, 0.005, format!("mean of {what}"));
+    assert_close(mean, level, most.into(), format!("mean of {what}"));
     let squares = light
         .iter()
         .map(|light| (light.x / PI / level - 1.0).powi(2));
     let deviation = (squares.sum::<f32>() / count).sqrt();
-    println!("{what}: {} {deviation}", mean / level);
-    assert!(deviation < 0.01, "{deviation} of {what}");
+    assert!(deviation < 2.0 * most, "{deviation} of {what}");
 }
 
 #[test]
 fn radiance_is_the_same_everywhere_where_surfaces_complete_the_sky() {
     // Emission L (1 − ρ) under a sky L: everything shows L, whatever stands where.
     type Build = fn(f32, f32) -> SceneBuilder;
-    let scenes: [(&str, Build); 3] = [("blocks", blocks), ("box", open_box), ("columns", columns)];
-    for (name, scene) in scenes {
+    let scenes: [(&str, Build, f32); 3] = [
+        ("blocks", blocks, 0.005),
+        ("box", open_box, 0.005),
+        ("columns", columns, 0.02),
+    ];
+    for (name, scene, most) in scenes {
         for (reflectance, level) in [(0.5, 1.0), (0.9, 2.0), (0.95, 0.5)] {
             for direct in [Direct::Sampled, Direct::Linked] {
                 let settings = SolveSettings {
@@ -410,12 +413,12 @@ fn radiance_is_the_same_everywhere_where_surfaces_complete_the_sky() {
                     ..SolveSettings::normal()
                 };
                 let builder = scene(reflectance, level * (1.0 - reflectance));
-                assert_even(builder, level, settings, name);
+                assert_even(builder, level, settings, name, most);
             }
         }
     }
     for settings in variants() {
-        assert_even(open_box(0.9, 0.2), 2.0, settings, "box");
+        assert_even(open_box(0.9, 0.2), 2.0, settings, "box", 0.005);
     }
 }
 
