@@ -80,6 +80,8 @@ impl Histogram {
 pub struct Follower {
     /// The last metering; `None` before the first light of a scene.
     pub target: Option<f32>,
+    /// Whether only lamps were lit in it, as before their light has arrived anywhere.
+    pub shows_lamps_only: bool,
 }
 
 impl Follower {
@@ -91,6 +93,7 @@ impl Follower {
     /// Take note of a metered picture; one without light changes nothing.
     pub fn note(&mut self, metered: &Metered) {
         self.target = of(metered).or(self.target);
+        self.shows_lamps_only = metered.reflected.is_empty();
     }
 
     /// Exposure after a time, and whether it is still on its way.
@@ -185,11 +188,21 @@ mod tests {
             Some(-3.0)
         );
         assert_eq!(of(&Metered::default()), None);
+        // Metered again once their light has arrived somewhere.
+        let mut follower = Follower::default();
+        for (reflected, shows_lamps_only) in [(Vec::new(), true), (vec![0.25], false)] {
+            let emitted = vec![8.0];
+            follower.note(&Metered { reflected, emitted });
+            assert_eq!(follower.shows_lamps_only, shows_lamps_only);
+        }
     }
 
     #[test]
     fn the_exposure_glides_to_what_was_metered_and_rests() {
-        let follower = Follower { target: Some(-3.0) };
+        let follower = Follower {
+            target: Some(-3.0),
+            ..Follower::default()
+        };
         let (mut exposure, mut frames, mut is_moving) = (2.0, 0, true);
         while is_moving {
             let before = exposure;

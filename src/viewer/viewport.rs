@@ -177,7 +177,7 @@ impl Viewport {
         // Lights that are dimmed would look as bright as before.
         let is_due = key.view.mode.is_light()
             && !key.is_unlit
-            && (is_first || !state.materials.are_changed());
+            && (is_first || state.exposure.shows_lamps_only || !state.materials.are_changed());
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
             let last = self.metered.as_ref();
