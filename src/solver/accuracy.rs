@@ -45,6 +45,7 @@ impl Solver {
         let shown = estimate::Shown {
             scene,
             settings: &self.settings,
+            appearances: &self.relighting.appearances,
             surfaces: Surfaces::new(&self.hierarchy, &self.direct),
             sees_outside: self.plan.sees_outside,
             irradiance: &self.snapshot.light.irradiance,

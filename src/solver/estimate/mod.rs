@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use self::{
     groups::{Groups, Residual},
-    samples::{Place, Samples, Scenery},
+    samples::{Appearances, Place, Point, Samples, Scenery},
     statistics::Reflected,
 };
 use super::{
@@ -33,7 +33,7 @@ use crate::{
     geometry::{Random, RayTree},
     hierarchy::Hierarchy,
     sampling::sample_points,
-    scene::Scene,
+    scene::{Appearance, Scene},
 };
 
 /// How many points, and how many rays over the hemisphere from each in each of the two sets, from few to many. With few
@@ -83,6 +83,8 @@ pub(super) struct Shown<'a> {
     pub scene: &'a Scene,
     /// Settings of the solve.
     pub settings: &'a SolveSettings,
+    /// Present appearance by material.
+    pub appearances: &'a [Appearance],
     /// The elements, with their direct light.
     pub surfaces: Surfaces<'a>,
     /// Whether light from outside arrives.
@@ -98,7 +100,9 @@ pub(super) struct Shown<'a> {
 /// Points and rays of the estimates of a solve, kept from step to step.
 pub(super) struct ErrorEstimator {
     /// The points, in the order of their patches.
-    places: Vec<Option<Place>>,
+    points: Vec<Option<Point>>,
+    /// Appearances of the scene, by material.
+    of_scene: Vec<Appearance>,
     rays: Arc<RayTree>,
     seed: u64,
     /// Index in [`LEVELS`].
@@ -131,19 +135,20 @@ impl ErrorEstimator {
             false => rays.clone(),
         };
         let (points, _) = sample_points(scene, &rays, STORED_POINTS, seed ^ SEEDS[0]);
-        let mut places: Vec<Option<Place>> = points
+        let mut points: Vec<Option<Point>> = points
             .iter()
-            .map(|point| Place::of(hierarchy, point))
+            .map(|point| Point::of(scene, hierarchy, point))
             .collect();
         // Neighbours lie beside each other.
-        places.sort_by_key(|place| place.map_or(u32::MAX, |place| place.patch));
+        points.sort_by_key(|point| point.map_or(u32::MAX, |point| point.place.patch));
         let half = |own: u64| Half {
-            from_points: Samples::new(places.len(), seed ^ own),
-            from_seen: Samples::new(places.len(), (seed ^ own).wrapping_add(1)),
+            from_points: Samples::new(points.len(), seed ^ own),
+            from_seen: Samples::new(points.len(), (seed ^ own).wrapping_add(1)),
         };
         Self {
             halves: [SEEDS[1], SEEDS[2]].map(half),
-            places,
+            points,
+            of_scene: scene.appearances(),
             rays,
             seed: seed ^ SEEDS[0],
             level: 0,
@@ -208,24 +213,30 @@ impl ErrorEstimator {
         let (_, count) = LEVELS[self.level];
         let chosen = self.chosen();
         // The errors of the points by each set of rays.
-        let places: Vec<Option<Place>> = chosen.iter().map(|&point| self.places[point]).collect();
+        let points: Vec<Option<Point>> = chosen.iter().map(|&point| self.points[point]).collect();
+        let places: Vec<Option<Place>> = points
+            .iter()
+            .map(|point| point.map(|point| point.place))
+            .collect();
         let mut errors = Vec::with_capacity(self.halves.len());
         for half in &mut self.halves {
             let (found, shot) = half.errors(scene, &places, &chosen, count)?;
             errors.push(found);
             self.ray_count += shot;
         }
-        let stored = |place: Option<Place>| {
-            place.and_then(|place| scene.stored(place.patch, place.receiver.point))
+        let appearances = Appearances {
+            now: shown.appearances,
+            of_scene: &self.of_scene,
         };
-        let reflected = |(point, place): (usize, &Option<Place>)| {
-            let errors = [0, 1].map(|half| errors[half][point]);
-            stored(*place).map_or_else(Reflected::default, |stored| Reflected::new(&stored, errors))
+        let stored = |point: Option<Point>| point?.stored(scene, appearances);
+        let reflected = |(index, point): (usize, &Option<Point>)| {
+            let errors = [0, 1].map(|half| errors[half][index]);
+            stored(*point).map_or_else(Reflected::default, |stored| Reflected::new(&stored, errors))
         };
-        let reflected: Vec<Reflected> = places.iter().enumerate().map(reflected).collect();
-        let all = self.places.par_iter();
+        let reflected: Vec<Reflected> = points.iter().enumerate().map(reflected).collect();
+        let all = self.points.par_iter();
         let all: Vec<f64> = all
-            .map(|place| stored(*place).map_or(0.0, |stored| statistics::stored_light(&stored)))
+            .map(|point| stored(*point).map_or(0.0, |stored| statistics::stored_light(&stored)))
             .collect();
         Some(EstimatedError {
             points: chosen.len() as u64,
@@ -239,10 +250,10 @@ impl ErrorEstimator {
     fn chosen(&self) -> Vec<usize> {
         let step = (STORED_POINTS as usize).div_ceil(LEVELS[self.level].0);
         let chance = |point: &usize| Random::new(self.seed, *point as u64).next_u32();
-        (0..self.places.len())
+        (0..self.points.len())
             .step_by(step)
             .filter_map(|first| {
-                let end = (first + step).min(self.places.len());
+                let end = (first + step).min(self.points.len());
                 (first..end).min_by_key(chance)
             })
             .collect()

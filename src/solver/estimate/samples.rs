@@ -8,6 +8,7 @@ use crate::{
     geometry::{Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Channels as _, Hierarchy},
     sampling::SurfacePoint,
+    scene::{Appearance, MaterialId, Scene},
     solver::{
         Cancel,
         direct::{DirectFields, PointLight},
@@ -49,6 +50,52 @@ pub(super) struct Stored {
 pub(super) struct Place {
     pub patch: u32,
     pub receiver: Receiver,
+}
+
+/// A point at which the error is estimated.
+#[derive(Clone, Copy)]
+pub(super) struct Point {
+    pub place: Place,
+    material: MaterialId,
+    /// Reflectance there, with the texture, in the appearance of the scene.
+    reflectance: Vec3,
+}
+
+impl Point {
+    /// `None` for a point of a surface that takes no part.
+    pub(super) fn of(scene: &Scene, hierarchy: &Hierarchy, point: &SurfacePoint) -> Option<Self> {
+        Some(Self {
+            place: Place::of(hierarchy, point)?,
+            material: scene.triangles[point.triangle.index()].material,
+            reflectance: point.reflectance,
+        })
+    }
+
+    /// The light stored there; `None` where there is none.
+    pub(super) fn stored(&self, light: Scenery<'_>, shown: Appearances<'_>) -> Option<Stored> {
+        let stored = light.stored(self.place.patch, self.place.receiver.point)?;
+        let [now, before] = [shown.now, shown.of_scene].map(|all| {
+            let appearance = all.get(self.material.index());
+            appearance.map_or(Vec3::ONE, |appearance| appearance.reflectance)
+        });
+        let ratio = |now: f32, before: f32| if before > 0.0 { now / before } else { 0.0 };
+        let change = Vec3::new(
+            ratio(now.x, before.x),
+            ratio(now.y, before.y),
+            ratio(now.z, before.z),
+        );
+        Some(Stored {
+            reflectance: self.reflectance * change,
+            ..stored
+        })
+    }
+}
+
+/// Appearances by material.
+#[derive(Clone, Copy)]
+pub(super) struct Appearances<'a> {
+    pub now: &'a [Appearance],
+    pub of_scene: &'a [Appearance],
 }
 
 impl Place {

@@ -32,6 +32,7 @@ fn estimated(
     let shown = Shown {
         scene: &scene,
         settings,
+        appearances: &solver.relighting.appearances,
         surfaces: solver.surfaces(),
         sees_outside: false,
         irradiance: &irradiance,
