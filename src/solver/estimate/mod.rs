@@ -39,8 +39,7 @@ use crate::{
 /// How many points, and how many rays over the hemisphere from each in each of the two sets, from few to many. With few
 /// points the interval is wide because errors differ from place to place; with few rays it is wide by their noise, which
 /// counts squared. So rays come first, but for points enough to meet every surface.
-const LEVELS: [(usize, u32); 9] = [
-    (64, 32),
+const LEVELS: [(usize, u32); 8] = [
     (128, 32),
     (256, 32),
     (256, 64),
