@@ -597,14 +597,14 @@ fn exact_suites_list_every_figure_and_refuse_cases_of_others() {
     let csv = fs::read_to_string(folder.path().join("out/cie171.csv")).unwrap();
     assert_eq!(csv.lines().count(), 10);
     // Discs are exact, too, but not of the standard.
-    let discs = |suite: &str, epsilon: &str| {
-        let flags = ["--suite", suite, "--cases", "discs", "--epsilon", epsilon];
+    let discs = |suite: &str| {
+        let flags = ["--suite", suite, "--cases", "discs", "--time-limit", "0"];
         report(folder.path(), &flags)
     };
-    let output = discs("cie171", "0.1");
+    let output = discs("cie171");
     assert_eq!(output.status.code(), Some(2), "{}", error_of(&output));
-    // Nothing is within nothing of what is expected.
-    let output = discs("exact", "0");
+    // A case that has no time does not hold.
+    let output = discs("exact");
     assert_eq!(output.status.code(), Some(1), "{}", error_of(&output));
     let sentence = error_of(&output);
     assert!(
