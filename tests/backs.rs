@@ -90,6 +90,7 @@ fn draw(
         snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     let camera = Camera::looking(Vec3::new(20.0, 10.0, from_z), Vec3::ZERO, Vec3::Y);
     let view = ViewSettings {

@@ -425,6 +425,9 @@ fn a_report_writes_tables_and_a_plot() {
     let cells = rows[0].matches('|').count();
     assert!(rows.iter().all(|row| row.matches('|').count() == cells));
     assert!(text.contains("](plates.svg)"));
+    let lights = &json["scenes"][0]["lights"];
+    assert_eq!(lights["sources"][0], "surfaces", "{lights}");
+    assert!(text.contains("Light: 2 emitting triangles."), "{text}");
 }
 
 #[test]

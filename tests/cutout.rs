@@ -93,6 +93,7 @@ fn draw(irradiance: f32, view: &ViewSettings) -> Option<(HeadlessPicture, Cutout
         snapshot: &snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     let camera = Camera::looking(Vec3::new(0.0, 0.0, 160.0), Vec3::ZERO, Vec3::Y);
     let opaque = unless_no_adapter(headless::picture(subject, &camera, view, SIZE))?;

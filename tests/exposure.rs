@@ -89,6 +89,7 @@ fn draw(squares: &(Arc<Scene>, Snapshot), camera: &Camera, mode: ViewMode) -> Op
         snapshot: &squares.1,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     let view = ViewSettings {
         mode,

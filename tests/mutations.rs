@@ -306,12 +306,15 @@ fn a_planted_fault_of_a_material_is_named_with_its_line() {
 
 #[cfg(feature = "viewer")]
 mod sidecar {
+    use std::path::Path;
+
     use glam::{DVec3, Vec3};
     use vecrad::{
-        scene::Frame,
+        scene::{Frame, Lighting, SkySource, SunSource},
         solver::SolveSettings,
         viewer::{
             camera::Camera,
+            saved_light::SavedLight,
             session::{Session, from_toml, to_toml},
             view::ViewSettings,
         },
@@ -325,6 +328,19 @@ mod sidecar {
             centre: DVec3::new(10.0, 0.0, -3.0),
             scale: 7.0,
         };
+        let lighting = Lighting {
+            sky: Some(SkySource::Hosek {
+                turbidity: 2.0,
+                scale: Vec3::ONE,
+            }),
+            sun: Some(SunSource::Disc {
+                azimuth: 90.0,
+                elevation: 30.0,
+                irradiance: Vec3::splat(10.0),
+                diameter: 0.53,
+            }),
+            ..Lighting::default()
+        };
         let session = Session {
             camera: Some(Camera::looking(
                 Vec3::new(90.0, 20.0, 3.0),
@@ -336,6 +352,7 @@ mod sidecar {
                 ..ViewSettings::default()
             },
             settings: SolveSettings::finest(),
+            light: SavedLight::of(&lighting, Path::new("")),
             materials: Vec::new(),
         };
         let text = to_toml(&session, &frame).unwrap();
@@ -358,6 +375,7 @@ mod sidecar {
                     used += 1;
                     assert_eq!(session.settings.check(), Ok(()), "case {case}:\n{text}");
                     assert_eq!(session.view.check(), Ok(()), "case {case}:\n{text}");
+                    assert_eq!(session.light.check(), Ok(()), "case {case}:\n{text}");
                     let valid = session.camera.is_none_or(|camera| camera.is_valid());
                     assert!(valid, "case {case}:\n{text}");
                     assert!(session.view.exposure_factor().is_finite(), "case {case}");

@@ -12,7 +12,10 @@ use image::RgbaImage;
 use pictures::{assert_near, unless_no_adapter};
 use vecrad::{
     export::{ColorOptions, ToneMap},
-    scene::{Material, Scene, SceneBuilder, SceneOptions, Sides, builtin::find_builtin},
+    scene::{
+        Environment, Material, Scene, SceneBuilder, SceneOptions, Sides, Sky, SkyPicture, Texture,
+        UpAxis, builtin::find_builtin,
+    },
     solver::{ClusterBox, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
@@ -103,6 +106,7 @@ fn draw(snapshot: &Snapshot, scene: &Arc<Scene>, view: &ViewSettings) -> Option<
         snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     unless_no_adapter(headless::picture(subject, &camera(), view, SIZE))
 }
@@ -481,6 +485,7 @@ fn a_picture_that_is_too_large_is_one_sentence() {
         snapshot: &snapshot,
         errors: None,
         interior: None,
+        is_dark: false,
     };
     match headless::picture(subject, &camera(), &view, [1_000_000, 2]) {
         Err(HeadlessError::NoAdapter(_)) => {}
@@ -521,5 +526,122 @@ fn edges_of_lamps_are_smooth() {
         });
         let rows = between.count();
         assert!(rows > 40, "{tone_map:?}: {rows} rows have a pixel between");
+    }
+}
+
+#[test]
+fn edges_within_a_picture_are_the_same_without_its_background() {
+    let mut builder = SceneBuilder::default();
+    let lamp = builder.push_material(Material::plain("lamp", Vec3::ZERO, Vec3::splat(50.0)));
+    let wall = builder.push_material(Material::plain("wall", Vec3::splat(0.5), Vec3::ZERO));
+    for (depth, corners, material) in [
+        (0.1, [(-0.8, -0.8), (0.3, -0.8), (-0.1, 0.8)], lamp),
+        (0.0, [(-1.0, -1.0), (3.0, -1.0), (-1.0, 3.0)], wall),
+    ] {
+        let corners = corners.map(|(x, y)| builder.push_position(DVec3::new(x, y, depth)));
+        builder.push_triangle(corners, material);
+    }
+    let options = SceneOptions::with_sides(Sides::One);
+    let scene = Arc::new(builder.finish(&options).expect("a lamp before a wall"));
+    let snapshot = snapshot(&scene, Vec3::splat(0.2));
+    let view = ViewSettings {
+        tone_map: ToneMap::Neutral,
+        ..plain(ViewMode::Radiance)
+    };
+    let Some(opaque) = draw(&snapshot, &scene, &view) else {
+        return;
+    };
+    let subject = Subject {
+        scene: &scene,
+        snapshot: &snapshot,
+        errors: None,
+        interior: None,
+        is_dark: false,
+    };
+    let cutout = headless::cutout(subject, &camera(), &view, SIZE).expect("drawn before");
+    let (mut between, mut covered) = (0, 0);
+    for (seen, alone) in opaque.display.pixels().zip(cutout.display.pixels()) {
+        if alone.0[3] == 255 {
+            covered += 1;
+            between += usize::from((60..200).contains(&seen.0[0]));
+            assert_eq!(seen, alone);
+        }
+    }
+    assert!(covered > 1000 && between > 20, "{covered}, {between}");
+}
+
+/// A picture of a sky that differs everywhere, but smoothly.
+fn sky_texture() -> Arc<Texture> {
+    let (width, height) = (64, 32);
+    let pixel = |index: u32| {
+        let [x, y] = [index % width, index / width].map(|at| at as f32);
+        let turn = x / width as f32 * std::f32::consts::TAU;
+        Vec3::new(2.0 + turn.sin(), 2.0 + turn.cos(), 0.1 * y)
+    };
+    Arc::new(Texture {
+        name: "sky".to_owned(),
+        width,
+        height,
+        pixels: (0..width * height).map(pixel).collect(),
+    })
+}
+
+#[test]
+fn the_sky_is_seen_behind_the_scene_from_where_its_light_comes() {
+    let dark = Scene::clone(&scene());
+    let skies = [UpAxis::Y, UpAxis::Z].into_iter().flat_map(|up| {
+        let picture = |rotation| {
+            Sky::Picture(SkyPicture::new(
+                sky_texture(),
+                Vec3::new(1.0, 0.5, 2.0),
+                up,
+                rotation,
+            ))
+        };
+        [0.0, 70.0].map(picture)
+    });
+    for sky in skies.chain([Sky::Uniform(Vec3::new(0.5, 1.0, 2.0))]) {
+        let environment = Environment {
+            sky: sky.clone(),
+            ..Environment::default()
+        };
+        let scene = Arc::new(dark.clone().in_environment(environment));
+        let snapshot = snapshot(&scene, Vec3::ONE);
+        let subject = Subject {
+            scene: &scene,
+            snapshot: &snapshot,
+            errors: None,
+            interior: None,
+            is_dark: false,
+        };
+        // Away from the walls, and slanted.
+        let camera = Camera::looking(
+            Vec3::new(0.0, 0.0, 130.0),
+            Vec3::new(30.0, 40.0, 200.0),
+            Vec3::Y,
+        );
+        for exposure in [0.0, 3.0] {
+            let view = ViewSettings {
+                exposure,
+                ..plain(ViewMode::Radiance)
+            };
+            let drawn = unless_no_adapter(headless::picture(subject, &camera, &view, SIZE));
+            let Some(picture) = drawn else {
+                return;
+            };
+            let radiance = picture.radiance.expect("it can be read");
+            for (x, y) in [(3, 5), (64, 64), (120, 17), (40, 126)] {
+                let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / 64.0 - 1.0;
+                let (_, direction) = camera.ray(Vec2::new(place.x, -place.y), 1.0);
+                let expected = sky.radiance(direction);
+                let found = Vec3::from_array(radiance.get_pixel(x, y).0);
+                // Half floats have 11 bits.
+                let error = (found - expected).abs().max_element();
+                assert!(
+                    error < 2e-3 * expected.max_element(),
+                    "{found} for {expected}"
+                );
+            }
+        }
     }
 }

@@ -38,5 +38,5 @@ fn every_shader_is_valid() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    assert_eq!(checked, 3, "mesh, lines and tone map");
+    assert_eq!(checked, 4, "sky, mesh, lines and tone map");
 }

@@ -109,3 +109,49 @@ fn two_rays_are_right_on_average() {
     assert!((light - 0.75).abs() < 0.025, "light {light}");
     assert!((area - 0.5).abs() < 0.025, "area {area}");
 }
+
+#[test]
+fn rays_along_an_axis_meet_a_face_across_it_whatever_the_sign_of_zero() {
+    let mut builder = SceneBuilder::default();
+    let material = builder.push_material(Material::plain("", Vec3::splat(0.5), Vec3::ZERO));
+    for axis in 0..3 {
+        let [u, v] = [1, 2].map(|next| {
+            let mut side = DVec3::ZERO;
+            side[(axis + next) % 3] = 2.0;
+            side
+        });
+        let mut corner = DVec3::ONE;
+        for _ in 0..2 {
+            let corners = [corner, corner - u, corner - u - v, corner - v];
+            let corners = corners.map(|at| builder.push_position(at));
+            let [a, b, c, d] = corners;
+            builder.push_triangle([a, b, c], material);
+            builder.push_triangle([a, c, d], material);
+            corner[axis] = -1.0;
+        }
+    }
+    let scene = builder
+        .finish(&SceneOptions::with_sides(Sides::Two))
+        .expect("the box is usable");
+    let rays = RayTree::new(&scene);
+    let half_extent = scene.corners(scene.triangle_ids().next().expect("a face"))[0]
+        .abs()
+        .max_element();
+    let origin = half_extent * Vec3::new(0.1, 0.23, -0.37);
+    for (axis, sign, zero) in (0..3).flat_map(|axis| {
+        [1.0f32, -1.0]
+            .into_iter()
+            .flat_map(move |sign| [0.0f32, -0.0].map(|zero| (axis, sign, zero)))
+    }) {
+        let mut direction = Vec3::splat(zero);
+        direction[axis] = sign;
+        let hit = rays.closest(origin, direction, None);
+        let expected = half_extent - sign * origin[axis];
+        let distance = hit.expect("the box is closed").distance;
+        assert!((distance / expected - 1.0).abs() < 1e-4, "{direction}");
+        assert_eq!(
+            rays.transmittance_outward(origin, direction, None),
+            Vec3::ZERO
+        );
+    }
+}

@@ -110,8 +110,7 @@ impl LightFlags {
             ..Lighting::default()
         };
         let mut irradiance = Vec3::splat(SunSource::IRRADIANCE);
-        let scale = self.sky_scale.unwrap_or(1.0);
-        let mut picture = None;
+        let scale = Vec3::splat(self.sky_scale.unwrap_or(1.0));
         lighting.sky = match &self.sky {
             Some(SkyFlag::Dark) => Some(SkySource::Dark),
             Some(SkyFlag::Uniform(radiance)) => Some(SkySource::Uniform(*radiance * scale)),
@@ -119,24 +118,22 @@ impl LightFlags {
                 let read = read_sky(path).map_err(LoadError::from)?;
                 lighting.files.push(path.clone());
                 lighting.warnings.extend(read.warnings);
-                picture = Some(read.picture);
-                None
+                Some(SkySource::Picture {
+                    picture: Arc::new(read.picture),
+                    file: Some(path.clone()),
+                    scale,
+                    rotation: self.sky_rotation.unwrap_or(0.0),
+                })
             }
             Some(SkyFlag::Hosek(turbidity)) => {
-                let sky = self.hosek(*turbidity)?;
-                irradiance = sky.sun_irradiance;
-                picture = Some(sky.picture);
-                None
+                irradiance = self.hosek(*turbidity)?.sun_irradiance;
+                Some(SkySource::Hosek {
+                    turbidity: *turbidity,
+                    scale,
+                })
             }
             None => None,
         };
-        if let Some(picture) = picture {
-            lighting.sky = Some(SkySource::Picture {
-                picture: Arc::new(picture),
-                scale,
-                rotation: self.sky_rotation.unwrap_or(0.0),
-            });
-        }
         lighting.sun = self.sun.map(|sun| self.sun(sun, irradiance));
         Ok(lighting)
     }
@@ -331,11 +328,16 @@ mod tests {
             picture,
             scale,
             rotation,
+            file,
         }) = found.sky
         else {
             panic!("no picture");
         };
-        assert_eq!((scale, rotation, picture.width), (2.0, -30.0, 4));
+        assert_eq!(
+            (scale, rotation, picture.width),
+            (Vec3::splat(2.0), -30.0, 4)
+        );
+        assert_eq!(file, Some(path));
     }
 
     #[test]
@@ -349,7 +351,9 @@ mod tests {
             irradiance,
             HosekSky::new(3.0, 120.0, 40.0).unwrap().sun_irradiance
         );
-        assert!(matches!(found.sky, Some(SkySource::Picture { .. })));
+        let scale = Vec3::ONE;
+        let turbidity = 3.0;
+        assert_eq!(found.sky, Some(SkySource::Hosek { turbidity, scale }));
         let weak = lighting(&[&sun[..], &["--sun-irradiance", "2"]].concat()).unwrap();
         assert!(matches!(
             weak.sun,

@@ -189,6 +189,7 @@ impl PictureFlags {
             snapshot,
             errors,
             interior: look.interior,
+            is_dark: scene.has_light() && !look.is_lit,
         };
         let encoded = {
             let _capture = StderrCapture::begin();

@@ -1,5 +1,7 @@
 //! The JSON report of `solve`.
 
+use std::fmt;
+
 use glam::Vec3;
 use serde::Serialize;
 
@@ -161,6 +163,53 @@ impl LightFacts {
             emitting_triangles,
             sky,
             sun,
+        }
+    }
+}
+
+impl fmt::Display for LightFacts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let color = |color: [f32; 3]| {
+            let [red, green, blue] = color.map(|channel| format!("{channel:.3}"));
+            match red == green && green == blue {
+                true => red,
+                false => format!("{red}, {green}, {blue}"),
+            }
+        };
+        let mut parts = Vec::new();
+        if self.emitting_triangles > 0 {
+            let s = if self.emitting_triangles == 1 {
+                ""
+            } else {
+                "s"
+            };
+            parts.push(format!("{} emitting triangle{s}", self.emitting_triangles));
+        }
+        let name = if self.sources.contains(&"default sky") {
+            "default sky"
+        } else {
+            "sky"
+        };
+        match &self.sky {
+            None => {}
+            Some(SkyFacts::Uniform { radiance }) => {
+                parts.push(format!("{name} of radiance {} W/(sr·m²)", color(*radiance)));
+            }
+            Some(SkyFacts::Picture { name, scale }) => {
+                parts.push(format!("sky {name} times {}", color(*scale)));
+            }
+        }
+        if let Some(sun) = &self.sun {
+            parts.push(format!(
+                "sun at azimuth {:.1}° and elevation {:.1}°, {} W/m²",
+                sun.azimuth,
+                sun.elevation,
+                color(sun.irradiance)
+            ));
+        }
+        match parts.is_empty() {
+            true => f.write_str("none"),
+            false => f.write_str(&parts.join("; ")),
         }
     }
 }

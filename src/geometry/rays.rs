@@ -136,7 +136,7 @@ impl RayTree {
             return Vec3::ONE;
         }
         let until = length - RAY_OFFSET;
-        let ray = Ray::new(from.into(), (separation / length).into(), RAY_OFFSET, until);
+        let ray = ray_until(from, separation / length, until);
         self.passing(ray, ends)
     }
 
@@ -151,7 +151,7 @@ impl RayTree {
         if self.is_clear() {
             return Vec3::ONE;
         }
-        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        let ray = ray_until(origin, direction, f32::MAX);
         self.passing(ray, [from, None])
     }
 
@@ -217,7 +217,7 @@ impl RayTree {
         if self.is_clear() {
             return None;
         }
-        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        let ray = ray_until(origin, direction, f32::MAX);
         let start = from.map_or(u32::MAX, |id| id.0);
         let mut hit = RayHit::none();
         let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
@@ -259,7 +259,7 @@ impl RayTree {
             return Vec3::ONE;
         };
         let end = hit.map_or(f32::MAX, |hit| hit.distance);
-        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, end);
+        let ray = ray_until(origin, direction, end);
         let met = hit.map_or(u32::MAX, |hit| hit.triangle.0);
         let start = from.map_or(u32::MAX, |id| id.0);
         let mut tint = Vec3::ONE;
@@ -289,7 +289,7 @@ impl RayTree {
         from: Option<TriangleId>,
         bounds: impl Fn(TriangleId) -> bool,
     ) -> i32 {
-        let ray = Ray::new(origin.into(), direction.into(), RAY_OFFSET, f32::MAX);
+        let ray = ray_until(origin, direction, f32::MAX);
         let mut left = 0;
         // Nothing counts as met, so that the ray goes through everything.
         self.tree
@@ -313,6 +313,12 @@ impl RayTree {
             + size_of_val(self.ids.as_slice())
             + self.panes.as_ref().map_or(0, |panes| panes.memory_bytes())
     }
+}
+
+/// A ray of unit direction that ends at a distance.
+fn ray_until(origin: Vec3, direction: Vec3, until: f32) -> Ray {
+    // Adding 0 turns -0 into 0: the tree takes it for a direction below 0, and misses what lies across it.
+    Ray::new(origin.into(), (direction + 0.0).into(), RAY_OFFSET, until)
 }
 
 fn point_at(ray: &Ray, distance: f32) -> Vec3 {

@@ -163,16 +163,23 @@ impl Sky {
 impl SkyPicture {
     /// A picture around a scene, turned clockwise as seen from above by an angle in degrees.
     pub fn new(picture: Arc<Texture>, scale: Vec3, up: UpAxis, rotation: f32) -> Self {
-        // As Blender converts: east stays +X, and north is +Y or -Z.
-        let upright = match up {
-            UpAxis::Y => Mat3::IDENTITY,
-            UpAxis::Z => Mat3::from_cols(Vec3::X, Vec3::NEG_Z, Vec3::Y),
-        };
         Self {
             picture,
             scale,
-            from_scene: Mat3::from_rotation_y(rotation.to_radians()) * upright,
+            from_scene: Mat3::from_rotation_y(rotation.to_radians()) * upright(up),
         }
+    }
+
+    /// By how much the picture is turned clockwise as seen from above, degrees, -180 to 180; see [`Self::new`].
+    pub fn rotation(&self, up: UpAxis) -> f32 {
+        let turn = self.from_scene * upright(up).transpose();
+        turn.z_axis.x.atan2(turn.z_axis.z).to_degrees()
+    }
+
+    /// The rotation from directions of the scene to those of the picture, in which +Y is up, the middle is +Z, and +X is
+    /// a quarter of the width left of it.
+    pub fn from_scene(&self) -> Mat3 {
+        self.from_scene
     }
 
     /// The place of the direction of a unit vector, across from the left and down from the top, each 0 to 1.
@@ -233,6 +240,14 @@ impl SkyPicture {
             }
         }
         samples
+    }
+}
+
+/// From directions of a scene to those in which +Y is up. As Blender converts: east stays +X, and north is +Y or -Z.
+fn upright(up: UpAxis) -> Mat3 {
+    match up {
+        UpAxis::Y => Mat3::IDENTITY,
+        UpAxis::Z => Mat3::from_cols(Vec3::X, Vec3::NEG_Z, Vec3::Y),
     }
 }
 
@@ -398,6 +413,10 @@ mod tests {
                 Sky::Picture(SkyPicture::new(picture(32), Vec3::splat(2.0), up, rotation))
             };
             let lifted = |horizontal: Vec3| (horizontal + 0.2 * up.vector()).normalize_or_zero();
+            for rotation in [0.0, 35.0, -120.0] {
+                let turned = SkyPicture::new(picture(32), Vec3::ONE, up, rotation);
+                assert!((turned.rotation(up) - rotation).abs() < 1e-3);
+            }
             assert!(sky(0.0).radiance(lifted(south)).x > 0.9, "the middle");
             near(sky(0.0).radiance(lifted(east)), Vec3::Y * 2.0);
             // Clockwise as seen from above, south turns to west.

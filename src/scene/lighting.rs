@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::Arc};
 use glam::Vec3;
 
 use super::{
-    Environment, Scene, Sky, SkyPicture, Sun, Texture, UpAxis, Warning, WarningKind,
+    Environment, HosekSky, Scene, Sky, SkyPicture, Sun, Texture, UpAxis, Warning, WarningKind,
     suggestion::closest,
 };
 
@@ -17,6 +17,10 @@ pub struct Lighting {
     pub sky: Option<SkySource>,
     /// The sun.
     pub sun: Option<SunSource>,
+    /// Whether the sky is switched off, whichever it is.
+    pub is_sky_off: bool,
+    /// Whether the sun is switched off, whichever it is.
+    pub is_sun_off: bool,
     /// Materials with another emission.
     pub lamps: Vec<Lamp>,
     /// Files that it was read from.
@@ -32,12 +36,21 @@ pub enum SkySource {
     Dark,
     /// The same radiance from all directions.
     Uniform(Vec3),
+    /// A clear or hazy day about the place of the sun; see [`HosekSky`]. Dark while there is no sun above the horizon.
+    Hosek {
+        /// 1 in clean air, 3 on a clear day, 10 in haze.
+        turbidity: f32,
+        /// Factor on its radiance.
+        scale: Vec3,
+    },
     /// An equirectangular picture.
     Picture {
         /// Radiance; the top row is straight up, the middle is south.
         picture: Arc<Texture>,
+        /// The file that it was read from.
+        file: Option<PathBuf>,
         /// Factor on its radiance.
-        scale: f32,
+        scale: Vec3,
         /// Clockwise turn as seen from above, degrees.
         rotation: f32,
     },
@@ -121,13 +134,18 @@ impl Lighting {
     pub fn environment(&self, scene: &Scene) -> Environment {
         let own = (*scene.environment).clone().scaled(scene.radiance_unit);
         let own_sky = if own.is_default { Sky::Dark } else { own.sky };
+        let sun = self.sun.map_or(own.sun, |sun| sun.sun(scene.up));
         let environment = Environment {
-            sky: self.sky.as_ref().map_or(own_sky, |sky| sky.sky(scene.up)),
-            sun: self.sun.map_or(own.sun, |sun| sun.sun(scene.up)),
+            sky: match &self.sky {
+                _ if self.is_sky_off => Sky::Dark,
+                Some(sky) => sky.sky(scene.up, sun),
+                None => own_sky,
+            },
+            sun: sun.filter(|_| !self.is_sun_off),
             is_default: false,
         };
-        let needs_sky = self.sky.is_none() && environment.sky.is_dark() && !scene.has_emitter();
-        if needs_sky {
+        let is_asked_for = self.sky.is_some() || self.is_sky_off;
+        if !is_asked_for && environment.sky.is_dark() && !scene.has_emitter() {
             environment.with_default_sky()
         } else {
             environment
@@ -160,18 +178,48 @@ impl Lighting {
 }
 
 impl SkySource {
-    fn sky(&self, up: UpAxis) -> Sky {
+    /// A sky that a scene has, asked for; `unit` is the scene's [`Scene::radiance_unit`].
+    pub fn of(sky: &Sky, up: UpAxis, unit: f32) -> Self {
+        match sky {
+            Sky::Dark => Self::Dark,
+            Sky::Uniform(radiance) => Self::Uniform(*radiance * unit),
+            Sky::Picture(sky) => Self::Picture {
+                picture: sky.picture.clone(),
+                file: None,
+                scale: sky.scale * unit,
+                rotation: sky.rotation(up),
+            },
+        }
+    }
+
+    /// The factor on its radiance, or the radiance itself; of no sky there is none.
+    pub fn scale_mut(&mut self) -> Option<&mut Vec3> {
+        match self {
+            Self::Dark => None,
+            Self::Uniform(scale) | Self::Hosek { scale, .. } | Self::Picture { scale, .. } => {
+                Some(scale)
+            }
+        }
+    }
+
+    fn sky(&self, up: UpAxis, sun: Option<Sun>) -> Sky {
         match self {
             Self::Dark => Sky::Dark,
             Self::Uniform(radiance) => Sky::Uniform(*radiance),
+            Self::Hosek { turbidity, scale } => {
+                let place = sun.map(|sun| sun.place(up));
+                let sky = place
+                    .and_then(|[azimuth, elevation]| HosekSky::new(*turbidity, azimuth, elevation));
+                sky.map_or(Sky::Dark, |sky| {
+                    Sky::Picture(SkyPicture::new(Arc::new(sky.picture), *scale, up, 0.0))
+                })
+            }
             Self::Picture {
                 picture,
                 scale,
                 rotation,
-            } => {
-                let scale = Vec3::splat(*scale);
-                Sky::Picture(SkyPicture::new(picture.clone(), scale, up, *rotation))
-            }
+                ..
+            } => Sky::Picture(SkyPicture::new(picture.clone(), *scale, up, *rotation)),
         }
     }
 }
@@ -180,6 +228,17 @@ impl SunSource {
     /// Irradiance of a surface that faces the sun where nobody says how much, W/m²: about three times what the default
     /// sky gives to open ground, π. Much less, and shadows are faint; much more, and they are black beside the light.
     pub const IRRADIANCE: f32 = 10.0;
+
+    /// A sun that a scene has, asked for; `unit` is the scene's [`Scene::radiance_unit`].
+    pub fn of(sun: &Sun, up: UpAxis, unit: f32) -> Self {
+        let [azimuth, elevation] = sun.place(up);
+        Self::Disc {
+            azimuth: azimuth.rem_euclid(360.0),
+            elevation,
+            irradiance: sun.irradiance * unit,
+            diameter: sun.diameter.to_degrees(),
+        }
+    }
 
     fn sun(self, up: UpAxis) -> Option<Sun> {
         match self {

@@ -150,7 +150,7 @@ impl Texture {
     }
 
     /// The picture with sides halved until it has at most so many pixels, but at least one.
-    pub(super) fn reduced_to(mut self, max_pixels: usize) -> Self {
+    pub fn reduced_to(mut self, max_pixels: usize) -> Self {
         while self.pixels.len() > max_pixels.max(1) {
             self = self.halved();
         }

@@ -18,10 +18,10 @@ use super::{
     vertices::LeafLight,
 };
 use crate::{
-    geometry::RayTree,
-    hierarchy::{Channels as _, Hierarchy, luminance},
+    geometry::{Random, RayTree},
+    hierarchy::{Channels as _, Hierarchy, NodeId, luminance},
     transport::{
-        Estimate, Judge, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement, Refiner,
+        Estimate, Judge, Link, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement, Refiner,
     },
 };
 
@@ -125,7 +125,43 @@ impl Refining<'_> {
             refined.ray_count += direct.sample(self.rays, hierarchy, self.limits, self.cancel)?;
             linked.pull(Surfaces::new(hierarchy, direct));
         }
+        if self.rays.has_coloured_panes() {
+            refined.ray_count += self.tint_links(hierarchy, linked)?;
+        }
         Some(refined)
+    }
+
+    /// Estimate what coloured panes make of the light of each link. Returns the rays shot; `None` when cancelled.
+    fn tint_links(&self, hierarchy: &Hierarchy, linked: &mut LinkedLight) -> Option<u64> {
+        let areas = PatchSums::of_area(hierarchy, &linked.power);
+        let powers = PatchSums::of_power(hierarchy, &linked.power);
+        let sampler = PairSampler {
+            hierarchy,
+            tables: &linked.power,
+            areas: &areas,
+            powers: &powers,
+            rays: self.rays,
+        };
+        let links = &linked.links;
+        let found: Vec<(Vec3, u32)> = (0..hierarchy.node_count() as u32)
+            .into_par_iter()
+            .flat_map_iter(|receiver| {
+                let of_link = move |link: &Link| {
+                    // Nothing passes, or all of every ray.
+                    if [0.0, 1.0].contains(&link.light_factor()) || self.cancel.is_cancelled() {
+                        return (Vec3::ONE, 0);
+                    }
+                    let pair = (u64::from(link.source.0) << 32) | u64::from(receiver);
+                    let mut random = Random::new(self.settings.seed, pair);
+                    sampler.tint(link.source, NodeId(receiver), &mut random)
+                };
+                links.of(NodeId(receiver)).iter().map(of_link)
+            })
+            .collect();
+        self.cancel.proceed()?;
+        let (tints, rays): (Vec<Vec3>, Vec<u32>) = found.into_iter().unzip();
+        linked.links.tint(tints);
+        Some(rays.into_iter().map(u64::from).sum())
     }
 
     /// Judge all links and replace those whose errors exceed the threshold. `judged` is the number of nodes when they
@@ -238,7 +274,6 @@ mod tests {
 
     use super::*;
     use crate::{
-        hierarchy::NodeId,
         scene::{
             SceneOptions,
             builtin::{empty_cornell, find_builtin},

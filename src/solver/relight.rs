@@ -47,6 +47,7 @@ impl Solver {
             surfaces: self.surfaces(),
             leaves: &self.leaves,
             squares: &squares,
+            coverage: &self.coverage,
             rays: &self.rays,
             limits: self.limits(threshold_scale),
             converged_change: vertices::converged_change(tolerance, self.mean_irradiance),

@@ -246,9 +246,9 @@ pub(super) fn begin_from(linked: &mut LinkedLight, surfaces: Surfaces<'_>, emitt
     let scale = |light: &mut Vec4| *light *= ratio.extend(1.0);
     linked.irradiance.iter_mut().for_each(scale);
     linked.pull(surfaces);
-    let sent = area_total(surfaces.hierarchy, |leaf| linked.radiosity(surfaces, leaf))
-        + surfaces.sampled_power();
-    if sent > CEILING_SLACK * surfaces.most_power() {
+    let powers = surfaces.powers();
+    let sent = area_total(surfaces.hierarchy, |leaf| linked.radiosity(surfaces, leaf));
+    if sent + powers.sampled > CEILING_SLACK * powers.most {
         linked.irradiance.fill(Vec4::ZERO);
         linked.pull(surfaces);
     }

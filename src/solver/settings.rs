@@ -128,7 +128,7 @@ impl SolveSettings {
         }
     }
 
-    /// The default: about 5 % error.
+    /// The default: about 2 % error.
     pub const fn normal() -> Self {
         Self {
             method: Method::Bounded,
@@ -159,7 +159,7 @@ impl SolveSettings {
         }
     }
 
-    /// For a final bake: about 2 % error.
+    /// For a final bake: about 1 % error.
     pub const fn finest() -> Self {
         Self {
             epsilon: 0.002,

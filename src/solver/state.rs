@@ -354,7 +354,10 @@ impl Solver {
         Some(refined.epsilon)
     }
 
+    /// Complete the coverage by what the sky fills, and find the factors of the senders.
     fn balance(&mut self, cancel: &Cancel) -> Option<()> {
+        let sky = self.direct.sky_shares(&self.hierarchy);
+        self.coverage.complete(&self.hierarchy, sky.as_ref());
         let surfaces = Surfaces::new(&self.hierarchy, &self.direct);
         let (coverage, settings) = (&self.coverage, &self.settings);
         iteration::balance(&mut self.linked, surfaces, coverage, settings, cancel)

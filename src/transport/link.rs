@@ -1,5 +1,7 @@
 //! Links: over which pairs of nodes light travels.
 
+use std::ops::Deref;
+
 use glam::{Vec3, Vec4};
 
 use crate::hierarchy::{Hierarchy, NodeId};
@@ -69,12 +71,81 @@ impl Link {
     }
 }
 
+/// A link, and what coloured panes on its way make of its light.
+#[derive(Clone, Copy, Debug)]
+pub struct TintedLink<'a> {
+    link: &'a Link,
+    /// Factor by colour, 1 on average; `None` where no pane is coloured.
+    tint: Option<&'a Vec3>,
+}
+
+impl Deref for TintedLink<'_> {
+    type Target = Link;
+
+    fn deref(&self) -> &Link {
+        self.link
+    }
+}
+
+impl TintedLink<'_> {
+    /// As [`Link::light_factor`], by channel.
+    pub fn tinted_light_factor(&self) -> Vec4 {
+        self.tinted(Vec4::splat(self.light_factor()))
+    }
+
+    /// As [`Link::form_factor`], by channel.
+    pub fn tinted_form_factor(&self) -> Vec4 {
+        self.tinted(Vec4::splat(self.form_factor()))
+    }
+
+    /// As [`Link::transmission`], by channel.
+    pub fn tinted_transmission(&self) -> Vec4 {
+        self.tinted(self.transmission())
+    }
+
+    fn tinted(&self, factor: Vec4) -> Vec4 {
+        self.tint.map_or(factor, |tint| factor * tint.extend(1.0))
+    }
+}
+
+/// The links of one receiver with their tints.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TintedLinks<'a> {
+    links: &'a [Link],
+    /// Empty where no pane is coloured.
+    tints: &'a [Vec3],
+}
+
+impl<'a> TintedLinks<'a> {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.links.is_empty()
+    }
+
+    /// Call `visit` for each link in order. Two loops, since that without tints is the common one and takes most of the
+    /// time of a sweep.
+    pub fn for_each(self, mut visit: impl FnMut(TintedLink<'a>)) {
+        if self.tints.is_empty() {
+            for link in self.links {
+                visit(TintedLink { link, tint: None });
+            }
+        } else {
+            for (link, tint) in self.links.iter().zip(self.tints) {
+                let tint = Some(tint);
+                visit(TintedLink { link, tint });
+            }
+        }
+    }
+}
+
 /// All links, grouped by receiver.
 #[derive(Clone, Debug, Default)]
 pub struct LinkStore {
     /// Start of each receiver's run; one more than there are nodes.
     offsets: Vec<u32>,
     links: Vec<Link>,
+    /// By link, what coloured panes make of its light; empty where no pane is coloured.
+    tints: Vec<Vec3>,
 }
 
 impl LinkStore {
@@ -100,6 +171,7 @@ impl LinkStore {
         Self {
             offsets,
             links: sorted,
+            tints: Vec::new(),
         }
     }
 
@@ -109,6 +181,24 @@ impl LinkStore {
             Some(&[start, end]) => &self.links[start as usize..end as usize],
             _ => &[],
         }
+    }
+
+    /// As [`Self::of`], with their tints.
+    pub fn tinted(&self, node: NodeId) -> TintedLinks<'_> {
+        let links = self.of(node);
+        let tints = match self.offsets.get(node.index()) {
+            Some(&start) if !links.is_empty() && !self.tints.is_empty() => {
+                &self.tints[start as usize..][..links.len()]
+            }
+            _ => &[],
+        };
+        TintedLinks { links, tints }
+    }
+
+    /// Set the tint of each link, in their order: factors of its light by colour, 1 on average over the colours.
+    pub fn tint(&mut self, tints: Vec<Vec3>) {
+        assert_eq!(tints.len(), self.links.len(), "a tint for each link");
+        self.tints = tints;
     }
 
     /// All links, grouped by receiver.
@@ -141,6 +231,8 @@ impl LinkStore {
 
     /// Memory in bytes.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.links.as_slice()) + size_of_val(self.offsets.as_slice())
+        size_of_val(self.links.as_slice())
+            + size_of_val(self.offsets.as_slice())
+            + size_of_val(self.tints.as_slice())
     }
 }

@@ -9,11 +9,12 @@ mod patch_sums;
 mod refine;
 mod refiner;
 mod sights;
+mod tint;
 mod validate;
 mod visibility;
 
 pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};
-pub use link::{Link, LinkStore};
+pub use link::{Link, LinkStore, TintedLink, TintedLinks};
 pub(crate) use oracle::self_irradiance;
 pub use oracle::{Estimate, Judge, Judgement};
 pub use patch_sums::PatchSums;

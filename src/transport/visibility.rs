@@ -43,7 +43,7 @@ struct Sample {
 
 /// An element to sample points on.
 #[derive(Clone, Copy, Debug)]
-struct Facet {
+pub(super) struct Facet {
     corners: [Vec3; 3],
     normal: Vec3,
     triangle: TriangleId,
@@ -65,7 +65,7 @@ impl Facet {
 }
 
 /// A node whose points are sampled by area.
-enum Receiver {
+pub(super) enum Receiver {
     /// An element as a whole, without regard to its children.
     Element(Facet),
     /// An element with inactive parts.
@@ -75,7 +75,7 @@ enum Receiver {
 }
 
 /// A node whose points are sampled by power and by area in turn.
-struct Source {
+pub(super) struct Source {
     kind: Kind,
     /// The element if it is a leaf; otherwise a leaf is chosen for each point.
     leaf: Option<Facet>,
@@ -87,10 +87,10 @@ struct Source {
 
 /// A candidate point of a source.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+pub(super) struct Candidate {
     from: Sample,
     /// Light that the point stands for, relative to that of a point sampled by area on a source of uniform radiosity.
-    light: f32,
+    pub(super) light: f32,
     /// Area that the point stands for, likewise.
     area: f32,
 }
@@ -161,7 +161,7 @@ impl PairSampler<'_> {
         (sample.point, sample.normal)
     }
 
-    fn receiver(&self, node: NodeId) -> Receiver {
+    pub(super) fn receiver(&self, node: NodeId) -> Receiver {
         match self.hierarchy.kind(node) {
             Kind::Element(index) if self.is_whole(index) => Receiver::Element(self.facet(index)),
             Kind::Element(index) => Receiver::Parts(index),
@@ -191,7 +191,7 @@ impl PairSampler<'_> {
         }
     }
 
-    fn source(&self, node: NodeId) -> Source {
+    pub(super) fn source(&self, node: NodeId) -> Source {
         let kind = self.hierarchy.kind(node);
         let (leaf, area, power) = match kind {
             Kind::Element(index) => {
@@ -298,22 +298,9 @@ impl PairSampler<'_> {
         let mut all = Share::default();
         let (source, receiver) = (self.source(source), self.receiver(receiver));
         for _ in 0..ray_count {
-            let (mut chosen, mut sum) = (None, 0.0);
-            for _ in 0..CANDIDATES {
-                let candidate = self.sample_source(&source, random);
-                let to = self.sample(&receiver, random);
-                let weight = transfer(&candidate.from, &to);
-                sum += weight;
-                if chosen.is_none() || random.uniform() * sum < weight {
-                    chosen = Some((candidate, to));
-                }
-            }
-            let Some((candidate, to)) = chosen else {
+            let Some((candidate, sum, passing)) = self.pair(&source, &receiver, random) else {
                 continue;
             };
-            let from = candidate.from;
-            let ends = [Some(to.triangle), Some(from.triangle)];
-            let passing = self.rays.transmittance(to.point, from.point, ends);
             let visible = passing.element_sum() / 3.0;
             all.count(1.0, visible);
             light.count(sum * candidate.light, visible);
@@ -321,6 +308,31 @@ impl PairSampler<'_> {
         }
         let area = area.part().or(all.part()).unwrap_or(1.0);
         (light.part().unwrap_or(area), area)
+    }
+
+    /// A pair of points by their unoccluded transfer, with the summed transfer of its candidates and what passes between
+    /// them, by channel, 0…1.
+    pub(super) fn pair(
+        &self,
+        source: &Source,
+        receiver: &Receiver,
+        random: &mut Random,
+    ) -> Option<(Candidate, f32, Vec3)> {
+        let (mut chosen, mut sum) = (None, 0.0);
+        for _ in 0..CANDIDATES {
+            let candidate = self.sample_source(source, random);
+            let to = self.sample(receiver, random);
+            let weight = transfer(&candidate.from, &to);
+            sum += weight;
+            if chosen.is_none() || random.uniform() * sum < weight {
+                chosen = Some((candidate, to));
+            }
+        }
+        let (candidate, to) = chosen?;
+        let from = candidate.from;
+        let ends = [Some(to.triangle), Some(from.triangle)];
+        let passing = self.rays.transmittance(to.point, from.point, ends);
+        Some((candidate, sum, passing))
     }
 
     /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of

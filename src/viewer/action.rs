@@ -40,6 +40,8 @@ pub enum Action {
     Relight(Materials),
     /// Light the scene from another sky and sun.
     Light(Lighting),
+    /// Left drags move the sun, or again the camera.
+    ToggleSunDrag,
     /// Lights and materials as before the last change.
     Undo,
     /// Lights and materials as before that was undone.

@@ -32,6 +32,7 @@ use super::{
     theme,
     viewport::{Viewport, viewport_ui},
 };
+use crate::scene::Lighting;
 use crate::worker::{RunOptions, Wake, WorkerHandle};
 
 /// When the next frame is drawn after something arrived. At once would draw two frames, and on a processor that plays
@@ -66,6 +67,8 @@ pub struct App {
     title: Option<String>,
     /// Camera and view stay as they are when the scene being read arrives.
     keeps_view: bool,
+    /// Light that the command line asked for; it goes before that of any sidecar.
+    asked_light: Lighting,
     /// Whether a control had the keyboard focus at the end of the last frame.
     had_focus: bool,
     /// Size of the window in the last frame, points.
@@ -106,7 +109,6 @@ impl App {
                 ..options.run.clone()
             },
             scene_options: options.scene_options,
-            lighting: options.lighting.clone(),
             view: options.view.apply(&preferences.view()),
             panels: preferences.panels(),
             recent,
@@ -131,6 +133,7 @@ impl App {
             first: None,
             title: None,
             keeps_view: false,
+            asked_light: options.lighting.clone(),
             had_focus: false,
             size: egui::Vec2::ZERO,
         };
@@ -189,11 +192,12 @@ impl eframe::App for App {
         let picked = egui::CentralPanel::no_frame()
             .show(ui, |ui| {
                 let rect = ui.available_rect_before_wrap();
-                let picked = viewport_ui(ui, self.viewport.as_mut(), &mut self.state);
+                let picked = viewport_ui(ui, self.viewport.as_mut(), &mut self.state, &mut actions);
                 if self.state.loaded.is_none() && self.state.loading.is_none() {
                     panels::scene::empty_ui(ui, rect, &mut self.state, &mut actions);
                 }
                 panels::scene::waiting_ui(ui, rect, &self.state);
+                panels::dark::dark_ui(ui, rect, &self.state, &mut actions);
                 panels::legend::legend_ui(ui, rect, &self.state);
                 picked
             })

@@ -217,6 +217,12 @@ pub fn bindings() -> Vec<Binding> {
             Action::Stop,
         ),
         command(Key::R, Solve, "Restart", Action::Reset),
+        plain(
+            Key::U,
+            Solve,
+            "Left drag moves the sun, or the camera again",
+            Action::ToggleSunDrag,
+        ),
         command(
             Key::Z,
             Solve,
@@ -246,7 +252,7 @@ pub fn bindings() -> Vec<Binding> {
         command(
             Key::S,
             File,
-            "Save camera and settings beside the scene",
+            "Save camera, settings and changed lights beside the scene",
             Action::SaveSidecar,
         ),
         command(Key::E, File, "Export the lit mesh…", Action::MeshDialog),

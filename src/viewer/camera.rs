@@ -160,6 +160,20 @@ impl Camera {
         }
     }
 
+    /// The directions that are seen, linear in the place of the picture: that of its middle, and what those of its right
+    /// edge and of its upper edge differ by. In parallel projection all are the same.
+    pub fn rays(&self, aspect: f32) -> [Vec3; 3] {
+        let half = match self.orthographic {
+            true => 0.0,
+            false => (0.5 * self.fov_y_radians).tan(),
+        };
+        [
+            -self.backward(),
+            self.right() * (half * aspect),
+            self.upward() * half,
+        ]
+    }
+
     /// Turn by a drag in points.
     pub fn orbit(&mut self, drag: Vec2) {
         const RADIANS_PER_POINT: f32 = 0.008;

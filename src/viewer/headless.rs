@@ -68,6 +68,15 @@ pub struct Subject<'a> {
     pub errors: Option<&'a Arc<Vec<f32>>>,
     /// The room, where the scene is one.
     pub interior: Option<Interior>,
+    /// Whether no light reaches what it shows first: under automatic exposure surfaces are shown instead.
+    pub is_dark: bool,
+}
+
+impl Subject<'_> {
+    /// Whether there is no light to show.
+    fn is_unlit(&self, view: &ViewSettings) -> bool {
+        !self.snapshot.is_lit() || (self.is_dark && view.auto_exposure)
+    }
 }
 
 /// A device of one's own.
@@ -158,7 +167,7 @@ pub fn cutout(
     with_picture(subject, camera, &view, |picture| {
         renderer.render_cutout(&target, picture)
     })?;
-    Ok(target.read(renderer.gpu(), view.tone_map, exposure_factor)?)
+    Ok(target.read(renderer.gpu(), exposure_factor)?)
 }
 
 /// A view with the exposure that the picture asks for, where it is automatic.
@@ -170,7 +179,7 @@ fn exposed(
     size: [u32; 2],
 ) -> Result<ViewSettings, HeadlessError> {
     let mut view = view.clone();
-    if view.auto_exposure && view.mode.is_light() && subject.snapshot.is_lit() {
+    if view.auto_exposure && view.mode.is_light() && !subject.is_unlit(&view) {
         let metering = with_picture(subject, camera, &view, |picture| {
             renderer.measure(size, picture)
         })?;
@@ -192,6 +201,7 @@ fn with_picture<T>(
         snapshot,
         errors,
         interior,
+        ..
     } = subject;
     let shown = clusters::shown(&snapshot.clusters, &view.clusters);
     let boxes = cluster_lines::boxes(&snapshot.clusters, &shown, &view.clusters);
@@ -205,7 +215,7 @@ fn with_picture<T>(
         light: &snapshot.light,
         errors,
         camera,
-        is_unlit: !snapshot.is_lit(),
+        is_unlit: subject.is_unlit(view),
         range: light_range::false_color_range(
             snapshot,
             view,

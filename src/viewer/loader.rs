@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     camera::Camera,
-    first_look::{Interior, first_look},
+    first_look::{Interior, first_look, shows_light},
 };
 use crate::{
     geometry::RayTree,
@@ -68,8 +68,10 @@ pub struct LoadedScene {
     pub source: SceneSource,
     /// The scene.
     pub scene: Arc<Scene>,
+    /// The light that it has beside its own.
+    pub lighting: Lighting,
     /// Sky and sun that it brings along, in its own units.
-    own_environment: Arc<Environment>,
+    pub own_environment: Arc<Environment>,
     /// For picking, and for the reference.
     pub rays: Arc<RayTree>,
     /// Lower corner of what matters, in frame units.
@@ -98,6 +100,8 @@ impl LoadedScene {
         let environment = lighting.environment(&scene);
         let scene = scene.in_environment(environment);
         Self {
+            lighting: lighting.clone(),
+            is_lit: self.is_lit || shows_light(&scene, &self.rays, &self.viewpoint),
             is_grey: is_grey(&scene),
             scene: Arc::new(scene),
             ..self.clone()
@@ -182,14 +186,14 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// Begin to read.
+    /// Begin to read. What the scene has beside its own light is looked up on the thread.
     ///
     /// # Errors
     /// When the system refuses a thread.
     pub fn start(
         source: SceneSource,
         options: SceneOptions,
-        lighting: Lighting,
+        lighting: impl FnOnce() -> Lighting + Send + 'static,
         wake: Wake,
     ) -> std::io::Result<Self> {
         let (sender, receiver) = mpsc::channel();
@@ -199,7 +203,7 @@ impl Loader {
             .name("loader".to_owned())
             .spawn(move || {
                 // Nobody listens when another scene was asked for meanwhile.
-                let _ = sender.send(load(wanted, &options, &lighting, &tracked));
+                let _ = sender.send(load(wanted, &options, lighting, &tracked));
                 wake();
             })?;
         Ok(Self {
@@ -240,7 +244,7 @@ impl Loader {
 fn load(
     source: SceneSource,
     options: &SceneOptions,
-    lighting: &Lighting,
+    lighting: impl FnOnce() -> Lighting,
     tracker: &Tracker,
 ) -> Result<LoadedScene, String> {
     tracker.enter(Phase::Reading);
@@ -258,6 +262,7 @@ fn load(
         }
     };
     let own_environment = scene.environment.clone();
+    let lighting = lighting();
     let scene = lighting.apply(scene);
     tracker.enter(Phase::BuildingRayTree);
     let rays = RayTree::new(&scene);
@@ -266,6 +271,7 @@ fn load(
     let [min, max] = look.bounds;
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
+        lighting,
         own_environment,
         emitter_count: scene.surfaces.iter().filter(emits).count(),
         has_backs: scene.triangles.iter().any(|triangle| !triangle.two_sided),

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{Appearance, Lighting, Material, Scene, Surface, TriangleId};
+use crate::scene::{Appearance, Lamp, Lighting, Material, Scene, Surface, TriangleId};
 
 /// A light as its controls show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,10 +154,11 @@ impl Materials {
             .collect()
     }
 
-    /// The materials that were changed.
-    pub fn changes(&self) -> Vec<SavedMaterial> {
+    /// The materials that were changed, here or by lamps that are asked for.
+    pub fn changes(&self, asked: &[Lamp]) -> Vec<SavedMaterial> {
         let pairs = self.now.iter().zip(&self.of_file);
-        let changed = pairs.filter(|(now, of_file)| now != of_file);
+        let is_asked = |name: &str| asked.iter().any(|lamp| lamp.material == name);
+        let changed = pairs.filter(|(now, of_file)| now != of_file || is_asked(&now.name));
         changed
             .map(|(now, _)| {
                 let Appearance {
@@ -173,8 +174,9 @@ impl Materials {
             .collect()
     }
 
-    /// Change materials as they were saved; returns the names that no material has.
-    pub fn restore<'a>(&mut self, saved: &'a [SavedMaterial]) -> Vec<&'a str> {
+    /// Change materials as they were saved, but the emission of lamps that are asked for; returns the names that no
+    /// material has.
+    pub fn restore<'a>(&mut self, saved: &'a [SavedMaterial], asked: &[Lamp]) -> Vec<&'a str> {
         let mut unknown = Vec::new();
         for saved in saved {
             let known = self.now.iter().position(|now| now.name == saved.name);
@@ -183,6 +185,9 @@ impl Materials {
                 continue;
             };
             self.now[index].reflectance = Vec3::from_array(saved.reflectance);
+            if asked.iter().any(|lamp| lamp.material == saved.name) {
+                continue;
+            }
             let emission = Vec3::from_array(saved.emission);
             let strength = emission.max_element();
             if strength <= 0.0 {
@@ -472,15 +477,24 @@ mod tests {
         materials.make_lamp(1);
         let lamp = materials.lights().last().expect("the box has a lamp");
         materials.put_out(lamp);
-        let saved = materials.changes();
+        let saved = materials.changes(&[]);
         assert_eq!(saved.len(), 3);
         assert!(saved.iter().all(|saved| saved.check().is_ok()));
         let mut again = Materials::of(&scene);
-        assert!(again.restore(&saved).is_empty());
+        assert!(again.restore(&saved, &[]).is_empty());
         assert_eq!(again.appearances(&scene), materials.appearances(&scene));
+        let mut asked = Materials::of(&scene);
+        let lamps = asked.lights().map(|index| Lamp {
+            material: asked.now[index].name.clone(),
+            radiance: Vec3::ONE,
+        });
+        let lamps: Vec<Lamp> = lamps.collect();
+        asked.restore(&saved, &lamps);
+        assert_eq!(Materials::of(&scene).changes(&lamps).len(), 1);
+        assert!(asked.is_lamp(lamp) && !again.is_lamp(lamp));
         let mut gone = saved[0].clone();
         gone.name = "gone".to_owned();
-        assert_eq!(again.restore(&[gone.clone()]), ["gone"]);
+        assert_eq!(again.restore(&[gone.clone()], &[]), ["gone"]);
         gone.emission[1] = f32::NAN;
         assert!(gone.check().is_err());
     }

@@ -37,6 +37,7 @@ pub mod picture_file;
 pub mod preferences;
 pub mod render;
 pub mod run;
+pub mod saved_light;
 pub mod saver;
 pub mod session;
 pub mod stage;

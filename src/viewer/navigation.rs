@@ -4,10 +4,16 @@ use eframe::egui::{self, Key, PointerButton};
 use glam::{Vec2, Vec3};
 
 use super::{
+    action::Action,
     panel_state::PanelState,
     pick::{self, Pick},
     state::State,
 };
+use crate::scene::{Lighting, SunSource};
+
+/// Degrees that the sun goes for each point that it is dragged: a window's width takes it nearly around. Less needs
+/// several drags for a day, more makes single degrees hard to hit.
+const SUN_DEGREES: f32 = 0.25;
 
 /// The result of a click.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,15 +24,31 @@ pub enum Picked {
     Nothing,
 }
 
-/// Move the camera by what the mouse did; returns what a click picked. Asks for a repaint only while it moves.
-pub fn navigate(ui: &egui::Ui, response: &egui::Response, state: &mut State) -> Option<Picked> {
+/// Move the camera, or the sun, by what the mouse did; returns what a click picked. Asks for a repaint only while the
+/// camera moves. A requested action goes into `actions`.
+pub fn navigate(
+    ui: &egui::Ui,
+    response: &egui::Response,
+    state: &mut State,
+    actions: &mut Vec<Action>,
+) -> Option<Picked> {
     let rect = response.rect;
     let modifiers = ui.input(|input| input.modifiers);
     let drag = response.drag_delta();
     let drag = Vec2::new(drag.x, drag.y);
+    let sun = state.sun().filter(|_| state.panels.drags_sun);
     let camera = &mut state.rig.target;
     // Move by drags.
-    if response.dragged_by(PointerButton::Primary) && !modifiers.shift {
+    if let Some(sun) = sun
+        && response.dragged_by(PointerButton::Primary)
+        && !modifiers.shift
+    {
+        actions.extend(dragged(sun, drag).map(|sun| {
+            let lighting = state.lighting.clone();
+            let sun = Some(sun);
+            Action::Light(Lighting { sun, ..lighting })
+        }));
+    } else if response.dragged_by(PointerButton::Primary) && !modifiers.shift {
         camera.orbit(drag);
     } else if response.dragged_by(PointerButton::Primary)
         || response.dragged_by(PointerButton::Middle)
@@ -54,6 +76,27 @@ pub fn navigate(ui: &egui::Ui, response: &egui::Response, state: &mut State) -> 
         ui.ctx().request_repaint();
     }
     clicked(response, state)
+}
+
+/// A sun after a drag in points, as if the viewer looked towards it: to the right is clockwise, up is higher. `None` where
+/// it stays.
+fn dragged(sun: SunSource, drag: Vec2) -> Option<SunSource> {
+    let SunSource::Disc {
+        azimuth,
+        elevation,
+        irradiance,
+        diameter,
+    } = sun
+    else {
+        return None;
+    };
+    let moved = SunSource::Disc {
+        azimuth: (azimuth + drag.x * SUN_DEGREES).rem_euclid(360.0),
+        elevation: (elevation - drag.y * SUN_DEGREES).clamp(-90.0, 90.0),
+        irradiance,
+        diameter,
+    };
+    (drag != Vec2::ZERO && moved != sun).then_some(moved)
 }
 
 /// Move eye and pivot with W A S D Q E.
@@ -149,4 +192,25 @@ fn clicked(response: &egui::Response, state: &mut State) -> Option<Picked> {
 fn ndc_of(rect: egui::Rect, point: egui::Pos2) -> Vec2 {
     let offset = (point - rect.center()) / (0.5 * rect.size());
     Vec2::new(offset.x, -offset.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sun_goes_with_the_drag_and_stops_at_the_zenith() {
+        let sun = |azimuth: f32, elevation: f32| SunSource::Disc {
+            azimuth,
+            elevation,
+            irradiance: Vec3::ONE,
+            diameter: 0.53,
+        };
+        let moved = |x, y| dragged(sun(350.0, 80.0), Vec2::new(x, y));
+        assert_eq!(moved(80.0, 0.0), Some(sun(10.0, 80.0)));
+        assert_eq!(moved(0.0, 40.0), Some(sun(350.0, 70.0)));
+        assert_eq!(moved(0.0, -400.0), Some(sun(350.0, 90.0)));
+        assert_eq!(moved(0.0, 0.0), None);
+        assert_eq!(dragged(SunSource::Dark, Vec2::ONE), None);
+    }
 }

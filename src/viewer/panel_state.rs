@@ -50,6 +50,8 @@ pub struct PanelState {
     pub table_text: String,
     /// Whether the messages are to be opened.
     pub show_messages: bool,
+    /// Whether dragging in the view moves the sun.
+    pub drags_sun: bool,
     /// Units a second when flying, in frame units.
     pub fly_speed: f32,
 }
@@ -164,6 +166,7 @@ impl Default for PanelState {
             table: false,
             table_text: String::new(),
             show_messages: false,
+            drags_sun: false,
             fly_speed: 30.0,
         }
     }

@@ -15,7 +15,7 @@ use super::{
     render::{CutoutTarget, Gpu, ReadError, Target},
 };
 use crate::{
-    export::{MeshFormat, MeshOptions, ToneMap, UnknownMeshFormat, write_csv},
+    export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
     metrics::SceneComparison,
     scene::{Frame, folder_of, write_whole},
     solver::Snapshot,
@@ -54,8 +54,6 @@ pub struct Drawn {
     pub gpu: Gpu,
     /// The factor on its radiance.
     pub exposure_factor: f32,
-    /// How it becomes display colours.
-    pub tone_map: ToneMap,
 }
 
 /// Where a picture is drawn.
@@ -90,7 +88,7 @@ impl Shot {
                 Ok((opaque(display), radiance.map(DynamicImage::from)))
             }
             Canvas::Cutout(target) => {
-                let cutout = target.read(gpu, drawn.tone_map, exposure_factor)?;
+                let cutout = target.read(gpu, exposure_factor)?;
                 let (display, radiance) = cutout.into_images();
                 Ok((display, Some(radiance)))
             }

@@ -9,9 +9,12 @@ use std::{
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{camera::Camera, loader::SceneSource, materials::SavedMaterial, view::ViewSettings};
+use super::{
+    camera::Camera, loader::SceneSource, materials::SavedMaterial, saved_light::SavedLight,
+    view::ViewSettings,
+};
 use crate::{
-    scene::{Frame, write_whole},
+    scene::{Frame, Lighting, Warning, WarningKind, folder_of, write_whole},
     solver::SolveSettings,
 };
 
@@ -61,6 +64,8 @@ struct Sidecar {
     camera: Option<SavedCamera>,
     view: ViewSettings,
     settings: SolveSettings,
+    #[serde(skip_serializing_if = "SavedLight::is_empty")]
+    light: SavedLight,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     materials: Vec<SavedMaterial>,
 }
@@ -74,6 +79,8 @@ pub struct Session {
     pub view: ViewSettings,
     /// How it is computed.
     pub settings: SolveSettings,
+    /// Sky and sun that were changed.
+    pub light: SavedLight,
     /// Materials that differ from the file.
     pub materials: Vec<SavedMaterial>,
 }
@@ -97,6 +104,7 @@ pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
         }),
         view: session.view.clone(),
         settings: session.settings.clone(),
+        light: session.light.clone(),
         materials: session.materials.clone(),
     };
     toml::to_string_pretty(&saved).map_err(|error| error.to_string())
@@ -113,6 +121,7 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
     })?;
     saved.settings.check()?;
     saved.view.check()?;
+    saved.light.check()?;
     saved.materials.iter().try_for_each(SavedMaterial::check)?;
     let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };
     let camera = saved.camera.map(|camera| Camera {
@@ -128,6 +137,7 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
         camera: camera.filter(Camera::is_valid),
         view: saved.view,
         settings: saved.settings,
+        light: saved.light,
         materials: saved.materials,
     })
 }
@@ -161,6 +171,34 @@ pub fn load(source: &SceneSource, frame: &Frame) -> Option<Result<Session, Strin
                 )
             }),
     )
+}
+
+/// Light of a scene as its sidecar has it.
+pub fn saved_light(source: &SceneSource, lighting: &Lighting) -> SavedLight {
+    SavedLight::of(lighting, source.path().map_or(Path::new(""), folder_of))
+}
+
+/// Light of a scene that is opened: its sidecar's where none is asked for. Where the picture of its sky cannot be read,
+/// a warning says so; of a broken sidecar [`load`] tells.
+pub fn light(source: &SceneSource, asked: &Lighting) -> Lighting {
+    let (Some(path), Some(folder)) = (sidecar_path(source), source.path().map(folder_of)) else {
+        return asked.clone();
+    };
+    let saved = read(&path).ok().and_then(|text| toml::from_str(&text).ok());
+    let light = saved.map(|saved: Sidecar| saved.light);
+    let Some(light) = light.filter(|light| light.check().is_ok()) else {
+        return asked.clone();
+    };
+    light.under(asked, folder).unwrap_or_else(|error| {
+        let mut lighting = asked.clone();
+        lighting.warnings.push(Warning {
+            kind: WarningKind::Light,
+            message: format!("the saved sky was not used: {error}"),
+            count: 1,
+            place: None,
+        });
+        lighting
+    })
 }
 
 /// Bytes of the largest sidecar that is read; ours have about a thousand.
@@ -203,6 +241,13 @@ mod tests {
                 ..ViewSettings::default()
             },
             settings: SolveSettings::draft(),
+            light: SavedLight::of(
+                &Lighting {
+                    is_sky_off: true,
+                    ..Lighting::default()
+                },
+                Path::new(""),
+            ),
             materials: vec![SavedMaterial {
                 name: "ceiling lamp".to_owned(),
                 reflectance: [0.0, 0.25, 0.5],
@@ -213,6 +258,7 @@ mod tests {
         let read = from_toml(&text, &frame).expect("our own text");
         assert_eq!(read.view, session.view);
         assert_eq!(read.settings, session.settings);
+        assert_eq!(read.light, session.light);
         assert_eq!(read.materials, session.materials);
         let (was, is) = (session.camera.expect("set"), read.camera.expect("valid"));
         assert!((was.eye() - is.eye()).length() < 1e-3);

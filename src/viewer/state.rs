@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     hierarchy::NodeId,
-    scene::{Lighting, Scene, SceneOptions},
+    scene::{Lighting, Scene, SceneOptions, SunSource},
     solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
@@ -117,6 +117,26 @@ impl State {
             materials: self.materials.clone(),
             lighting: self.lighting.clone(),
         }
+    }
+
+    /// The sun that shines, if there is one.
+    pub fn sun(&self) -> Option<SunSource> {
+        let loaded = self.loaded.as_ref()?;
+        let scene = &loaded.scene;
+        let sun = scene.environment.sun.as_ref()?;
+        let own = || SunSource::of(sun, scene.up, scene.radiance_unit);
+        Some(self.lighting.sun.unwrap_or_else(own))
+    }
+
+    /// Whether no light reaches what the scene shows first. The light that numerical errors let through is not exposed
+    /// then: surfaces are shown instead, unless somebody sets the exposure.
+    pub fn is_dark(&self) -> bool {
+        let mut materials = 0..self.materials.now.len();
+        let is_dark = self.loaded.as_ref().is_some_and(|loaded| !loaded.is_lit);
+        is_dark
+            && self.view.auto_exposure
+            && self.view.mode.is_light()
+            && !materials.any(|index| self.materials.is_lamp(index))
     }
 
     /// Go back to the view that the scene opened with, with the axis up that is up now.

@@ -15,6 +15,9 @@ pub(super) const BACK_LIGHTNESS: f32 = 0.035;
 /// Colour of what is selected, over the scene.
 pub const SELECTED: Color32 = Color32::from_rgb(0xff, 0xb4, 0x3a);
 
+/// Colour of the mark of the sun, over the scene.
+pub const SUN: Color32 = Color32::from_rgb(0xff, 0xe0, 0x6a);
+
 /// Colour of lines that mark the selection, display-linear.
 pub const SELECTED_LINE: Vec3 = Vec3::new(1.0, 0.45, 0.04);
 /// Colours of the arrows along x, y and z, display-linear.

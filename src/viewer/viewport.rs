@@ -3,12 +3,13 @@
 use std::sync::{Arc, Weak};
 
 use eframe::{
-    egui::{self, Color32, Rect, TextureId, pos2},
+    egui::{self, Color32, Pos2, Rect, TextureId, pos2},
     egui_wgpu::RenderState,
 };
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::{
+    action::Action,
     camera::Camera,
     exposure,
     first_look::Interior,
@@ -38,6 +39,9 @@ pub struct Viewport {
     lines: LineCache,
     metered: Option<MeterKey>,
     metering: Option<Metering>,
+    /// The light that was there when nothing but errors lit the scene. It is not shown while that of new lamps is on its
+    /// way, or the exposure would follow it.
+    dark: Option<Weak<VertexLight>>,
 }
 
 /// Everything that the automatic exposure depends on.
@@ -78,6 +82,8 @@ impl MeterKey {
 #[derive(Clone)]
 struct PictureKey {
     staged: Arc<Staged>,
+    /// Whether there is no light to show.
+    is_unlit: bool,
     segments: Arc<Vec<SegmentInstance>>,
     camera: Camera,
     view: ViewSettings,
@@ -89,6 +95,7 @@ struct PictureKey {
 impl PartialEq for PictureKey {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.staged, &other.staged)
+            && self.is_unlit == other.is_unlit
             && Arc::ptr_eq(&self.segments, &other.segments)
             && self.camera == other.camera
             && self.view == other.view
@@ -113,6 +120,7 @@ impl Viewport {
             lines: LineCache::default(),
             metered: None,
             metering: None,
+            dark: None,
         }
     }
 
@@ -168,7 +176,7 @@ impl Viewport {
         let is_first = state.exposure.target.is_none();
         // Lights that are dimmed would look as bright as before.
         let is_due = key.view.mode.is_light()
-            && key.staged.is_lit
+            && !key.is_unlit
             && (is_first || !state.materials.are_changed());
         if is_due && self.metering.is_none() {
             let wanted = MeterKey::of(key);
@@ -245,7 +253,6 @@ impl Viewport {
             canvas,
             gpu,
             exposure_factor: key.view.exposure_factor() / state.radiance_unit(),
-            tone_map: key.view.tone_map,
         })
     }
 
@@ -258,10 +265,17 @@ impl Viewport {
     ) -> Option<PictureKey> {
         let staged = state.staged.as_ref()?;
         let snapshot = &staged.wanted.snapshot;
+        let light = &snapshot.light;
+        if state.is_dark() {
+            self.dark = Some(Arc::downgrade(light));
+        }
+        let mut dark = self.dark.iter();
+        let is_dark = dark.any(|dark| dark.ptr_eq(&Arc::downgrade(light)));
         let lines = &mut self.lines;
         let segments = lines.segments(state, &snapshot.clusters, marks_selection);
         Some(PictureKey {
             staged: staged.clone(),
+            is_unlit: !staged.is_lit || is_dark,
             segments: segments.clone(),
             camera: state.rig.current,
             view: ViewSettings {
@@ -295,7 +309,7 @@ impl Viewport {
             errors: wanted.errors.as_ref(),
             camera: &key.camera,
             view: &key.view,
-            is_unlit: !key.staged.is_lit,
+            is_unlit: key.is_unlit,
             range: wanted.range,
             interior: key.interior,
             overlay: &overlay,
@@ -353,12 +367,13 @@ pub fn viewport_ui(
     ui: &mut egui::Ui,
     viewport: Option<&mut Viewport>,
     state: &mut State,
+    actions: &mut Vec<Action>,
 ) -> Option<navigation::Picked> {
     let rect = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(rect);
     let response = ui.interact(rect, scene_id(), egui::Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Scene"));
-    let picked = navigation::navigate(ui, &response, state);
+    let picked = navigation::navigate(ui, &response, state, actions);
     ui.painter().rect_filled(rect, 0.0, ui.visuals().panel_fill);
     if let Some(viewport) = viewport {
         viewport.paint(ui, rect, state);
@@ -366,20 +381,47 @@ pub fn viewport_ui(
     if let Some(selection) = &state.selection {
         mark(ui, rect, &state.rig.current, &selection.pick);
     }
+    if state.panels.drags_sun
+        && let Some(loaded) = &state.loaded
+        && let Some(sun) = &loaded.scene.environment.sun
+    {
+        sun_marker(ui, rect, &state.rig.current, sun.direction);
+    }
     if state.loaded.is_some() {
         axes(ui, rect, &state.rig.current);
     }
     picked
 }
 
+/// Where a point, or with a fourth coordinate of 0 a direction, is seen; `None` behind the viewer.
+fn seen_at(rect: Rect, camera: &Camera, point: Vec4) -> Option<Pos2> {
+    let aspect = rect.width() / rect.height().max(1.0);
+    let clip = camera.clip_from_frame(aspect) * point;
+    (clip.w > 0.0).then(|| rect.center() + egui::vec2(clip.x, -clip.y) / clip.w * 0.5 * rect.size())
+}
+
+/// A disc with rays where the sun stands.
+fn sun_marker(ui: &egui::Ui, rect: Rect, camera: &Camera, direction: Vec3) {
+    const RADIUS: f32 = 7.0;
+    let Some(at) = seen_at(rect, camera, direction.extend(0.0)) else {
+        return;
+    };
+    let painter = ui.painter().with_clip_rect(rect);
+    for (width, color) in [(4.0, Color32::from_black_alpha(160)), (2.0, theme::SUN)] {
+        painter.circle_filled(at, RADIUS + 0.5 * width - 1.0, color);
+        for turn in 0..8 {
+            let arm = egui::Vec2::angled(turn as f32 * std::f32::consts::FRAC_PI_4);
+            let ray = [at + arm * (RADIUS + 3.0), at + arm * (RADIUS + 9.0)];
+            painter.line_segment(ray, egui::Stroke::new(width, color));
+        }
+    }
+}
+
 /// A ring around the picked point.
 fn mark(ui: &egui::Ui, rect: Rect, camera: &Camera, pick: &Pick) {
-    let aspect = rect.width() / rect.height().max(1.0);
-    let clip = camera.clip_from_frame(aspect) * pick.point.extend(1.0);
-    if clip.w <= 0.0 {
+    let Some(at) = seen_at(rect, camera, pick.point.extend(1.0)) else {
         return;
-    }
-    let at = rect.center() + egui::vec2(clip.x, -clip.y) / clip.w * 0.5 * rect.size();
+    };
     let painter = ui.painter().with_clip_rect(rect);
     painter.circle_stroke(
         at,

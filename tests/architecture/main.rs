@@ -39,6 +39,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "link",
             "patch_sums",
             "visibility",
+            "tint",
             "oracle",
             "validate",
             "refiner",

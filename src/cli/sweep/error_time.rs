@@ -17,7 +17,7 @@ use super::{
 use crate::{
     cli::{
         output::{Destination, check_inputs_kept, write_whole},
-        report::Machine,
+        report::{LightFacts, Machine},
     },
     export::{Curve, CurvePlot, write_csv},
     metrics::{Runner, SceneComparison, Trajectory, grouped},
@@ -38,7 +38,15 @@ struct Report<'a> {
     time_limit_s: f64,
     /// Whether Ctrl+C came before the end.
     is_interrupted: bool,
-    scenes: &'a [SceneComparison],
+    scenes: &'a [LitComparison],
+}
+
+/// The runs on a scene, and what lights it.
+#[derive(Serialize)]
+struct LitComparison {
+    #[serde(flatten)]
+    runs: SceneComparison,
+    lights: LightFacts,
 }
 
 /// Run every configuration and baseline on each scene and write the files after each.
@@ -51,7 +59,10 @@ pub(super) fn compare(session: &mut Session<'_>, sources: &[Source]) -> Result<(
         let scene = session.load(source)?;
         check_inputs_kept(&destinations(session, &scene), &scene.files)?;
         if let Some(truth) = session.trace(&scene) {
-            scenes.push(compare_on(session, &scene, &truth)?);
+            scenes.push(LitComparison {
+                runs: compare_on(session, &scene, &truth)?,
+                lights: LightFacts::of(&scene),
+            });
         }
         write(session, &scenes)?;
     }
@@ -119,9 +130,9 @@ fn distinct<T>(pair: Option<[Arc<T>; 2]>) -> Vec<Arc<T>> {
 }
 
 /// Write all files, each whole or not at all.
-fn write(session: &Session<'_>, scenes: &[SceneComparison]) -> Result<()> {
+fn write(session: &Session<'_>, scenes: &[LitComparison]) -> Result<()> {
     let folder = &session.arguments.output;
-    for scene in scenes {
+    for scene in scenes.iter().map(|scene| &scene.runs) {
         let plot = plot(scene);
         let name = file_stem(&scene.scene);
         write_whole(&folder.join(format!("{name}.svg")), |out| {
@@ -132,7 +143,7 @@ fn write(session: &Session<'_>, scenes: &[SceneComparison]) -> Result<()> {
         })?;
     }
     write_whole(&folder.join("report.csv"), |out| {
-        write_csv(scenes.iter().flat_map(SceneComparison::rows), out)
+        write_csv(scenes.iter().flat_map(|scene| scene.runs.rows()), out)
     })?;
     let report = report(session, scenes);
     write_whole(&folder.join("report.json"), |out| {
@@ -144,7 +155,7 @@ fn write(session: &Session<'_>, scenes: &[SceneComparison]) -> Result<()> {
     })
 }
 
-fn report<'a>(session: &Session<'_>, scenes: &'a [SceneComparison]) -> Report<'a> {
+fn report<'a>(session: &Session<'_>, scenes: &'a [LitComparison]) -> Report<'a> {
     let arguments = session.arguments;
     let configurations = arguments.runs.configurations(&arguments.setting_flags);
     let SceneOptions { sides, .. } = arguments.scene_flags.options();
@@ -194,10 +205,15 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
         if report.repeats == 1 { "" } else { "s" },
         report.time_limit_s,
     )?;
-    for scene in report.scenes {
+    for LitComparison {
+        runs: scene,
+        lights,
+    } in report.scenes
+    {
         writeln!(
             out,
             "## {}, {} triangles\n\n![error against run time]({}.svg)\n\n\
+             Light: {lights}.\n\
              Reference: {} points of {} samples, {:.1} s, noise {:.2} %. Errors are means over {}.\n\n{}",
             scene.scene,
             grouped(scene.triangles as u64),

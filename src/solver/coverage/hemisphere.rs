@@ -11,13 +11,8 @@
 //! %; always with that of the neighbourhood: 5.0 % both, and lit hilltops up to twice too bright.)
 
 use glam::{Vec3, Vec4};
-use rayon::prelude::*;
 
-use crate::{
-    hierarchy::{Channels as _, Hierarchy, Moments, Tables},
-    solver::plan::Plan,
-    transport::luminance,
-};
+use crate::{hierarchy::Channels as _, transport::luminance};
 
 /// Smallest sum of form factors by which light is scaled up, as a share of the coverage. Larger, and the errors of
 /// coarse links remain; smaller, and the noise of a few rays is amplified.
@@ -28,14 +23,19 @@ const LEAST_ROW: f32 = 0.3;
 /// about faces inside solids; larger, and coarse links stay too bright.
 const SURPLUS: f32 = 0.1;
 
-/// Most patches of a neighbourhood. With 4 the errors are equal, with 64 a little larger. Smaller, and the
-/// neighbourhood has the colour of the leaf itself; larger, and it includes far surfaces.
-const NEIGHBOURS: u32 = 16;
-
 /// Factors above this, up to 1, count as noise: like missing light, surplus light has the radiosity of the
 /// neighbourhood if that is darker. Smaller, and real surplus is scaled too little; larger, and light is lost on
 /// average (halls of sheets 3.5 % too dark at `draft` with 1, 2.4 % with 0.8).
 const SLIGHT: f32 = 0.8;
+
+/// The part of a hemisphere that an even sky fills, cosine-weighted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SkyShare {
+    /// The part, 0…1.
+    pub(crate) share: f32,
+    /// Standard error of the part.
+    pub(crate) deviation: f32,
+}
 
 /// The part of a cell's hemisphere that lit surfaces fill, cosine-weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +44,10 @@ pub(crate) struct HemisphereCoverage {
     pub(super) share: f32,
     /// Standard error of the part; 0 if it is exact.
     deviation: f32,
+    /// The lit part of all that fills the hemisphere, backs of surfaces included, 0…1.
+    lit: f32,
+    /// If the part is the complement of that of an even sky, the radiosity (luminance) of a surface as bright; else 0.
+    sky: f32,
 }
 
 impl HemisphereCoverage {
@@ -51,23 +55,109 @@ impl HemisphereCoverage {
     pub(super) const ENCLOSED: Self = Self {
         share: 1.0,
         deviation: 0.0,
+        lit: 1.0,
+        sky: 0.0,
     };
 
     /// Unknown: light is not scaled.
     pub(super) const UNKNOWN: Self = Self {
         share: 0.0,
         deviation: f32::INFINITY,
+        ..Self::ENCLOSED
     };
 
     /// Inside a solid, where no light arrives.
     pub(super) const INSIDE_SOLID: Self = Self {
         share: 0.0,
         deviation: 0.0,
+        lit: 0.0,
+        sky: 0.0,
     };
 
-    /// An estimate of the part, with its standard error.
-    pub(super) fn estimated(share: f32, deviation: f32) -> Self {
-        Self { share, deviation }
+    /// An estimate of the part, with its standard error; `lit` is the lit part of all that fills the hemisphere.
+    pub(super) fn estimated(share: f32, deviation: f32, lit: f32) -> Self {
+        Self {
+            share,
+            deviation,
+            lit,
+            sky: 0.0,
+        }
+    }
+
+    /// The complement of what an even sky of this radiosity (luminance) fills, of which a part is `lit`. What is exact
+    /// without the sky stays as it is.
+    pub(super) fn beside_sky(self, sky: SkyShare, lit: f32, radiosity: f32) -> Self {
+        if self == Self::INSIDE_SOLID || self == Self::UNKNOWN {
+            return self;
+        }
+        Self {
+            share: (1.0 - sky.share).clamp(0.0, 1.0) * lit,
+            deviation: sky.deviation * lit,
+            lit,
+            sky: radiosity,
+        }
+    }
+
+    /// The mean of the parts at three corners.
+    pub(crate) fn mean(corners: [Self; 3]) -> Self {
+        let [first, ..] = corners;
+        if corners == [first; 3] {
+            return first;
+        }
+        let mean = |of: fn(&Self) -> f32| corners.iter().map(of).sum::<f32>() / 3.0;
+        Self {
+            share: mean(|corner| corner.share),
+            deviation: mean(|corner| corner.deviation),
+            lit: mean(|corner| corner.lit),
+            sky: first.sky,
+        }
+    }
+
+    /// Whether it is the complement of an even sky.
+    pub(super) fn is_beside_sky(&self) -> bool {
+        self.sky > 0.0
+    }
+
+    /// The lit part of all that fills the hemisphere.
+    pub(super) fn lit(&self) -> f32 {
+        self.lit
+    }
+
+    /// Weight of the part beside another estimate of it, 0…1: `trust` by their errors alone, 0…1, and more where the sky
+    /// fills the rest, since an error of both cancels as far as the surfaces, of this radiosity (luminance), are as bright
+    /// as the sky. (The weight for which the variance of the irradiance is least.)
+    fn weight(&self, trust: f32, radiosity: f32) -> f32 {
+        let cancelled = if self.sky > 0.0 {
+            (self.sky / radiosity.max(f32::MIN_POSITIVE)).min(1.0)
+        } else {
+            0.0
+        };
+        trust + (1.0 - trust) * cancelled
+    }
+
+    /// For an estimate of an irradiance by this number of rays, given that over links: the radiosity to subtract from what
+    /// each ray meets and to add times the part. Where the mean radiosity is known better than which rays meet something,
+    /// that removes their noise (a control variate); 0 where no sky gives the part.
+    pub(crate) fn control(&self, linked: Vec4, rays: u32) -> Control {
+        if self.sky <= 0.0 {
+            return Control::default();
+        }
+        let filled = self.share.max(linked.form_factor_sum());
+        let radiosity = linked.color() / filled.max(f32::MIN_POSITIVE);
+        let (own, others) = (
+            self.deviation * self.deviation,
+            self.share * (1.0 - self.share) / rays.max(1) as f32,
+        );
+        let trust = if own + others > 0.0 {
+            others / (own + others)
+        } else {
+            0.0
+        };
+        let radiosity = radiosity * self.weight(trust, luminance(radiosity.extend(0.0)));
+        Control {
+            radiosity: radiosity.extend(0.0),
+            irradiance: (radiosity * self.share).extend(0.0),
+        }
     }
 
     /// Whether the part is exact, and so the same for all elements of the cell.
@@ -75,9 +165,9 @@ impl HemisphereCoverage {
         self.deviation == 0.0
     }
 
-    /// Factor of an irradiance with this sum of form factors, at least 0. Where the coverage is an estimate, a sum
-    /// within its error is changed little.
-    fn factor(&self, row_sum: f32) -> f32 {
+    /// Factor of an irradiance with this sum of form factors and mean radiosity (luminance), at least 0. Where the
+    /// coverage is an estimate, a sum within its error is changed little.
+    fn factor(&self, row_sum: f32, radiosity: f32) -> f32 {
         let gap = self.share - row_sum;
         let doubt = 2.0 * self.deviation;
         let trust = if self.is_certain() {
@@ -86,7 +176,7 @@ impl HemisphereCoverage {
             let surplus = if gap < 0.0 { SURPLUS * self.share } else { 0.0 };
             gap * gap / (gap * gap + doubt * doubt + surplus * surplus)
         };
-        let target = row_sum + trust * gap;
+        let target = row_sum + self.weight(trust, radiosity) * gap;
         let row_sum = row_sum.max(LEAST_ROW * self.share);
         if row_sum > 0.0 { target / row_sum } else { 1.0 }
     }
@@ -95,27 +185,31 @@ impl HemisphereCoverage {
     /// coverage. `sums` are the area of the cell and the sum of form factors times area over the cell; `nearby` is the
     /// mean radiosity of the neighbourhood.
     pub(crate) fn scaled(&self, light: Vec4, sums: (f32, f32), nearby: Vec3) -> Vec4 {
-        multiplied(
-            light,
-            self.factor_for(light.form_factor_sum(), sums),
-            nearby,
-        )
+        multiplied(light, self.factor_for(light, sums), nearby)
     }
 
-    /// The factor for one leaf with this sum of form factors. An estimate holds for the mean over the cell, whose
-    /// elements may differ.
-    fn factor_for(&self, row_sum: f32, (area, weighted): (f32, f32)) -> f32 {
-        if self.is_certain() || area <= 0.0 {
-            self.factor(row_sum)
-        } else {
-            self.factor(weighted / area)
-        }
+    /// The factor for one leaf with this irradiance. An estimate by rays holds for the mean over the cell, whose elements
+    /// may differ.
+    pub(super) fn factor_for(&self, light: Vec4, (area, weighted): (f32, f32)) -> f32 {
+        let row_sum = light.form_factor_sum();
+        let radiosity = luminance(light.color().extend(0.0)) / row_sum.max(f32::MIN_POSITIVE);
+        let is_own = self.is_certain() || self.sky > 0.0 || area <= 0.0;
+        self.factor(if is_own { row_sum } else { weighted / area }, radiosity)
     }
+}
+
+/// See [`HemisphereCoverage::control`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Control {
+    /// Radiosity to subtract from that of each surface that a ray meets, W/m².
+    pub(crate) radiosity: Vec4,
+    /// Irradiance to add, W/m².
+    pub(crate) irradiance: Vec4,
 }
 
 /// Irradiance times a factor; the missing light has the radiosity `nearby` if that is darker. The sum of form factors
 /// in the fourth channel is unchanged.
-fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
+pub(super) fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
     let (color, row_sum) = (light.color(), light.form_factor_sum());
     if factor <= SLIGHT || row_sum <= 0.0 {
         return (color * factor).extend(row_sum);
@@ -127,196 +221,5 @@ fn multiplied(light: Vec4, factor: f32, nearby: Vec3) -> Vec4 {
     complete.max(Vec3::ZERO).extend(row_sum)
 }
 
-/// Coverage by cell of a mesh. The cells are the leaves of the first mesh.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct CoverageMap {
-    /// By element of the first mesh.
-    of: Vec<HemisphereCoverage>,
-    /// By patch, the cluster that is its neighbourhood.
-    near: Vec<u32>,
-    /// Whether only a share of the rays was shot.
-    is_rough: bool,
-}
-
-impl CoverageMap {
-    /// The cell that contains an element.
-    pub(crate) fn cell(&self, hierarchy: &Hierarchy, mut element: usize) -> usize {
-        while element >= self.of.len() {
-            element = hierarchy.mesh.elements[element].parent as usize;
-        }
-        element
-    }
-
-    /// From the coverage of all elements of the first mesh.
-    pub(crate) fn new(hierarchy: &Hierarchy, of: Vec<HemisphereCoverage>, is_rough: bool) -> Self {
-        let mut near = vec![0; hierarchy.patches.len()];
-        for cluster in hierarchy.groups(NEIGHBOURS) {
-            near[hierarchy.clusters[cluster].patches()].fill(cluster as u32);
-        }
-        Self { of, near, is_rough }
-    }
-
-    /// The same coverage of all patches.
-    fn even(hierarchy: &Hierarchy, coverage: HemisphereCoverage) -> Self {
-        Self::new(hierarchy, vec![coverage; hierarchy.patches.len()], false)
-    }
-
-    /// The coverage that is known without rays: 1 in enclosed scenes, and unknown where all form factors are exact.
-    /// `None` elsewhere: it must be probed, since with white walls even a leak that one ray in a thousand finds
-    /// matters.
-    pub(crate) fn without_rays(plan: &Plan, hierarchy: &Hierarchy) -> Option<Self> {
-        if !plan.is_clear {
-            return None;
-        }
-        let coverage = match (plan.is_enclosed, plan.is_by_patch) {
-            (true, _) => HemisphereCoverage::ENCLOSED,
-            (false, true) => HemisphereCoverage::UNKNOWN,
-            (false, false) => return None,
-        };
-        Some(Self::even(hierarchy, coverage))
-    }
-
-    /// Number of elements of the first mesh; 0 before the coverage is known.
-    pub(super) fn count(&self) -> usize {
-        self.of.len()
-    }
-
-    /// Whether it is precise enough for a coarse step or another one.
-    pub(crate) fn serve(&self, is_coarse: bool) -> bool {
-        !self.of.is_empty() && (is_coarse || !self.is_rough)
-    }
-
-    /// Mean radiosity of the neighbourhood of a patch.
-    pub(crate) fn nearby(&self, tables: &Tables, patch: usize) -> Vec3 {
-        // A scene without active patches has no cluster.
-        let cluster = tables.clusters.get(self.near[patch] as usize);
-        let total = cluster.map_or(Vec4::ZERO, Moments::total);
-        total.color() / total.area().max(f32::MIN_POSITIVE)
-    }
-
-    /// The coverage of a cell.
-    pub(crate) fn of(&self, cell: usize) -> HemisphereCoverage {
-        self.of[cell]
-    }
-
-    /// Memory in bytes.
-    pub(crate) fn memory_bytes(&self) -> usize {
-        size_of_val(self.of.as_slice()) + size_of_val(self.near.as_slice())
-    }
-}
-
-impl CoverageMap {
-    /// Scale the irradiance of all leaves so that their form factors add to the coverage; if `bounds_rows`, those of
-    /// each leaf to at most 1.
-    pub(crate) fn scale(
-        &self,
-        hierarchy: &Hierarchy,
-        power: &Tables,
-        irradiance: &mut [Vec4],
-        bounds_rows: bool,
-    ) {
-        let elements = &hierarchy.mesh.elements;
-        let factors = self.factors(hierarchy, irradiance);
-        irradiance
-            .par_iter_mut()
-            .zip(elements.par_iter().zip(factors))
-            .with_min_len(1024)
-            .for_each(|(value, (element, factor))| {
-                let Some(factor) = factor else { return };
-                let most = if bounds_rows && value.form_factor_sum() > 0.0 {
-                    1.0 / value.form_factor_sum()
-                } else {
-                    f32::INFINITY
-                };
-                let nearby = self.nearby(power, element.patch as usize);
-                *value = multiplied(*value, factor.min(most), nearby);
-            });
-    }
-
-    /// Factor of the irradiance by leaf, given the sums of form factors; `None` for other elements.
-    pub(crate) fn factors(&self, hierarchy: &Hierarchy, irradiance: &[Vec4]) -> Vec<Option<f32>> {
-        let elements = &hierarchy.mesh.elements;
-        let cell_count = self.of.len();
-        let cell = |index| self.cell(hierarchy, index);
-        // Area and sum of form factors times area, by cell.
-        let part = |index: usize| {
-            let (area, row_sum) = (
-                elements[index].area_vector.length(),
-                irradiance[index].form_factor_sum(),
-            );
-            if elements[index].is_leaf() {
-                (area, area * row_sum)
-            } else {
-                (0.0, 0.0)
-            }
-        };
-        let mut sums: Vec<(f32, f32)> = (0..cell_count).into_par_iter().map(part).collect();
-        for index in cell_count..elements.len() {
-            let (area, weighted) = part(index);
-            let sum = &mut sums[cell(index)];
-            *sum = (sum.0 + area, sum.1 + weighted);
-        }
-        (0..elements.len())
-            .into_par_iter()
-            .with_min_len(1024)
-            .map(|index| {
-                let cell = cell(index);
-                let coverage = self.of(cell);
-                let is_leaf = elements[index].is_leaf();
-                is_leaf
-                    .then(|| coverage.factor_for(irradiance[index].form_factor_sum(), sums[cell]))
-            })
-            .collect()
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Random;
-
-    fn color(random: &mut Random) -> Vec3 {
-        Vec3::from_array([(); 3].map(|()| random.uniform()))
-    }
-
-    #[test]
-    fn light_is_multiplied_by_the_factor_where_all_radiosities_are_equal() {
-        let mut random = Random::new(3, 0);
-        for _ in 0..200 {
-            let (radiosity, row, share) =
-                (color(&mut random), 1.5 * random.uniform(), random.uniform());
-            let coverage = HemisphereCoverage::estimated(share, 0.0);
-            let light = (radiosity * row).extend(row);
-            let scaled = coverage.scaled(light, (1.0, row), radiosity);
-            let expected = radiosity * row * coverage.factor(row);
-            assert!((scaled.color() - expected).abs().max_element() < 1e-5);
-            assert_eq!(scaled.form_factor_sum(), row);
-        }
-    }
-
-    #[test]
-    fn missing_light_is_as_bright_as_the_darker_of_the_neighbourhood_and_the_mean() {
-        let mut random = Random::new(4, 0);
-        for _ in 0..200 {
-            let (seen, nearby) = (color(&mut random), color(&mut random));
-            let row = 0.3 + 0.7 * random.uniform();
-            let light = (seen * row).extend(row);
-            let whole = HemisphereCoverage::ENCLOSED.scaled(light, (1.0, row), nearby);
-            let luminance = |color: Vec3| luminance(color.extend(0.0));
-            let lacking = luminance(whole.color() - seen * row) / (1.0 - row).max(1e-6);
-            let least = luminance(seen).min(luminance(nearby));
-            assert!(
-                (lacking - least).abs() < 1e-3 || row > 0.999,
-                "{lacking} {least}"
-            );
-            assert!(whole.min_element() >= 0.0);
-        }
-    }
-
-    #[test]
-    fn light_with_far_too_large_form_factors_is_scaled_as_a_whole() {
-        let light = Vec4::new(2.0, 1.0, 0.5, 2.0);
-        let scaled = HemisphereCoverage::ENCLOSED.scaled(light, (1.0, 2.0), Vec3::splat(9.0));
-        assert_eq!(scaled, Vec4::new(1.0, 0.5, 0.25, 2.0));
-    }
-}
+mod tests;

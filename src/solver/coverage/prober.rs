@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::hemisphere::{CoverageMap, HemisphereCoverage};
+use super::{hemisphere::HemisphereCoverage, map::CoverageMap};
 use crate::{
     geometry::{Random, RayTree, cosine_direction, low_discrepancy_2d, triangle_point},
     hierarchy::{Element, Hierarchy},
@@ -61,6 +61,8 @@ const ENCLOSED_RAYS: f32 = 512.0;
 struct Met {
     /// Rays that met a lit side.
     hits: f32,
+    /// Rays that met anything but the inside of a solid.
+    blocked: f32,
     /// Rays that began outside solids.
     rays: f32,
     /// Rays that began inside a solid.
@@ -71,6 +73,11 @@ impl Met {
     /// Share of hits, with half a hit and half a miss added, so that no finite number of rays gives 0 or 1.
     fn share(self) -> f32 {
         (self.hits + 0.5) / (self.rays + 1.0)
+    }
+
+    /// Of the rays that met something, the part that met a lit side, with one more that has the result of `around`.
+    fn lit(self, around: f32) -> f32 {
+        ((self.hits + around) / (self.blocked + 1.0)).min(1.0)
     }
 
     /// Standard error of the share for this many rays.
@@ -91,13 +98,15 @@ impl Met {
         };
         // One more ray has the mean result of the neighbourhood.
         let share = (self.hits + around.share()) / (self.rays + 1.0);
-        HemisphereCoverage::estimated(share, self.deviation(rays))
+        let lit = self.lit(around.lit(1.0));
+        HemisphereCoverage::estimated(share, self.deviation(rays), lit)
     }
 
     /// The counts of both.
     fn and(self, other: Self) -> Self {
         Self {
             hits: self.hits + other.hits,
+            blocked: self.blocked + other.blocked,
             rays: self.rays + other.rays,
             within: self.within + other.within,
         }
@@ -326,9 +335,10 @@ impl Prober<'_> {
                 self.scene.triangles[hit.triangle.index()].bounds_solid
                     && self.hierarchy.side_met(hit.triangle, direction).is_none()
             });
-            if is_lit {
-                let tint = self.rays.tint(origin, direction, start, hit);
-                met.hits += tint.element_sum() / 3.0;
+            if hit.is_some() && !is_within {
+                let tint = self.rays.tint(origin, direction, start, hit).element_sum() / 3.0;
+                met.blocked += tint;
+                met.hits += if is_lit { tint } else { 0.0 };
             }
             if is_within {
                 met.within += 1.0;

@@ -1,11 +1,13 @@
 //! Direct light as a field on the mesh: sampled at vertices, and at the centroids of elements where it varies.
 
-use glam::Vec4;
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::{lights::Lights, samples::DirectLight, smooth};
 use crate::{
-    hierarchy::{Element, Hierarchy},
+    hierarchy::{Element, Hierarchy, luminance},
     solver::{
+        coverage::SkyShare,
         places::{OffsetPlaces, carry_over, project},
         sums,
     },
@@ -90,6 +92,46 @@ impl DirectField {
             });
         }
         shown
+    }
+
+    /// The part of hemispheres that an even sky fills, by vertex as shown, and by element; `None` for other light.
+    pub(super) fn shares(&self, hierarchy: &Hierarchy) -> Option<[Vec<SkyShare>; 2]> {
+        let radiosity = self.lights.even_radiosity()?;
+        let share = |light: Vec4, deviation: f32| SkyShare {
+            share: luminance(light) / radiosity,
+            deviation,
+        };
+        let mesh = &hierarchy.mesh;
+        let mut doubts: Vec<f32> = Vec::with_capacity(mesh.vertices.len());
+        for (index, vertex) in mesh.vertices.iter().enumerate() {
+            let sampled = self.vertices.get(index).copied().flatten();
+            doubts.push(match (sampled, vertex.ends) {
+                (Some(light), _) => light.fraction_doubt(),
+                // Ends were made before the vertices between them.
+                (None, Some([a, b])) => (doubts[a as usize] + doubts[b as usize]) * 0.5,
+                (None, None) => 1.0,
+            });
+        }
+        let shown = self.shown(hierarchy);
+        let vertices = shown.iter().zip(&doubts);
+        let vertices = vertices
+            .map(|((light, _), &doubt)| share(*light, doubt))
+            .collect();
+        let of_element = |index: usize| {
+            let corners = mesh.elements[index]
+                .vertices
+                .map(|vertex| doubts[vertex as usize]);
+            let doubt = Vec3::from_array(corners).length() / 3.0;
+            share(self.element(hierarchy, index), doubt)
+        };
+        let elements = (0..mesh.elements.len()).into_par_iter().map(|index| {
+            if mesh.elements[index].is_leaf() {
+                of_element(index)
+            } else {
+                SkyShare::default()
+            }
+        });
+        Some([vertices, elements.collect()])
     }
 
     /// Irradiance at the sampled vertices, smoothed as far as noise explains differences of neighbours.

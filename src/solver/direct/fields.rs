@@ -14,6 +14,7 @@ use crate::{
     scene::Scene,
     solver::{
         Cancel, Direct, SolveSettings,
+        coverage::SkyShares,
         limits::Limits,
         places::{OffsetPlaces, Receiver},
         sums::area_total,
@@ -124,6 +125,18 @@ impl DirectFields {
         let power =
             |field: &DirectField| area_total(hierarchy, |leaf| field.element(hierarchy, leaf));
         self.outside().map(power).sum()
+    }
+
+    /// The parts of all hemispheres that the sky fills, if it is equally bright in all directions.
+    pub(crate) fn sky_shares(&self, hierarchy: &Hierarchy) -> Option<SkyShares> {
+        let even =
+            |field: &DirectField| Some((field.lights.even_radiosity()?, field.shares(hierarchy)?));
+        let (radiosity, [vertices, elements]) = self.outside().find_map(even)?;
+        Some(SkyShares {
+            radiosity,
+            vertices,
+            elements,
+        })
     }
 
     /// Irradiance from outside of a leaf, W/m².

@@ -100,6 +100,14 @@ impl Lights {
         !matches!(self.source, Source::Emitters(_))
     }
 
+    /// As [`SkyTree::even_radiosity`]; `None` for other light.
+    pub(super) fn even_radiosity(&self) -> Option<f32> {
+        match &self.source {
+            Source::Sky(sky) => sky.even_radiosity(),
+            Source::Emitters(_) | Source::Sun(_) => None,
+        }
+    }
+
     /// The emitters; none for light from outside.
     fn emitters(&self) -> &[Emitter] {
         match &self.source {

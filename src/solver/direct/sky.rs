@@ -259,6 +259,15 @@ impl SkyTree {
         even.min(all.sum::<Vec4>() / PI)
     }
 
+    /// Radiosity of a surface of the radiance of the sky (luminance), W/m², if that is the same in all directions.
+    pub(super) fn even_radiosity(&self) -> Option<f32> {
+        let mut leaves = self.leaves().map(|leaf| leaf.radiosity);
+        let first = leaves.next()?;
+        leaves
+            .all(|radiosity| radiosity == first)
+            .then(|| luminance(first))
+    }
+
     /// Mean of the unoccluded irradiance over all normals, W/m².
     pub(super) fn mean_irradiance(&self) -> Vec4 {
         let all = self

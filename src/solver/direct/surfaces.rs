@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::fields::DirectFields;
@@ -66,30 +66,34 @@ impl<'a> Surfaces<'a> {
         (reflected + emitted).extend(self.hierarchy.opacity_of(element))
     }
 
-    /// Power of the sampled emitters, and the power that arrives from outside, summed over the colours.
-    pub(crate) fn sampled_power(&self) -> f64 {
-        let of_patch = |index: usize| {
-            let patch = &self.hierarchy.patches[index];
-            f64::from((patch.emission * PI).element_sum()) * f64::from(patch.area)
-        };
-        let emitted: f64 = self.direct.sampled_patches().map(of_patch).sum();
-        emitted + self.direct.outside_power(self.hierarchy)
-    }
-
-    /// Upper bound of the total power, summed over the colours: the emitted power and that from outside, if all surfaces
-    /// reflected as the brightest one does.
-    pub(crate) fn most_power(&self) -> f64 {
+    /// The power that is not sent over links, and a bound of all power.
+    pub(crate) fn powers(&self) -> Powers {
         let patches = &self.hierarchy.patches;
-        let brightest = self.hierarchy.largest_reflectance();
-        let emitted = ordered_sum(patches.len(), |index| {
-            patches[index].emission.as_dvec3() * f64::from(patches[index].area)
-        });
-        let absorbed = 1.0 - f64::from(brightest);
-        if absorbed > 0.0 {
-            let outside = self.direct.outside_power(self.hierarchy);
-            (f64::from(PI) * emitted.element_sum() + outside) / absorbed
-        } else {
-            f64::INFINITY
+        let emitted = |index: usize| {
+            let emission = patches[index].emission.as_dvec3();
+            emission * (f64::from(PI) * f64::from(patches[index].area))
+        };
+        let outside = self.direct.outside_power(self.hierarchy);
+        let from_emitters: DVec3 = self.direct.sampled_patches().map(emitted).sum();
+        let all = ordered_sum(patches.len(), emitted).element_sum() + outside;
+        let absorbed = 1.0 - f64::from(self.hierarchy.largest_reflectance());
+        Powers {
+            sampled: from_emitters.element_sum() + outside,
+            most: if absorbed > 0.0 {
+                all / absorbed
+            } else {
+                f64::INFINITY
+            },
         }
     }
+}
+
+/// Powers of a scene, summed over the colours, in watts times the square of the frame's unit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Powers {
+    /// Power of the sampled emitters, and the power that arrives from outside.
+    pub(crate) sampled: f64,
+    /// Upper bound of the total power: the emitted power and that from outside, if all surfaces reflected as the brightest
+    /// one does.
+    pub(crate) most: f64,
 }

@@ -112,3 +112,45 @@ fn largest(values: impl Iterator<Item = Vec3>) -> f32 {
         .map(|value| value.abs().max_element())
         .fold(0.0, f32::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_full_and_divide_no_patch() {
+        let patches = (0..40).map(|place| place / 12);
+        let groups = Groups::new(patches);
+        assert_eq!(groups.first_place, [0, 12, 24, 36, 40]);
+        assert_eq!(
+            [0, 1, 2, 3, 9].map(|patch| groups.of_patch(patch)),
+            [0, 1, 2, 3, 3]
+        );
+        let none = Groups::new(std::iter::empty());
+        assert_eq!((none.count(), none.of_patch(3)), (0, 0));
+        assert!(none.errors(&[]).is_empty());
+    }
+
+    #[test]
+    fn errors_solve_the_error_equation() {
+        // Two groups that see each other: e = s + T e.
+        let groups = Groups::new((0..16).map(|place| place / 8));
+        let residual = |group: usize| {
+            let mut row = vec![Vec3::ZERO; 2];
+            row[1 - group] = Vec3::splat([0.8, 0.5][group]);
+            Residual {
+                residual: Vec3::splat([1.0, 2.0][group]),
+                row,
+            }
+        };
+        let residuals: Vec<Residual> = (0..16).map(|place| residual(place / 8)).collect();
+        let errors = groups.errors(&residuals);
+        // a = 1 + 0.8 b, b = 2 + 0.5 a.
+        let (a, b) = (2.6 / 0.6, 2.5 / 0.6);
+        assert!(
+            (errors[0].x - a).abs() < 0.01 && (errors[1].x - b).abs() < 0.01,
+            "{errors:?}"
+        );
+        assert!((residuals[0].explained_by(&errors).y - a).abs() < 0.01);
+    }
+}

@@ -301,3 +301,6 @@ impl Half {
         Some((of_points.iter().map(at_point).collect(), shot))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -120,3 +120,62 @@ pub(super) fn estimated(points: &[Reflected], all: &[f64]) -> EstimatedError {
         rays: 0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Random;
+
+    /// Points of light 1 with an error, and noise of this deviation in both estimates.
+    fn points(count: usize, noise: f64, error: impl Fn(usize) -> f64) -> Vec<Reflected> {
+        let mut random = Random::new(3, 4);
+        let mut uniform = || f64::from(random.uniform()) - 0.5;
+        let mut point = |index: usize| Reflected {
+            stored: 1.0 + error(index),
+            errors: [(); 2].map(|()| error(index) + noise * 12f64.sqrt() * uniform()),
+        };
+        (0..count).map(&mut point).collect()
+    }
+
+    fn figures(points: &[Reflected]) -> EstimatedError {
+        let all: Vec<f64> = points.iter().map(|point| point.stored).collect();
+        estimated(points, &all)
+    }
+
+    #[test]
+    fn noise_is_not_taken_for_an_error() {
+        let error = figures(&points(4000, 0.2, |_| 0.02));
+        assert!(error.rms_low <= 0.02 && error.rms_high >= 0.02, "{error:?}");
+        assert!(
+            error.trimmed_low <= 0.02 && error.trimmed_high >= 0.02,
+            "{error:?}"
+        );
+        assert!(
+            error.energy_low <= 1.02 && error.energy_high >= 1.02,
+            "{error:?}"
+        );
+        assert!(error.rms_high < 0.1);
+    }
+
+    #[test]
+    fn the_worst_hundredth_is_omitted_where_noise_does_not_explain_it() {
+        let error = figures(&points(
+            1000,
+            0.001,
+            |point| if point < 10 { 5.0 } else { 0.02 },
+        ));
+        assert!((error.trimmed_rms - 0.02).abs() < 0.001, "{error:?}");
+        assert!(error.rms > 0.4, "{error:?}");
+    }
+
+    #[test]
+    fn black_scenes_have_no_error() {
+        let error = figures(&vec![Reflected::default(); 64]);
+        assert_eq!(
+            (error.rms, error.trimmed_high, error.energy),
+            (0.0, 0.0, 1.0)
+        );
+        let error = estimated(&[], &[]);
+        assert_eq!((error.rms_high, error.energy), (0.0, 1.0));
+    }
+}

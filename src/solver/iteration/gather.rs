@@ -96,7 +96,7 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
         .with_min_len(TASK_NODES)
         .map(|index| {
             let mut sum = Vec4::ZERO;
-            let links = links.of(NodeId(base + index as u32));
+            let links = links.tinted(NodeId(base + index as u32));
             if links.is_empty() || cancel.is_cancelled() {
                 return sum;
             }
@@ -104,14 +104,16 @@ fn own_irradiance(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec
                 hierarchy.mesh.elements[index].centroid,
                 hierarchy.patch_of(index).normal,
             );
-            for link in links {
+            links.for_each(|link| {
                 sum += match hierarchy.kind(link.source) {
-                    Kind::Element(source) => kernel.tables.elements[source] * link.form_factor(),
+                    Kind::Element(source) => {
+                        kernel.tables.elements[source] * link.tinted_form_factor()
+                    }
                     Kind::Cluster(_) => {
-                        kernel.irradiance(link.source, point, normal) * link.transmission()
+                        kernel.irradiance(link.source, point, normal) * link.tinted_transmission()
                     }
                 };
-            }
+            });
             sum
         })
         .collect()
@@ -170,18 +172,18 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     let hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
     let mut sum = Moments::default();
-    for link in links.of(NodeId(index as u32)) {
+    links.tinted(NodeId(index as u32)).for_each(|link| {
         if link.source.index() == index {
             sum.add_isotropic(
                 self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
-                    * link.transmission(),
+                    * link.tinted_transmission(),
             );
         } else {
             kernel
                 .vector_irradiance(link.source, cluster.centroid)
-                .add_to(&mut sum, link.transmission());
+                .add_to(&mut sum, link.tinted_transmission());
         }
-    }
+    });
     sum
 }
 
@@ -198,16 +200,16 @@ fn push_at_once(kernel: Kernel<'_>, links: &LinkStore, cancel: &Cancel) -> Vec<V
             let mut sums = vec![Vec4::ZERO; range.len()];
             let mut at = leaf;
             while !cancel.is_cancelled() {
-                for link in links.of(NodeId(at as u32)) {
+                links.tinted(NodeId(at as u32)).for_each(|link| {
                     push_one(
                         kernel,
                         at,
                         link.source,
-                        link.transmission(),
+                        link.tinted_transmission(),
                         &hierarchy.patches[range.clone()],
                         &mut sums,
                     );
-                }
+                });
                 match hierarchy.clusters[at].parent {
                     u32::MAX => break,
                     parent => at = parent as usize,

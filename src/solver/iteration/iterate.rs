@@ -160,10 +160,8 @@ fn converge(
     let weights = leaf_areas(hierarchy);
     let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let direct = surfaces.direct_of_leaves();
-    let (sampled, ceiling) = (
-        surfaces.sampled_power(),
-        CEILING_SLACK * surfaces.most_power(),
-    );
+    let powers = surfaces.powers();
+    let ceiling = CEILING_SLACK * powers.most;
     let mut acceleration = Anderson::new(DEPTH);
     let mut growing = 0;
     for _ in 0..MOST_SWEEPS {
@@ -173,7 +171,7 @@ fn converge(
             linked,
             iteration,
             &linked_clusters,
-            (&direct, sampled),
+            (&direct, powers.sampled),
             bounds_rows,
         )?;
         convergence.sweeps += 1;

@@ -20,6 +20,7 @@ use crate::{
     hierarchy::{Element, Hierarchy},
     solver::{
         Cancel,
+        coverage::{Control, CoverageMap, HemisphereCoverage},
         direct::Surfaces,
         iteration::Anderson,
         limits::Limits,
@@ -99,6 +100,8 @@ struct VertexProbe {
     weight: f32,
     /// Variance of the radiosity (luminance) that one ray meets, known from links; 0 where links carry no emission.
     variance: f32,
+    /// Coverage, where an even sky gives it.
+    coverage: Option<HemisphereCoverage>,
     met: Vec<Met>,
     /// The tints of these rays; empty where no pane is coloured.
     tints: Vec<Vec3>,
@@ -123,6 +126,8 @@ pub(crate) struct FinalGather<'a> {
     /// The same for the square of the luminance, if links carry emission: a few rays miss a small lamp, so that only
     /// links give their variance. Empty otherwise.
     pub squares: &'a [LeafLight],
+    /// Coverage at the vertices, where an even sky gives it.
+    pub coverage: &'a CoverageMap,
     /// The occluders.
     pub rays: &'a RayTree,
     /// The visibility of errors and noise.
@@ -249,6 +254,7 @@ impl FinalGather<'_> {
                 all,
                 weight: weights[vertex as usize],
                 variance: (square - luminance(linked).powi(2)).max(0.0),
+                coverage: self.coverage.at_vertex(vertex),
                 met: Vec::new(),
                 tints: Vec::new(),
                 found: GatherEstimate::default(),
@@ -359,10 +365,17 @@ fn evaluate(probes: &mut [VertexProbe], senders: &[Sender], received: &[Vec4]) {
         Met::Leaf(leaf, shares) => Some(senders[leaf as usize].radiosity(shares, received)),
     };
     probes.par_iter_mut().with_min_len(64).for_each(|probe| {
-        probe.found = GatherEstimate::default();
+        let control = probe.coverage.map_or_else(Control::default, |coverage| {
+            coverage.control(probe.linked, probe.met.len() as u32)
+        });
+        probe.found = GatherEstimate::beside(control.irradiance);
         for (ray, met) in probe.met.iter().enumerate() {
             let tint = probe.tints.get(ray).copied().unwrap_or(Vec3::ONE);
-            let met = radiosity(met).map(|radiosity| radiosity * tint.extend(1.0));
+            let expected = match met {
+                Met::Leaf(..) => control.radiosity * (tint.element_sum() / 3.0),
+                Met::Nothing | Met::Back => Vec4::ZERO,
+            };
+            let met = radiosity(met).map(|radiosity| radiosity * tint.extend(1.0) - expected);
             probe.found.count(met);
         }
     });

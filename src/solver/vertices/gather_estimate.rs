@@ -30,6 +30,8 @@ const MOST_RATIO: f32 = 4.0;
 /// An estimate of the indirect irradiance of a vertex from cosine-weighted rays.
 #[derive(Clone, Copy, Default)]
 pub(super) struct GatherEstimate {
+    /// The expected irradiance, if the radiosities counted are differences from the expected ones; else 0.
+    expected: Vec4,
     /// Sum of the radiosities met.
     sum: Vec4,
     /// Sum of the squares of their luminances.
@@ -41,6 +43,14 @@ pub(super) struct GatherEstimate {
 }
 
 impl GatherEstimate {
+    /// An estimate without rays of the difference from an expected irradiance.
+    pub(super) fn beside(expected: Vec4) -> Self {
+        Self {
+            expected,
+            ..Self::default()
+        }
+    }
+
     /// Count a ray that met this radiosity; `None` for a back.
     pub(super) fn count(&mut self, met: Option<Vec4>) {
         self.rays += 1;
@@ -53,7 +63,7 @@ impl GatherEstimate {
 
     /// The estimated irradiance, W/m².
     fn mean(&self) -> Vec4 {
-        self.sum / self.rays.max(1) as f32
+        self.expected + self.sum / self.rays.max(1) as f32
     }
 
     /// Difference of the estimate to the linked irradiance (luminance), and the square of its standard error: as of
@@ -61,9 +71,10 @@ impl GatherEstimate {
     /// surfaces are not certain. `variance` is the least variance of one ray, known from links.
     pub(super) fn gap(&self, linked: Vec4, variance: f32) -> (f32, f32) {
         let (count, linked) = (self.rays.max(1) as f32, luminance(linked));
-        let mean = luminance(self.mean());
-        let spread = (self.squares - count * mean * mean).max(count * variance);
-        (mean - linked, (spread + linked * linked) / (count * count))
+        let difference = luminance(self.sum / count);
+        let spread = (self.squares - count * difference * difference).max(count * variance);
+        let gap = luminance(self.expected) + difference - linked;
+        (gap, (spread + linked * linked) / (count * count))
     }
 
     /// Ratio of the estimate to the linked irradiance; `variance` as in [`Self::gap`].

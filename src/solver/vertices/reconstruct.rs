@@ -17,7 +17,7 @@ use crate::{
         limits::Limits,
         places::{OffsetPlaces, carry_over, project, share_root},
     },
-    transport::{Kernel, Link, LinkStore, Sights, luminance, self_irradiance},
+    transport::{Kernel, LinkStore, Sights, TintedLink, TintedLinks, luminance, self_irradiance},
 };
 
 /// Most patches of a group whose leaves one task visits; fewer in small scenes.
@@ -81,7 +81,7 @@ pub(crate) fn gather_leaves(
 /// radiosity of the neighbourhood.
 fn scale_to_coverage(
     hierarchy: &Hierarchy,
-    coverage: HemisphereCoverage,
+    coverage: &CoverageMap,
     nearby: Vec3,
     leaves: &mut [LeafLight],
 ) {
@@ -92,9 +92,11 @@ fn scale_to_coverage(
         (areas + area, rows + area * leaf.centre.form_factor_sum())
     });
     for leaf in leaves {
-        for value in leaf.corners.iter_mut().chain([&mut leaf.centre]) {
+        let corners = coverage.at_corners(hierarchy, leaf.element as usize);
+        for (value, coverage) in leaf.corners.iter_mut().zip(corners) {
             *value = coverage.scaled(*value, sums, nearby);
         }
+        leaf.centre = HemisphereCoverage::mean(corners).scaled(leaf.centre, sums, nearby);
     }
 }
 
@@ -107,9 +109,9 @@ struct Chain<'a> {
     /// Sources far enough for one sight for all leaves, with their transmissions.
     sights: Sights,
     /// The other links.
-    rest: Vec<&'a Link>,
+    rest: Vec<TintedLink<'a>>,
     /// Links of the node if it is an element: they are evaluated at the corners of the leaves.
-    own: &'a [Link],
+    own: TintedLinks<'a>,
     /// Sum of the errors of the links of clusters.
     error: f32,
 }
@@ -127,13 +129,13 @@ impl<'a> Chain<'a> {
     }
 
     /// Add a link, as a sight if its source is a cluster further than `far` from a centre.
-    fn add(&mut self, kernel: Kernel<'_>, link: &'a Link, centre: Vec3, far: f32) {
+    fn add(&mut self, kernel: Kernel<'_>, link: TintedLink<'a>, centre: Vec3, far: f32) {
         match kernel.hierarchy.kind(link.source) {
             Kind::Cluster(index)
                 if centre.distance_squared(kernel.tables.centres[index]) > far * far =>
             {
                 let sight = kernel.sight(index, centre);
-                self.sights.push(&sight, link.transmission());
+                self.sights.push(&sight, link.tinted_transmission());
             }
             _ => self.rest.push(link),
         }
@@ -197,7 +199,7 @@ impl<'a> Walk<'a> {
     fn push(&mut self, centre: Vec3, radius: f32, mut chain: Chain<'a>) {
         let far = SIGHT_DISTANCE * radius;
         if let Some(above) = self.path.last() {
-            for link in &above.rest {
+            for &link in &above.rest {
                 chain.add(self.kernel, link, centre, far);
             }
         }
@@ -209,14 +211,14 @@ impl<'a> Walk<'a> {
         let cluster = &self.kernel.hierarchy.clusters[index];
         let far = SIGHT_DISTANCE * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
-        for link in self.links.of(NodeId(index as u32)) {
+        self.links.tinted(NodeId(index as u32)).for_each(|link| {
             chain.error += link.error;
             if link.source.index() == index {
                 chain.even += own_irradiance(self.kernel, index, link);
             } else {
                 chain.add(self.kernel, link, cluster.centroid, far);
             }
-        }
+        });
         self.push(cluster.centroid, cluster.radius, chain);
     }
 
@@ -231,7 +233,7 @@ impl<'a> Walk<'a> {
         while let Some((index, depth)) = pending.pop() {
             let element = &hierarchy.mesh.elements[index];
             self.leave(depth);
-            let own = self.links.of(NodeId(base + index as u32));
+            let own = self.links.tinted(NodeId(base + index as u32));
             if element.is_leaf() {
                 let light = self.leaf_light(index, normal, own);
                 self.found.push(light);
@@ -247,13 +249,12 @@ impl<'a> Walk<'a> {
         let cell = |leaf: &LeafLight| self.coverage.cell(hierarchy, leaf.element as usize);
         let nearby = self.coverage.nearby(self.kernel.tables, patch);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-            let coverage = self.coverage.of(cell(&leaves[0]));
-            scale_to_coverage(hierarchy, coverage, nearby, leaves);
+            scale_to_coverage(hierarchy, self.coverage, nearby, leaves);
         }
     }
 
     /// Linked light of a leaf, before scaling; `own` are its links.
-    fn leaf_light(&self, index: usize, normal: Vec3, own: &[Link]) -> LeafLight {
+    fn leaf_light(&self, index: usize, normal: Vec3, own: TintedLinks<'_>) -> LeafLight {
         let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
         let centroid = hierarchy.mesh.elements[index].centroid;
         let mut light = LeafLight {
@@ -264,7 +265,7 @@ impl<'a> Walk<'a> {
             light.error += chain.error;
             light.centre += chain.known(centroid, normal);
         }
-        for link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
+        for &link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
             light.centre += link_irradiance(kernel, link, centroid, normal);
         }
         light.corners = [light.centre; 3];
@@ -273,8 +274,7 @@ impl<'a> Walk<'a> {
             .offsets
             .places(&hierarchy.mesh.elements[index], corners);
         let points = Vectors4::new([centroid, a, b, c]);
-        let elements = self.path.iter().flat_map(|chain| chain.own);
-        for link in elements.chain(own) {
+        let mut add = |link: TintedLink<'_>| {
             light.error += link.error;
             let transmission = transmission(kernel, link);
             let [centre, corners @ ..] = kernel.irradiances(link.source, &points, normal);
@@ -282,27 +282,36 @@ impl<'a> Walk<'a> {
             for (sum, corner) in light.corners.iter_mut().zip(corners) {
                 *sum += corner * transmission;
             }
+        };
+        for chain in &self.path {
+            chain.own.for_each(&mut add);
         }
+        own.for_each(add);
         light
     }
 }
 
 /// Irradiance of all faces of a cluster over its link with itself.
-pub(crate) fn own_irradiance(kernel: Kernel<'_>, cluster: usize, link: &Link) -> Vec4 {
+pub(crate) fn own_irradiance(kernel: Kernel<'_>, cluster: usize, link: TintedLink<'_>) -> Vec4 {
     let total = kernel.tables.clusters[cluster].total();
-    self_irradiance(kernel.hierarchy, cluster, total) * link.transmission()
+    self_irradiance(kernel.hierarchy, cluster, total) * link.tinted_transmission()
 }
 
 /// Irradiance of a face over a link of its own or of an ancestor, from another node.
-pub(crate) fn link_irradiance(kernel: Kernel<'_>, link: &Link, point: Vec3, normal: Vec3) -> Vec4 {
+pub(crate) fn link_irradiance(
+    kernel: Kernel<'_>,
+    link: TintedLink<'_>,
+    point: Vec3,
+    normal: Vec3,
+) -> Vec4 {
     kernel.irradiance(link.source, point, normal) * transmission(kernel, link)
 }
 
 /// Factor by channel of the irradiance over a link when its form factor is evaluated again.
-fn transmission(kernel: Kernel<'_>, link: &Link) -> Vec4 {
+fn transmission(kernel: Kernel<'_>, link: TintedLink<'_>) -> Vec4 {
     match kernel.hierarchy.kind(link.source) {
-        Kind::Cluster(_) => link.transmission(),
-        Kind::Element(_) => Vec4::splat(link.light_factor()),
+        Kind::Cluster(_) => link.tinted_transmission(),
+        Kind::Element(_) => link.tinted_light_factor(),
     }
 }
 

@@ -183,6 +183,13 @@ impl App {
                 }
                 state.view.clusters.shown = true;
             }
+            Action::ToggleSunDrag if state.sun().is_some() => {
+                state.panels.drags_sun = !state.panels.drags_sun;
+            }
+            Action::ToggleSunDrag => {
+                let text = "there is no sun to drag; switch it on under “Lights and materials”";
+                state.messages.push(Severity::Note, text);
+            }
             Action::ToggleSeeThrough if state.has_interior() => {
                 state.view.see_through = !state.view.see_through;
             }

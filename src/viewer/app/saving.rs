@@ -123,7 +123,7 @@ impl App {
         let Some(loaded) = &self.state.loaded else {
             return;
         };
-        let changes = self.state.materials.changes();
+        let changes = self.state.materials.changes(&self.state.lighting.lamps);
         let is_srgb = self.state.scene_options.mtl_color_is_srgb;
         let (severity, text) =
             match material_file::save(&loaded.source, &loaded.scene, &changes, is_srgb) {
@@ -147,7 +147,8 @@ impl App {
             camera: Some(self.state.rig.target),
             view: self.state.view.clone(),
             settings: self.state.settings.clone(),
-            materials: self.state.materials.changes(),
+            light: session::saved_light(&loaded.source, &self.state.lighting),
+            materials: self.state.materials.changes(&self.state.lighting.lamps),
         };
         match session::save(&loaded.source, &saved, &loaded.scene.frame) {
             Ok(path) => self

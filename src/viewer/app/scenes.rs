@@ -15,18 +15,24 @@ use super::{
     },
     App,
 };
+use crate::scene::Lighting;
 
 impl App {
     /// Begin to read a scene; the present one stays until it is there.
     pub(super) fn load(&mut self, source: SceneSource) {
         self.keeps_view = false;
         self.first = None;
-        self.start_loader(source);
+        let (asked, of) = (self.asked_light.clone(), source.clone());
+        self.start_loader(source, move || session::light(&of, &asked));
     }
 
-    fn start_loader(&mut self, source: SceneSource) {
+    fn start_loader(
+        &mut self,
+        source: SceneSource,
+        lighting: impl FnOnce() -> Lighting + Send + 'static,
+    ) {
         self.state.messages.open_scene();
-        let (options, lighting) = (self.state.scene_options, self.state.lighting.clone());
+        let options = self.state.scene_options;
         match Loader::start(source, options, lighting, self.wake.clone()) {
             Ok(loader) => self.state.loading = Some(loader),
             Err(error) => self
@@ -47,10 +53,6 @@ impl App {
         if let Some(sentence) = loaded.scene.up_sentence() {
             let text = wording::without_flags(&sentence);
             self.state.messages.push(Severity::Note, text);
-        }
-        if loaded.scene.has_light() && !loaded.is_lit {
-            let text = "no light reaches what is seen first; make a lamp of a material: click a surface, then “Lamp”";
-            self.state.messages.push(Severity::Warning, text);
         }
         if let Some(path) = loaded.source.path() {
             self.state.recent.push(path);
@@ -75,6 +77,7 @@ impl App {
             self.state.settings.clone(),
             self.state.options.clone(),
         );
+        self.state.lighting = loaded.lighting.clone();
         self.state.materials = Materials::of(&loaded.scene);
         self.state.history = History::default();
         self.state.loaded = Some(Arc::new(loaded));
@@ -136,7 +139,7 @@ impl App {
     /// Change materials as they were saved.
     fn restore(&mut self, saved: &[SavedMaterial]) {
         let mut materials = self.state.materials.clone();
-        let unknown = materials.restore(saved);
+        let unknown = materials.restore(saved, &self.state.lighting.lamps);
         if !unknown.is_empty() {
             let text = format!(
                 "the saved settings change materials that are not there: {}",
@@ -157,7 +160,8 @@ impl App {
             .map(|loaded| loaded.source.clone())
         {
             self.keeps_view = true;
-            self.start_loader(source);
+            let lighting = self.state.lighting.clone();
+            self.start_loader(source, || lighting);
         }
     }
 

@@ -98,6 +98,18 @@ pub fn first_look(scene: &Scene, rays: &RayTree) -> FirstLook {
     }
 }
 
+/// Whether light reaches anything that a camera shows.
+pub fn shows_light(scene: &Scene, rays: &RayTree, camera: &Camera) -> bool {
+    let judge = Judge {
+        scene,
+        rays,
+        spots: Spots::new(scene, rays),
+        up: scene.up.vector(),
+        bounds: [Vec3::ZERO; 2],
+    };
+    judge.shows_light(camera)
+}
+
 /// Box about the faces near the origin, where what matters lies: see [`Frame`]. Lamps are left out where there is anything
 /// else: a dome that stands for the sky is as far away as it likes. In most scenes that is all.
 fn bounds(scene: &Scene) -> [Vec3; 2] {
@@ -259,8 +271,6 @@ impl Judge<'_> {
 
     /// The same from free space.
     fn meets_from(&self, origin: Vec3, direction: Vec3) -> Option<(f32, bool)> {
-        // Adding 0 turns -0 into 0: the tree takes it for a direction below 0, and finds nothing.
-        let direction = direction + 0.0;
         let hit = self.rays.closest(origin, direction, None)?;
         Some((
             hit.distance,

@@ -21,7 +21,7 @@ use crate::viewer::{
 const MOST_HEIGHT: f32 = 240.0;
 
 /// Show the lights and the materials; a requested action goes into `actions`.
-pub fn materials_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
+pub fn materials_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let Some(loaded) = &state.loaded else {
         return;
     };

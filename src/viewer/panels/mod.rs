@@ -2,6 +2,7 @@
 
 pub mod clusters;
 pub mod color;
+pub mod dark;
 pub mod dialog;
 pub mod emission;
 pub mod error;

@@ -8,19 +8,20 @@ use super::{
     row::{self, slider},
 };
 use crate::{
-    scene::{Environment, Lighting, Scene, Sky, SkySource, Sun, SunSource},
-    viewer::{action::Action, state::State},
+    scene::{HosekSky, Lighting, Sky, SkySource, Sun, SunSource},
+    viewer::{action::Action, loader::LoadedScene, state::State},
 };
 
 /// Show sky and sun; a requested action goes into `actions`.
-pub fn outside_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
-    let Some(loaded) = &state.loaded else {
+pub fn outside_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
+    let Some(loaded) = state.loaded.clone() else {
         return;
     };
     let mut lighting = state.lighting.clone();
-    sky_ui(ui, &loaded.scene, &mut lighting);
-    sun_ui(ui, &loaded.scene, &mut lighting);
-    if lighting != state.lighting {
+    // Both, and no comparison of the pictures in it.
+    let has_changed = sky_ui(ui, &loaded, &mut lighting)
+        | sun_ui(ui, &loaded, &mut lighting, &mut state.panels.drags_sun);
+    if has_changed {
         actions.push(Action::Light(lighting));
     }
 }
@@ -34,149 +35,309 @@ fn split(light: Vec3) -> (f32, Vec3) {
     }
 }
 
-/// The present sky as something that is asked for: a picture of the scene's own counts as none.
-fn sky_of(environment: &Environment, unit: f32) -> SkySource {
-    match environment.sky {
-        Sky::Uniform(radiance) => SkySource::Uniform(radiance * unit),
-        Sky::Dark | Sky::Picture(_) => SkySource::Dark,
+/// The sky that there is, or would be were it switched on.
+fn sky_of(loaded: &LoadedScene, lighting: &Lighting) -> SkySource {
+    let (own, scene) = (&loaded.own_environment, &loaded.scene);
+    match &lighting.sky {
+        Some(sky) => sky.clone(),
+        None if matches!(own.sky, Sky::Dark) && loaded.emitter_count == 0 => {
+            SkySource::Uniform(Vec3::ONE)
+        }
+        None => SkySource::of(&own.sky, scene.up, scene.radiance_unit),
     }
 }
 
-fn sky_ui(ui: &mut egui::Ui, scene: &Scene, lighting: &mut Lighting) {
-    let environment = &scene.environment;
-    if lighting.sky.is_none() && matches!(environment.sky, Sky::Picture(_)) {
-        ui.weak("The scene brings its own sky along.");
-        return;
+/// Kinds of sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum SkyKind {
+    Uniform,
+    Hosek,
+    Picture,
+}
+
+/// Turbidity of a clear day.
+const CLEAR: f32 = 3.0;
+
+fn sky_ui(ui: &mut egui::Ui, loaded: &LoadedScene, lighting: &mut Lighting) -> bool {
+    let mut sky = sky_of(loaded, lighting);
+    let was_on = sky != SkySource::Dark && !lighting.is_sky_off;
+    let mut is_on = was_on;
+    let mut has_changed = false;
+    ui.horizontal(|ui| {
+        if let Some(scale) = sky.scale_mut().filter(|_| was_on) {
+            let (strength, mut color) = split(*scale);
+            let before = color;
+            color_button(ui, "Colour of the sky", &mut color);
+            if color != before {
+                *scale = color * strength;
+                has_changed = true;
+            }
+        }
+        ui.checkbox(&mut is_on, "Sky")
+            .on_hover_text("Light from all around");
+    });
+    if is_on != was_on {
+        lighting.is_sky_off = !is_on;
+        if sky == SkySource::Dark {
+            lighting.sky = Some(SkySource::Uniform(Vec3::ONE));
+        }
+        return true;
     }
-    let present = lighting.sky.clone();
-    let mut sky = present.unwrap_or_else(|| sky_of(environment, scene.radiance_unit));
-    let before = sky.clone();
+    if !is_on {
+        return false;
+    }
+    has_changed |= kind_ui(ui, loaded, lighting, &mut sky);
+    let (name, explanation) = match &sky {
+        SkySource::Dark | SkySource::Uniform(_) => {
+            ("Sky radiance", "Radiance of the sky, W/(sr·m²)")
+        }
+        SkySource::Hosek { .. } | SkySource::Picture { .. } => {
+            ("Sky strength", "Factor on the radiance of the sky")
+        }
+    };
+    if let Some(scale) = sky.scale_mut() {
+        let (mut strength, color) = split(*scale);
+        let is_changed = row::setting(ui, name, explanation, &mut strength, &1.0, |ui, value| {
+            ui.add(slider(value, 0.01..=100.0))
+        });
+        if is_changed {
+            *scale = color * strength;
+            has_changed = true;
+        }
+    }
     match &mut sky {
-        SkySource::Picture { scale, .. } => {
-            let explanation = "Factor on the radiance of the picture of the sky";
-            row::setting(ui, "Sky picture", explanation, scale, &1.0, |ui, value| {
-                ui.add(slider(value, 0.01..=100.0))
+        SkySource::Dark | SkySource::Uniform(_) => {}
+        SkySource::Hosek { turbidity, .. } => {
+            let explanation = "Turbidity: 1 in clean air, 3 on a clear day, 10 in haze";
+            has_changed |= row::setting(ui, "Haze", explanation, turbidity, &CLEAR, |ui, value| {
+                ui.add(egui::Slider::new(value, 1.0..=10.0))
             });
         }
-        SkySource::Dark => {
-            let mut is_on = false;
-            ui.checkbox(&mut is_on, "Sky")
-                .on_hover_text("The same light from all directions");
-            if is_on {
-                sky = SkySource::Uniform(Vec3::ONE);
-            }
-        }
-        SkySource::Uniform(radiance) => {
-            let (mut strength, mut color) = split(*radiance);
-            let mut is_on = true;
-            ui.horizontal(|ui| {
-                color_button(ui, "Colour of the sky", &mut color);
-                ui.checkbox(&mut is_on, "Sky")
-                    .on_hover_text("The same light from all directions");
-            });
-            let explanation = "Radiance of the sky, W/(sr·m²)";
-            row::setting(
+        SkySource::Picture { rotation, .. } => {
+            let explanation = "Turn of the picture, clockwise as seen from above";
+            has_changed |= row::setting(
                 ui,
-                "Sky radiance",
+                "Sky rotation",
                 explanation,
-                &mut strength,
-                &1.0,
-                |ui, value| ui.add(slider(value, 0.01..=100.0)),
+                rotation,
+                &0.0,
+                |ui, value| ui.add(egui::Slider::new(value, -180.0..=180.0).suffix("°")),
             );
-            *radiance = color * strength;
-            if !is_on {
-                sky = SkySource::Dark;
-            }
         }
     }
-    if sky != before {
+    if has_changed {
         lighting.sky = Some(sky);
     }
+    has_changed
 }
 
-/// The present sun as something that is asked for.
-fn sun_of(scene: &Scene) -> SunSource {
-    let Some(sun) = scene.environment.sun else {
-        return SunSource::Dark;
+/// What the sky is. A clear day comes with its sun.
+fn kind_ui(
+    ui: &mut egui::Ui,
+    loaded: &LoadedScene,
+    lighting: &mut Lighting,
+    sky: &mut SkySource,
+) -> bool {
+    let mut kind = match sky {
+        SkySource::Dark | SkySource::Uniform(_) => SkyKind::Uniform,
+        SkySource::Hosek { .. } => SkyKind::Hosek,
+        SkySource::Picture { .. } => SkyKind::Picture,
     };
-    let [azimuth, elevation] = sun.place(scene.up);
-    SunSource::Disc {
-        azimuth,
-        elevation,
-        irradiance: sun.irradiance * scene.radiance_unit,
-        diameter: sun.diameter.to_degrees(),
+    let mut options = vec![
+        (SkyKind::Uniform, "Uniform", "The same from all directions"),
+        (
+            SkyKind::Hosek,
+            "Clear day",
+            "Blue, about the place of the sun",
+        ),
+    ];
+    if kind == SkyKind::Picture {
+        options.push((SkyKind::Picture, "Picture", "An equirectangular picture"));
     }
+    let explanation = "Where the light of the sky comes from";
+    let before = kind;
+    row::setting(
+        ui,
+        "Kind of sky",
+        explanation,
+        &mut kind,
+        &before,
+        |ui, value| row::choice(ui, "Kind of sky", value, &options),
+    );
+    if kind == before {
+        return false;
+    }
+    match kind {
+        SkyKind::Uniform => *sky = SkySource::Uniform(Vec3::ONE),
+        SkyKind::Hosek => {
+            *sky = clear_day(loaded, lighting);
+        }
+        SkyKind::Picture => {}
+    }
+    true
 }
 
-/// The sun that is switched on: in the afternoon.
-const NEW_SUN: SunSource = SunSource::Disc {
-    azimuth: 225.0,
-    elevation: 40.0,
-    irradiance: Vec3::splat(SunSource::IRRADIANCE),
-    diameter: Sun::DEGREES,
-};
-
-fn sun_ui(ui: &mut egui::Ui, scene: &Scene, lighting: &mut Lighting) {
-    let mut sun = lighting.sun.unwrap_or_else(|| sun_of(scene));
-    let before = sun;
-    match &mut sun {
-        SunSource::Dark => {
-            let mut is_on = false;
-            ui.checkbox(&mut is_on, "Sun")
-                .on_hover_text("A small disc in the sky");
-            if is_on {
-                sun = NEW_SUN;
-            }
-        }
+/// A clear sky about the sun, which is switched on. Both are as bright beside each other as they are by nature, and the
+/// sun is as bright as before.
+fn clear_day(loaded: &LoadedScene, lighting: &mut Lighting) -> SkySource {
+    let sun = match sun_of(loaded, lighting) {
         SunSource::Disc {
             azimuth,
             elevation,
             irradiance,
-            ..
-        } => {
-            let (mut strength, mut color) = split(*irradiance);
-            let mut is_on = true;
-            ui.horizontal(|ui| {
-                color_button(ui, "Colour of the sun", &mut color);
-                ui.checkbox(&mut is_on, "Sun")
-                    .on_hover_text("A small disc in the sky");
-            });
-            let degrees = |range| {
-                move |ui: &mut egui::Ui, value: &mut f32| {
-                    ui.add(egui::Slider::new(value, range).suffix("°"))
-                }
-            };
-            row::setting(
-                ui,
-                "Sun azimuth",
-                "Clockwise from north as seen from above: -Z, or +Y where Z is up",
-                azimuth,
-                &225.0,
-                degrees(0.0..=360.0),
-            );
-            row::setting(
-                ui,
-                "Sun elevation",
-                "Above the horizon",
-                elevation,
-                &40.0,
-                degrees(-90.0..=90.0),
-            );
-            row::setting(
-                ui,
-                "Sun irradiance",
-                "Of a surface that faces the sun, W/m²",
-                &mut strength,
-                &SunSource::IRRADIANCE,
-                |ui, value| ui.add(slider(value, 0.01..=1000.0)),
-            );
-            *irradiance = color * strength;
-            if !is_on {
-                sun = SunSource::Dark;
-            }
-        }
+            diameter,
+        } if elevation >= 0.0 => (azimuth, elevation, irradiance.max_element(), diameter),
+        _ => (
+            NEW_PLACE[0],
+            NEW_PLACE[1],
+            SunSource::IRRADIANCE,
+            Sun::DEGREES,
+        ),
+    };
+    let (azimuth, elevation, strength, diameter) = sun;
+    let by_nature =
+        HosekSky::new(CLEAR, azimuth, elevation).map_or(Vec3::ONE, |day| day.sun_irradiance);
+    let scale = strength / by_nature.max_element();
+    lighting.is_sun_off = false;
+    lighting.sun = Some(SunSource::Disc {
+        azimuth,
+        elevation,
+        irradiance: by_nature * scale,
+        diameter,
+    });
+    SkySource::Hosek {
+        turbidity: CLEAR,
+        scale: Vec3::splat(scale),
     }
-    if sun != before {
-        lighting.sun = Some(sun);
+}
+
+/// Azimuth and elevation of a sun that is switched on where there was none: in the afternoon.
+const NEW_PLACE: [f32; 2] = [225.0, 40.0];
+
+/// The sun that there is, or would be were it switched on.
+fn sun_of(loaded: &LoadedScene, lighting: &Lighting) -> SunSource {
+    let (own, scene) = (&loaded.own_environment, &loaded.scene);
+    lighting.sun.unwrap_or_else(|| match &own.sun {
+        Some(sun) => SunSource::of(sun, scene.up, scene.radiance_unit),
+        None => SunSource::Dark,
+    })
+}
+
+fn sun_ui(
+    ui: &mut egui::Ui,
+    loaded: &LoadedScene,
+    lighting: &mut Lighting,
+    is_dragged: &mut bool,
+) -> bool {
+    let mut sun = sun_of(loaded, lighting);
+    let was_on = sun != SunSource::Dark && !lighting.is_sun_off;
+    let mut is_on = was_on;
+    let before = sun;
+    ui.horizontal(|ui| {
+        if let (true, SunSource::Disc { irradiance, .. }) = (was_on, &mut sun) {
+            let (strength, mut color) = split(*irradiance);
+            color_button(ui, "Colour of the sun", &mut color);
+            *irradiance = color * strength;
+        }
+        ui.checkbox(&mut is_on, "Sun")
+            .on_hover_text("A small disc in the sky");
+        if was_on {
+            ui.toggle_value(is_dragged, "Drag sun").on_hover_text(
+                "Left drag in the view moves the sun: across its azimuth, up and down its elevation (U)",
+            );
+        }
+    });
+    if is_on != was_on {
+        lighting.is_sun_off = !is_on;
+        *is_dragged &= is_on;
+        if sun == SunSource::Dark {
+            lighting.sun = Some(new_sun());
+        }
+        return true;
+    }
+    if let (true, SunSource::Disc { .. }) = (is_on, sun) {
+        disc_ui(ui, &mut sun);
+    }
+    if sun == before {
+        return false;
+    }
+    lighting.sun = Some(sun);
+    true
+}
+
+fn disc_ui(ui: &mut egui::Ui, sun: &mut SunSource) {
+    let SunSource::Disc {
+        azimuth,
+        elevation,
+        irradiance,
+        diameter,
+    } = sun
+    else {
+        return;
+    };
+    let degrees = |range| {
+        move |ui: &mut egui::Ui, value: &mut f32| {
+            ui.add(egui::Slider::new(value, range).suffix("°"))
+        }
+    };
+    let [new_azimuth, new_elevation] = NEW_PLACE;
+    // On the command line it may be negative.
+    let mut shown = azimuth.rem_euclid(360.0);
+    let explanation = "Clockwise from north as seen from above: -Z, or +Y where Z is up";
+    let is_changed = row::setting(
+        ui,
+        "Sun azimuth",
+        explanation,
+        &mut shown,
+        &new_azimuth,
+        degrees(0.0..=360.0),
+    );
+    if is_changed {
+        *azimuth = shown;
+    }
+    row::setting(
+        ui,
+        "Sun elevation",
+        "Above the horizon",
+        elevation,
+        &new_elevation,
+        degrees(-90.0..=90.0),
+    );
+    let (mut strength, color) = split(*irradiance);
+    let explanation = "Of a surface that faces the sun, W/m²";
+    let default = SunSource::IRRADIANCE;
+    let is_changed = row::setting(
+        ui,
+        "Sun irradiance",
+        explanation,
+        &mut strength,
+        &default,
+        |ui, value| ui.add(slider(value, 0.01..=1000.0)),
+    );
+    if is_changed {
+        *irradiance = color * strength;
+    }
+    let explanation = "The larger, the softer its shadows";
+    row::setting(
+        ui,
+        "Sun diameter",
+        explanation,
+        diameter,
+        &Sun::DEGREES,
+        |ui, value| {
+            let slider = egui::Slider::new(value, 0.1..=90.0).logarithmic(true);
+            ui.add(slider.suffix("°"))
+        },
+    );
+}
+
+/// The sun that is switched on where there was none.
+fn new_sun() -> SunSource {
+    let [azimuth, elevation] = NEW_PLACE;
+    SunSource::Disc {
+        azimuth,
+        elevation,
+        irradiance: Vec3::splat(SunSource::IRRADIANCE),
+        diameter: Sun::DEGREES,
     }
 }

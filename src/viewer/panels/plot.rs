@@ -1,4 +1,4 @@
-//! Residual and estimated error against run time.
+//! Estimated error, with its interval, and residual against run time.
 
 use eframe::egui;
 use egui_plot::{AxisHints, GridInput, GridMark, Line, Plot, PlotPoints};
@@ -25,29 +25,44 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         ui.weak("The plot begins with the second step.");
         return;
     }
-    let height = |report: &StepReport, of: fn(&StepReport) -> f32| {
-        let value = f64::from(of(report));
-        value.max(FLOOR).log10()
-    };
-    let lines = [
-        (
-            "Error bound",
-            theme::SELECTED,
-            (|report| report.error_bound) as fn(&StepReport) -> f32,
-        ),
-        ("Residual", theme::axis_color(2), |report| report.residual),
+    /// A line: its name, colour, width, and value in a step, where there is one.
+    type Curve = (
+        &'static str,
+        egui::Color32,
+        f32,
+        fn(&StepReport) -> Option<f64>,
+    );
+    let estimated = theme::SELECTED;
+    let interval = estimated.gamma_multiply(0.5);
+    let curves: [Curve; 4] = [
+        ("Estimated error", estimated, 2.0, |report| {
+            report.estimated_error.map(|error| error.trimmed_rms)
+        }),
+        ("its interval", interval, 1.0, |report| {
+            report.estimated_error.map(|error| error.trimmed_high)
+        }),
+        ("", interval, 1.0, |report| {
+            report.estimated_error.map(|error| error.trimmed_low)
+        }),
+        ("Residual", theme::axis_color(2), 2.0, |report| {
+            Some(f64::from(report.residual))
+        }),
     ];
+    let height = |value: f64| value.max(FLOOR).log10();
     // Above the plot: within it they would hide the lines.
     ui.horizontal(|ui| {
-        for (name, color, _) in lines {
-            ui.colored_label(color, "—");
-            ui.label(name);
+        for (name, color, ..) in curves.iter().filter(|(name, ..)| !name.is_empty()) {
+            ui.colored_label(*color, "—");
+            ui.label(*name);
         }
         ui.weak("relative");
     });
     let heights = reports
         .iter()
-        .flat_map(|report| lines.map(|(.., of)| height(report, of)));
+        .flat_map(|report| curves.map(|(.., of)| of(report)))
+        .flatten()
+        .filter(|value| *value > 0.0)
+        .map(height);
     // Whole decades, so that there are marks however little the lines move.
     let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), at| {
         (low.min(at.floor()), high.max(at.ceil()))
@@ -65,12 +80,14 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         .x_grid_spacer(time_spacer())
         .y_grid_spacer(decade_spacer())
         .show(ui, |plot| {
-            for (name, color, of) in lines {
+            for (name, color, width, of) in curves {
+                // An interval that reaches 0 has no lower end on this axis.
                 let points: PlotPoints<'_> = reports
                     .iter()
-                    .map(|report| [report.elapsed_s, height(report, of)])
+                    .filter_map(|report| Some((report, of(report).filter(|value| *value > 0.0)?)))
+                    .map(|(report, value)| [report.elapsed_s, height(value)])
                     .collect();
-                plot.line(Line::new(name, points).width(2.0).color(color));
+                plot.line(Line::new(name, points).width(width).color(color));
             }
         });
 }

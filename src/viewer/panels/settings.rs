@@ -1,4 +1,4 @@
-//! Settings of the solve: presets, thresholds, limits.
+//! Settings of the solve: accuracy, presets, thresholds, limits.
 
 use std::time::Duration;
 
@@ -17,6 +17,7 @@ use crate::{
 /// Show the settings; requested actions go into `actions`.
 pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let mut settings = state.settings.clone();
+    accuracy_ui(ui, &mut settings);
     presets_ui(ui, &mut settings);
     ui.add_space(4.0);
     quality_ui(ui, state, &mut settings);
@@ -27,6 +28,29 @@ pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
     limits_ui(ui, state, actions);
 }
 
+/// Errors that can be asked for.
+const ACCURACIES: [f32; 4] = [0.1, 0.05, 0.02, 0.01];
+
+/// The error that is asked for. A solve that is asked for one goes on until its estimate is that small.
+fn accuracy_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
+    ui.horizontal(|ui| {
+        ui.label("Accuracy").on_hover_text(
+            "Refine until the estimated error is this small. Each half of the error takes about four times as long",
+        );
+        for error in ACCURACIES {
+            let chosen = with_quality_of(&SolveSettings::towards(error), settings);
+            let is_active = settings.error == Some(error);
+            let label = format!("{} %", (100.0 * error).round());
+            let button = egui::Button::selectable(is_active, label).frame_when_inactive(true);
+            let explanation = "The upper end of the interval of 'Estimated error' is to be this small";
+            if ui.add(button).on_hover_text(explanation).clicked() {
+                *settings = chosen;
+            }
+        }
+    });
+    ui.add_space(2.0);
+}
+
 fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
     const PRESETS: [(&str, SolveSettings, &str); 3] = [
         (
@@ -34,11 +58,11 @@ fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
             SolveSettings::draft(),
             "Seconds to a first impression",
         ),
-        ("Normal", SolveSettings::normal(), "About 5 % error"),
+        ("Normal", SolveSettings::normal(), "About 2 % error"),
         (
             "Final",
             SolveSettings::finest(),
-            "For the final bake: about 2 % error, many times the time",
+            "For the final bake: about 1 % error, many times the time",
         ),
     ];
     ui.horizontal(|ui| {

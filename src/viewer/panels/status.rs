@@ -34,8 +34,11 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
         }
         if let Some(report) = state.report() {
             let text = format!(
-                "Step {}   ε {}   Links {}   Vertices {}   {}",
+                "Step {}{}   ε {}   Links {}   Vertices {}   {}",
                 report.step,
+                report.estimated_error.map_or_else(String::new, |error| {
+                    format!("   Error {}", error.text())
+                }),
                 figure(f64::from(report.epsilon)),
                 count(report.links),
                 count(report.vertices),

@@ -10,6 +10,7 @@ mod line_pass;
 mod mesh_pass;
 mod meter;
 mod readback;
+mod sky_pass;
 mod target;
 mod tonemap_pass;
 mod uniforms;
@@ -31,13 +32,14 @@ use super::{
     view::{ViewMode, ViewSettings},
 };
 use crate::{
-    scene::{Scene, Sky},
+    scene::{Scene, Sky, SkyPicture},
     solver::{DisplayMesh, VertexLight},
 };
 use detail::DetailSet;
 use line_pass::LinePass;
 use mesh_pass::MeshPass;
 use meter::MeterTarget;
+use sky_pass::SkyPass;
 use tonemap_pass::TonemapPass;
 use uniforms::ViewUniforms;
 
@@ -227,17 +229,34 @@ impl<'a> Picture<'a> {
         self.interior.filter(is_looked_into)
     }
 
-    /// What is seen where no surface is: the radiance of a uniform sky that was asked for, else the background. Alpha
-    /// says whether it is light.
-    fn backdrop(&self) -> Vec4 {
+    /// Factor on light, exposure included.
+    fn light_factor(&self) -> f32 {
+        self.view.exposure_factor() * self.view.light_factor().max(f32::MIN_POSITIVE)
+    }
+
+    /// The sky where it is seen: one that was asked for, as radiance.
+    fn sky(&self) -> &Sky {
         let environment = &self.scene.environment;
-        match environment.sky {
-            Sky::Uniform(radiance)
-                if self.view.mode == ViewMode::Radiance && !environment.is_default =>
-            {
-                radiance.extend(1.0)
-            }
-            _ => self.background.extend(0.0),
+        match self.view.mode == ViewMode::Radiance && !environment.is_default {
+            true => &environment.sky,
+            false => &Sky::Dark,
+        }
+    }
+
+    /// The picture of the sky where it is seen.
+    fn sky_picture(&self) -> Option<&SkyPicture> {
+        match self.sky() {
+            Sky::Picture(picture) => Some(picture),
+            Sky::Dark | Sky::Uniform(_) => None,
+        }
+    }
+
+    /// What is seen where neither a surface nor a picture of the sky is: the light of a uniform sky, else the background.
+    /// Alpha says whether it is light.
+    fn backdrop(&self) -> Vec4 {
+        match self.sky() {
+            Sky::Uniform(radiance) => (*radiance * self.light_factor()).extend(1.0),
+            Sky::Dark | Sky::Picture(_) => self.background.extend(0.0),
         }
     }
 
@@ -259,6 +278,7 @@ impl<'a> Picture<'a> {
 pub struct Renderer {
     gpu: Gpu,
     uniforms: ViewUniforms,
+    sky_pass: SkyPass,
     mesh_pass: MeshPass,
     line_pass: LinePass,
     tonemap_pass: TonemapPass,
@@ -271,6 +291,7 @@ impl Renderer {
         let uniforms = ViewUniforms::new(&gpu.device);
         let details = DetailSet::new(&gpu);
         Self {
+            sky_pass: SkyPass::new(&gpu, uniforms.layout()),
             mesh_pass: MeshPass::new(&gpu, uniforms.layout(), &details),
             line_pass: LinePass::new(&gpu, uniforms.layout()),
             tonemap_pass: TonemapPass::new(&gpu, uniforms.layout()),
@@ -345,8 +366,10 @@ impl Renderer {
 
     /// Draw a picture of what was uploaded for it.
     pub fn draw(&mut self, target: &Target, picture: &Picture<'_>, uploads: &Uploads) {
+        let sky = picture.sky_picture().map(|sky| &sky.picture);
+        self.sky_pass.prepare(&self.gpu, sky);
         let mut encoder = self.begin(target.size(), picture);
-        self.draw_linear(&mut encoder, target, picture.backdrop(), picture, uploads);
+        self.draw_linear(&mut encoder, target, None, picture, uploads);
         // Turn it into display colours.
         {
             let mut pass = target.begin_display(&mut encoder);
@@ -363,7 +386,12 @@ impl Renderer {
             (&target.over_nothing, Vec4::ZERO),
             (&target.over_light, Vec4::W),
         ] {
-            self.draw_linear(&mut encoder, target, background, picture, uploads);
+            self.draw_linear(&mut encoder, target, Some(background), picture, uploads);
+        }
+        {
+            let mut pass = target.over_nothing.begin_display(&mut encoder);
+            pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+            self.tonemap_pass.draw_cutout(&self.gpu, &mut pass, target);
         }
         self.gpu.queue.submit([encoder.finish()]);
     }
@@ -394,17 +422,21 @@ impl Renderer {
             })
     }
 
-    /// Draw surfaces and lines into the linear picture.
+    /// Draw surfaces and lines into the linear picture, over this background or the picture's own.
     fn draw_linear(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         target: &Target,
-        background: Vec4,
+        background: Option<Vec4>,
         picture: &Picture<'_>,
         uploads: &Uploads,
     ) {
-        let mut pass = target.begin_linear(encoder, background);
+        let backdrop = background.unwrap_or_else(|| picture.backdrop());
+        let mut pass = target.begin_linear(encoder, backdrop);
         pass.set_bind_group(0, self.uniforms.bind_group(), &[]);
+        if background.is_none() {
+            self.sky_pass.draw(&mut pass);
+        }
         let cuts = picture.room_looked_into().is_some();
         self.mesh_pass.draw(&mut pass, uploads, picture.view, cuts);
         self.line_pass.draw(&mut pass, uploads.boxes());

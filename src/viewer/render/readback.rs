@@ -16,7 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 pub struct ReadError(String);
 
 impl Target {
-    /// The display picture: sRGB-encoded, opaque.
+    /// The display picture, sRGB-encoded.
     ///
     /// # Errors
     /// When the device is lost or out of memory.

@@ -4,6 +4,9 @@
 
 @group(1) @binding(0) var picture: texture_2d<f32>;
 @group(1) @binding(1) var samples: texture_multisampled_2d<f32>;
+// Of a picture without its background, the same over light.
+@group(1) @binding(2) var picture_over_light: texture_2d<f32>;
+@group(1) @binding(3) var samples_over_light: texture_multisampled_2d<f32>;
 
 @vertex
 fn vs_main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
@@ -57,4 +60,43 @@ fn fs_samples(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
         sum += shown(textureLoad(samples, vec2<i32>(at.xy), index));
     }
     return vec4<f32>(srgb(sum / f32(count)), 1.0);
+}
+
+// What is covered, of a pixel over nothing and the alpha of the same over light: display-linear colour times coverage, and
+// coverage.
+fn covered(over_nothing: vec4<f32>, alpha_over_light: f32) -> vec4<f32> {
+    let coverage = clamp(1.0 - (alpha_over_light - over_nothing.a), 0.0, 1.0);
+    if (coverage <= 0.0) {
+        return vec4<f32>(0.0);
+    }
+    let light = clamp(over_nothing.a, 0.0, coverage);
+    let color = shown(vec4<f32>(over_nothing.rgb, light) / coverage);
+    return vec4<f32>(color * coverage, coverage);
+}
+
+// Straight alpha: colours are not darkened towards the edges.
+fn straight(sum: vec4<f32>) -> vec4<f32> {
+    if (sum.a <= 0.0) {
+        return vec4<f32>(0.0);
+    }
+    return vec4<f32>(srgb(sum.rgb / sum.a), sum.a);
+}
+
+@fragment
+fn fs_cutout(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let place = vec2<i32>(at.xy);
+    let over_light = textureLoad(picture_over_light, place, 0);
+    return straight(covered(textureLoad(picture, place, 0), over_light.a));
+}
+
+@fragment
+fn fs_cutout_samples(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let place = vec2<i32>(at.xy);
+    let count = i32(textureNumSamples(samples));
+    var sum = vec4<f32>(0.0);
+    for (var index = 0; index < count; index++) {
+        let over_light = textureLoad(samples_over_light, place, index);
+        sum += covered(textureLoad(samples, place, index), over_light.a);
+    }
+    return straight(sum / f32(count));
 }

@@ -2,13 +2,13 @@
 
 use std::num::NonZeroU64;
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 use super::{super::theme, Picture};
-use crate::{export::ToneMap, viewer::view::ViewMode};
+use crate::{export::ToneMap, scene::SkyPicture, viewer::view::ViewMode};
 
-/// Floats of `View`: a matrix, seven vectors, nine ramp colours.
-const FLOAT_COUNT: usize = 16 + 7 * 4 + 9 * 4;
+/// Floats of `View`: a matrix, eleven vectors, nine ramp colours.
+const FLOAT_COUNT: usize = 16 + 11 * 4 + 9 * 4;
 const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
 /// Width of segments in points.
 const LINE_POINTS: f32 = 2.5;
@@ -100,7 +100,7 @@ impl ViewUniforms {
             } else {
                 f32::from(view.mode.shader_number())
             },
-            view.exposure_factor() * factor,
+            picture.light_factor(),
             flag(view.tone_map == ToneMap::None),
             flag(view.texture_detail),
         ]);
@@ -114,6 +114,17 @@ impl ViewUniforms {
         let [min, max] = room.map_or([Vec3::ZERO; 2], |room| [room.min, room.max]);
         floats.extend([min.x, min.y, min.z, flag(room.is_some())]);
         floats.extend([max.x, max.y, max.z, 0.0]);
+        let sky = picture.sky_picture();
+        let turn = sky.map_or(Mat3::IDENTITY, SkyPicture::from_scene);
+        let scale = sky.map_or(Vec3::ZERO, |sky| sky.scale * picture.light_factor());
+        for vector in camera
+            .rays(aspect)
+            .map(|ray| turn * ray)
+            .into_iter()
+            .chain([scale])
+        {
+            floats.extend([vector.x, vector.y, vector.z, 0.0]);
+        }
         for color in theme::ramp_stops() {
             floats.extend([color.x, color.y, color.z, 1.0]);
         }

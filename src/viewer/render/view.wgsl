@@ -14,6 +14,13 @@ struct View {
     // Lower corner of the room, w: 1 where what stands before it is not drawn; upper corner.
     room_min: vec4<f32>,
     room_max: vec4<f32>,
+    // From a place of the picture to the direction that is seen there, in the coordinates of the picture of the sky: of its
+    // middle, and what its right edge and its upper edge differ by.
+    sky_forward: vec4<f32>,
+    sky_right: vec4<f32>,
+    sky_up: vec4<f32>,
+    // Factor on the picture of the sky, exposure included.
+    sky_scale: vec4<f32>,
     // Display-linear colours of the false-colour ramp, evenly spaced.
     ramp: array<vec4<f32>, 9>,
 };

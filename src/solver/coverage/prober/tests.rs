@@ -48,7 +48,7 @@ fn probed(scene: &Scene) -> ([f32; 3], Vec<HemisphereCoverage>) {
     let found = probe(scene, &hierarchy, &rays, &known, false, 1, &cancel).unwrap();
     assert!(found.within.is_empty() && found.ray_count > 0);
     let cells: Vec<HemisphereCoverage> = (0..hierarchy.patches.len())
-        .map(|patch| found.coverage.of(patch))
+        .map(|patch| found.coverage.of(&hierarchy, patch))
         .collect();
     let means = [0, 1, 2].map(|axis| {
         let patches = hierarchy.patches.iter().zip(&cells);

@@ -20,7 +20,7 @@ use crate::{
         iteration::LinkedLight,
         vertices::{LeafLight, link_irradiance, own_irradiance},
     },
-    transport::{Kernel, Link, luminance},
+    transport::{Kernel, TintedLink, luminance},
 };
 
 /// The state that is inspected.
@@ -138,7 +138,7 @@ impl<'a> Inspector<'a> {
         let mut found = Vec::new();
         for &receiver in path {
             let place = self.place(receiver);
-            for link in self.linked.links.of(receiver) {
+            self.linked.links.tinted(receiver).for_each(|link| {
                 let share = match self.hierarchy().kind(node) {
                     Kind::Cluster(index) => mean_irradiance(kernel, index, receiver, link),
                     Kind::Element(leaf) => {
@@ -159,7 +159,7 @@ impl<'a> Inspector<'a> {
                     form_factor: share.form_factor_sum(),
                     error: link.error,
                 });
-            }
+            });
         }
         found
     }
@@ -182,7 +182,10 @@ impl<'a> Inspector<'a> {
             });
         let patch = elements[leaf].patch as usize;
         let nearby = self.coverage.nearby(&self.linked.power, patch);
-        let scaled = self.coverage.of(cell).scaled(light, sums, nearby);
+        let scaled = self
+            .coverage
+            .of(self.hierarchy(), leaf)
+            .scaled(light, sums, nearby);
         let ratio = (scaled / light).color();
         Vec3::select(ratio.is_finite_mask(), ratio, Vec3::ONE)
     }
@@ -253,7 +256,12 @@ impl<'a> Inspector<'a> {
 }
 
 /// Mean irradiance over the faces of a cluster, at its centroid, over a link of itself or of an ancestor.
-fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Link) -> Vec4 {
+fn mean_irradiance(
+    kernel: Kernel<'_>,
+    index: usize,
+    receiver: NodeId,
+    link: TintedLink<'_>,
+) -> Vec4 {
     let hierarchy: &Hierarchy = kernel.hierarchy;
     let cluster = &hierarchy.clusters[index];
     if link.source == receiver {
@@ -269,7 +277,7 @@ fn mean_irradiance(kernel: Kernel<'_>, index: usize, receiver: NodeId, link: &Li
     let facing = moments.project(towards, reading).area() / area;
     let cosine = moments.area_vector().dot(towards) / area;
     let share = facing * (1.0 - incident.spread) + 0.5 * (1.0 + cosine) * incident.spread;
-    incident.strength * (link.transmission() * share)
+    incident.strength * (link.tinted_transmission() * share)
 }
 
 /// Luminance of the irradiance over a link, by which links are ordered.

@@ -35,6 +35,7 @@ fn gathered(solver: &Solver, factor: f32) -> GatherFactors {
         surfaces: solver.surfaces(),
         leaves: &leaves,
         squares: &[],
+        coverage: &solver.coverage,
         rays: &solver.rays,
         limits: Limits::new(solver.settings(), hierarchy, 1.0, u64::MAX),
         converged_change: 1e-4,
