@@ -128,7 +128,8 @@ fn write_markdown(report: &Report<'_>, out: &mut dyn Write) -> io::Result<()> {
         "# Exact cases\n\n\
          vecrad {}, {}, {} threads.\n\
          {} figures hold and {} fail, in {seconds:.0} s.\n\
-         Irradiance in W/m², each to be within {} % of what is expected, or of the largest of its case where that is 0.\n\n{}",
+         Irradiance E in W/m² and radiance L in W·sr⁻¹·m⁻², each to be within {} % of what is expected, or of the largest \
+         figure of its case where that is 0.\n\n{}",
         report.version,
         report.machine.describe(),
         report.threads,

@@ -3,9 +3,11 @@
 //! The values are computed by the closed forms that the standard names; the tests hold them to the digits of its tables.
 //! Table 19 of the standard (case 5.7) is known to be wrong; its corrected values are used.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
-use super::{Case, Expected, Group, Place, closed::mean_irradiance};
+use super::{Case, Expected, Figure, Group, Spot, closed::mean_irradiance};
 use crate::{
     reference::analytic::point_to_polygon,
     scene::{
@@ -34,20 +36,16 @@ pub(super) fn cases() -> Vec<Case> {
     let opening = middle.map(|[x, y]| DVec3::new(x, y, 3.0));
     let floor = [[0.0, 0.0], [0.0, 4.0], [4.0, 4.0], [4.0, 0.0]];
     let floor = floor.map(|[x, y]| DVec3::new(x, y, 0.0));
-    let above = |points: &[f64]| {
-        let lit = points.iter().map(|&z| Point::wall(z));
-        lit.collect::<Vec<_>>()
-    };
-    let floors = |count: usize| AWAY[..count].iter().map(|&y| Point::floor(y));
-    let ceilings = AWAY[..4].iter().map(|&y| Point::ceiling(y));
-    let pi = std::f64::consts::PI;
+    let walls = || WALL.into_iter().map(Point::wall);
+    let floors = |count: usize| AWAY.into_iter().take(count).map(Point::floor);
+    let ceilings = AWAY.into_iter().take(4).map(Point::ceiling);
     let mut cases = vec![
         case(
             "5.3, area lamp in the ceiling",
             "L · π times the factor of the lamp of 1 m² and L = 1000",
             cie_room_with_lamp(LAMP as f32),
-            above(&WALL).into_iter().chain(floors(4)),
-            |point| LAMP * pi * point.factor(&opening),
+            walls().chain(floors(4)),
+            |point| LAMP * PI * point.factor(&opening),
         ),
         case(
             "5.6, reflection of a lit floor",
@@ -56,7 +54,8 @@ pub(super) fn cases() -> Vec<Case> {
             WALL[..5]
                 .iter()
                 .rev()
-                .map(|&z| Point::wall(z))
+                .copied()
+                .map(Point::wall)
                 .chain(ceilings),
             |point| PERCENT * point.factor(&floor),
         ),
@@ -64,11 +63,11 @@ pub(super) fn cases() -> Vec<Case> {
             "5.7, reflection of a lit wall behind a screen",
             "100 E / M, the factor of what is seen of the wall; Table 19 of the standard is wrong",
             cie_room_with_screen(PERCENT),
-            above(&WALL).into_iter().chain(floors(5)),
-            |point| PERCENT * point.factor(&seen_wall(point.position)),
+            walls().chain(floors(5)),
+            |point| PERCENT * point.factor(&seen_wall(point.spot.position)),
         ),
         Case {
-            sky: PERCENT as f32 / std::f32::consts::PI,
+            sky: (PERCENT / PI) as f32,
             ..case(
                 "5.9, roof opening under a uniform sky",
                 "sky component in percent: the factor of the opening of 1 m²",
@@ -92,9 +91,9 @@ fn reflections(reflectance: f32) -> Case {
         basis: "mean indirect E = ρ Φ / (A (1 − ρ))",
         sky: 0.0,
         expected: vec![Expected {
-            quantity: "mean indirect E".to_owned(),
-            place: Place::IndirectEverywhere,
-            irradiance: total * f64::from(reflectance),
+            name: "mean indirect E".to_owned(),
+            figure: Figure::MeanIndirect,
+            value: total * f64::from(reflectance),
         }],
         scene,
     }
@@ -104,42 +103,35 @@ fn reflections(reflectance: f32) -> Case {
 #[derive(Clone, Copy)]
 struct Point {
     on: &'static str,
-    position: DVec3,
-    normal: DVec3,
+    spot: Spot,
 }
 
 impl Point {
+    fn new(on: &'static str, y: f64, z: f64, normal: DVec3) -> Self {
+        let position = DVec3::new(2.0, y, z);
+        let spot = Spot { position, normal };
+        Self { on, spot }
+    }
+
     fn wall(z: f64) -> Self {
-        Self {
-            on: "wall",
-            position: DVec3::new(2.0, 0.0, z),
-            normal: DVec3::Y,
-        }
+        Self::new("wall", 0.0, z, DVec3::Y)
     }
 
     fn floor(y: f64) -> Self {
-        Self {
-            on: "floor",
-            position: DVec3::new(2.0, y, 0.0),
-            normal: DVec3::Z,
-        }
+        Self::new("floor", y, 0.0, DVec3::Z)
     }
 
     fn ceiling(y: f64) -> Self {
-        Self {
-            on: "ceiling",
-            position: DVec3::new(2.0, y, 3.0),
-            normal: -DVec3::Z,
-        }
+        Self::new("ceiling", y, 3.0, -DVec3::Z)
     }
 
     /// View factor to a polygon that faces into the room.
     fn factor(&self, corners: &[DVec3]) -> f64 {
-        point_to_polygon(self.position, self.normal, corners).abs()
+        point_to_polygon(self.spot.position, self.spot.normal, corners).abs()
     }
 
-    fn quantity(&self) -> String {
-        let DVec3 { x, y, z } = self.position;
+    fn name(&self) -> String {
+        let DVec3 { x, y, z } = self.spot.position;
         format!("{} {x}, {y}, {z}", self.on)
     }
 }
@@ -162,12 +154,9 @@ fn case(
     irradiance: impl Fn(&Point) -> f64,
 ) -> Case {
     let expected = |point: Point| Expected {
-        quantity: point.quantity(),
-        place: Place::Point {
-            position: point.position,
-            normal: point.normal,
-        },
-        irradiance: irradiance(&point),
+        name: point.name(),
+        figure: Figure::IrradianceAt(point.spot),
+        value: irradiance(&point),
     };
     Case {
         group: Group::Cie171,
@@ -214,10 +203,10 @@ mod tests {
                 // Half a unit of the last digit.
                 let allowed = if name == "5.3" { 0.00501 } else { 0.000501 };
                 assert!(
-                    (known.irradiance - printed).abs() < allowed,
+                    (known.value - printed).abs() < allowed,
                     "{name}, {}: {} for {printed}",
-                    known.quantity,
-                    known.irradiance
+                    known.name,
+                    known.value
                 );
             }
         }

@@ -4,12 +4,13 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{Case, Expected, Group, Place};
+use super::{Case, Expected, Figure, Group, Spot};
 use crate::{
     reference::analytic::sphere_irradiance,
     scene::{
         Material, SceneBuilder,
         builtin::{
+            Builtin,
             exact::{concentric_spheres, even_court, patterned_sphere, with_one_reflectance},
             find_builtin,
         },
@@ -25,25 +26,21 @@ const ONE: f32 = 0.6;
 
 pub(super) fn cases() -> Vec<Case> {
     let mut cases = vec![patterned(), spheres(), even()];
-    let rooms = ["cornell", "room-1022"]
-        .into_iter()
-        .filter_map(find_builtin);
-    cases.extend(rooms.map(|room| {
-        let scene = with_one_reflectance(room.builder(), ONE);
-        Case {
-            group: Group::Closed,
-            name: format!("one reflectance, {}", room.name),
-            basis: "mean E = Φ / (A (1 − ρ))",
-            sky: 0.0,
-            expected: vec![mean(
-                Place::Everywhere,
-                "all surfaces",
-                mean_irradiance(&scene, f64::from(ONE)),
-            )],
-            scene,
-        }
-    }));
+    cases.extend(find_builtin("room-1022").map(one_reflectance));
     cases
+}
+
+fn one_reflectance(room: &Builtin) -> Case {
+    let scene = with_one_reflectance(room.builder(), ONE);
+    let irradiance = mean_irradiance(&scene, f64::from(ONE));
+    Case {
+        group: Group::Closed,
+        name: format!("one reflectance, {}", room.name),
+        basis: "mean E = Φ / (A (1 − ρ))",
+        scene,
+        sky: 0.0,
+        expected: vec![mean(Figure::MeanOfAll, "all surfaces", irradiance)],
+    }
 }
 
 fn patterned() -> Case {
@@ -56,7 +53,7 @@ fn patterned() -> Case {
         basis: "E = (Σ M A / A) / (1 − Σ ρ A / A) everywhere",
         sky: 0.0,
         expected: ["cap", "belt", "rest"]
-            .map(|name| mean(Place::Material(name), name, irradiance))
+            .map(|name| mean(Figure::MeanOf(name), name, irradiance))
             .into(),
         scene,
     }
@@ -72,8 +69,8 @@ fn spheres() -> Case {
         scene: concentric_spheres(FREQUENCY),
         sky: 0.0,
         expected: vec![
-            mean(Place::Material("inner"), "inner sphere", inner),
-            mean(Place::Material("outer"), "outer sphere", outer),
+            mean(Figure::MeanOf("inner"), "inner sphere", inner),
+            mean(Figure::MeanOf("outer"), "outer sphere", outer),
         ],
     }
 }
@@ -82,8 +79,9 @@ fn even() -> Case {
     let points = [
         ("floor", [0.3, 0.3, 0.0], DVec3::Z),
         ("floor under the block", [0.8, 1.2, 0.0], DVec3::Z),
-        ("wall", [0.0, 1.2, 0.7], DVec3::X),
-        ("wall", [1.5, 0.0, 1.9], DVec3::Y),
+        ("wall", [2.0, 1.2, 0.7], -DVec3::X),
+        ("wall beside the block", [0.8, 2.0, 0.7], -DVec3::Y),
+        ("wall under the sky", [1.5, 0.0, 1.9], DVec3::Y),
         ("corner", [1.99, 0.01, 0.0], DVec3::Z),
         ("block", [0.5, 1.2, 0.7], -DVec3::X),
         ("under the block", [0.8, 1.2, 0.4], -DVec3::Z),
@@ -92,29 +90,29 @@ fn even() -> Case {
     let at = |(on, position, normal): (&str, [f64; 3], DVec3)| {
         let [x, y, z] = position;
         Expected {
-            quantity: format!("{on} {x}, {y}, {z}"),
-            place: Place::Point {
+            name: format!("L of {on} {x}, {y}, {z}"),
+            figure: Figure::RadianceAt(Spot {
                 position: position.into(),
                 normal,
-            },
-            irradiance: PI,
+            }),
+            value: 1.0,
         }
     };
     Case {
         group: Group::Closed,
         name: "constant radiance".to_owned(),
-        basis: "surfaces of emission 1 − ρ under a sky of radiance 1: E = π everywhere",
+        basis: "surfaces of emission 1 − ρ under a sky of radiance 1: L = 1 everywhere",
         scene: even_court(),
         sky: 1.0,
         expected: points.into_iter().map(at).collect(),
     }
 }
 
-fn mean(place: Place, on: &str, irradiance: f64) -> Expected {
+fn mean(figure: Figure, of: &str, value: f64) -> Expected {
     Expected {
-        quantity: format!("mean E of {on}"),
-        place,
-        irradiance,
+        name: format!("mean E of {of}"),
+        figure,
+        value,
     }
 }
 

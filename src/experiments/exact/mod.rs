@@ -20,8 +20,9 @@ use serde::Serialize;
 use super::{claim::Claim, light::mean_where};
 use crate::{
     metrics::MeshLookup,
-    scene::{BuildError, Environment, Scene, SceneBuilder, SceneOptions, Sides, Sky},
-    solver::{Cancel, SolveSettings, Solver},
+    reference::ReferencePoint,
+    scene::{BuildError, Environment, Scene, SceneBuilder, SceneOptions, Sides, Sky, TriangleId},
+    solver::{Cancel, Snapshot, SolveSettings, Solver},
 };
 
 /// The origin of a case.
@@ -47,25 +48,37 @@ impl Group {
     }
 }
 
-/// Where light is expected.
-#[derive(Clone, Debug, PartialEq)]
-enum Place {
-    /// At a point of a surface that faces along a unit normal, world coordinates.
-    Point { position: DVec3, normal: DVec3 },
-    /// On average over the surfaces of a material.
-    Material(&'static str),
-    /// On average over all surfaces.
-    Everywhere,
-    /// The part that was reflected before, on average over all surfaces.
-    IndirectEverywhere,
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spot {
+    /// World coordinates.
+    position: DVec3,
+    /// Unit normal of the side that is lit.
+    normal: DVec3,
 }
 
-/// An irradiance that is known.
+/// A quantity of light.
+#[derive(Clone, Debug, PartialEq)]
+enum Figure {
+    /// Irradiance at a point, W/m².
+    IrradianceAt(Spot),
+    /// Radiance that leaves a point, W·sr⁻¹·m⁻².
+    RadianceAt(Spot),
+    /// Mean irradiance of the surfaces of a material, W/m².
+    MeanOf(&'static str),
+    /// Mean irradiance of all surfaces, W/m².
+    MeanOfAll,
+    /// The part of it that was reflected before.
+    MeanIndirect,
+}
+
+/// A figure that is known.
 #[derive(Clone, Debug, PartialEq)]
 struct Expected {
-    quantity: String,
-    place: Place,
-    irradiance: f64,
+    /// Its name in tables.
+    name: String,
+    figure: Figure,
+    value: f64,
 }
 
 /// A scene whose light is known.
@@ -103,7 +116,7 @@ pub struct Outcome {
     pub case: String,
     /// Its closed form.
     pub basis: &'static str,
-    /// All figures, irradiance in W/m²; none where it did not finish.
+    /// All figures; none where it did not finish.
     pub claims: Vec<Claim>,
     /// Why it did not finish.
     pub failure: Option<String>,
@@ -147,19 +160,15 @@ impl Case {
 
     fn claims(&self, settings: &SolveSettings, cancel: &Cancel) -> Result<Vec<Claim>, Trouble> {
         let lit = Lit::new(self.finished()?, settings, cancel)?;
-        let brightest = self.expected.iter().map(|known| known.irradiance);
-        let brightest = brightest.fold(0.0, f64::max);
+        let values = self.expected.iter().map(|known| known.value);
+        let largest = values.fold(0.0, f64::max);
         let claim = |known: &Expected| {
-            let scale = if known.irradiance > 0.0 {
-                known.irradiance
-            } else {
-                brightest
-            };
+            let is_some = known.value > 0.0;
             Claim::within(
-                known.quantity.clone(),
-                known.irradiance,
-                lit.irradiance(&known.place),
-                scale,
+                known.name.clone(),
+                known.value,
+                lit.value(&known.figure),
+                if is_some { known.value } else { largest },
                 f64::from(settings.epsilon),
             )
         };
@@ -186,7 +195,7 @@ impl Case {
 /// A finished solve.
 struct Lit {
     scene: Arc<Scene>,
-    snapshot: crate::solver::Snapshot,
+    snapshot: Snapshot,
 }
 
 impl Lit {
@@ -198,34 +207,43 @@ impl Lit {
         Ok(Self { scene, snapshot })
     }
 
-    /// Irradiance (red) at a place, W/m²; NaN where no surface is.
-    fn irradiance(&self, place: &Place) -> f64 {
+    /// A figure (red); NaN where no surface is.
+    fn value(&self, figure: &Figure) -> f64 {
         let light = &self.snapshot.light;
-        let mean = |counts: &dyn Fn(crate::scene::TriangleId) -> bool| {
-            mean_where(&self.snapshot.mesh, &light.irradiance, counts).x
+        let mean = |values: &[Vec3], counts: &dyn Fn(TriangleId) -> bool| {
+            mean_where(&self.snapshot.mesh, values, counts).x
         };
-        let found = match *place {
-            Place::Point { position, normal } => self.at(position, normal),
-            Place::Material(name) => mean(&|id| self.scene.material(id).name == name),
-            Place::Everywhere => mean(&|_| true),
-            Place::IndirectEverywhere => {
+        let found = match *figure {
+            Figure::IrradianceAt(spot) => self
+                .at(spot)
+                .map_or(f64::NAN, |point| f64::from(point.irradiance.x)),
+            Figure::RadianceAt(spot) => self
+                .at(spot)
+                .map_or(f64::NAN, |point| f64::from(point.radiance().x)),
+            Figure::MeanOf(name) => {
+                let is_it = |id| self.scene.material(id).name == name;
+                mean(&light.irradiance, &is_it)
+            }
+            Figure::MeanOfAll => mean(&light.irradiance, &|_| true),
+            Figure::MeanIndirect => {
                 let pairs = light.irradiance.iter().zip(&light.direct);
                 let indirect: Vec<Vec3> = pairs.map(|(all, direct)| *all - *direct).collect();
-                mean_where(&self.snapshot.mesh, &indirect, |_| true).x
+                mean(&indirect, &|_| true)
             }
         };
         found * f64::from(self.scene.radiance_unit)
     }
 
-    fn at(&self, position: DVec3, normal: DVec3) -> f64 {
-        let Some(point) = points::find(&self.scene, position, normal) else {
-            return f64::NAN;
-        };
+    /// The point at a spot with the irradiance there.
+    fn at(&self, spot: Spot) -> Option<ReferencePoint> {
+        let point = points::find(&self.scene, spot)?;
         let lookup = MeshLookup::new(&self.scene, &self.snapshot.mesh);
-        let [found] = lookup.irradiance(&self.snapshot.light, &[point])[..] else {
-            return f64::NAN;
-        };
-        found.map_or(f64::NAN, |irradiance| f64::from(irradiance.x))
+        let found = lookup.irradiance(&self.snapshot.light, &[point]);
+        let irradiance = found.into_iter().next().flatten()?;
+        Some(ReferencePoint {
+            irradiance,
+            ..point
+        })
     }
 }
 
@@ -252,9 +270,9 @@ mod tests {
             assert!(!case.expected.is_empty(), "{}", case.name);
             let scene = case.finished().expect("it has faces");
             for known in &case.expected {
-                if let Place::Point { position, normal } = known.place {
-                    let found = points::find(&scene, position, normal);
-                    assert!(found.is_some(), "{}: {}", case.name, known.quantity);
+                if let Figure::IrradianceAt(spot) | Figure::RadianceAt(spot) = known.figure {
+                    let found = points::find(&scene, spot);
+                    assert!(found.is_some(), "{}: {}", case.name, known.name);
                 }
             }
         }

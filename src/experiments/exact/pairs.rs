@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::{Case, Expected, Group, Place};
+use super::{Case, Expected, Figure, Group, Spot};
 use crate::{
     reference::analytic::{
         coaxial_discs, parallel_rectangles, perpendicular_rectangles, point_to_parallel_disc,
@@ -89,17 +89,17 @@ fn case(
     irradiance: impl Fn(f64, f64) -> f64,
 ) -> Case {
     let mean = Expected {
-        quantity: "mean E of the receiver".to_owned(),
-        place: Place::Material("receiver"),
-        irradiance: mean,
+        name: "mean E of the receiver".to_owned(),
+        figure: Figure::MeanOf("receiver"),
+        value: mean,
     };
     let at = |&[x, z]: &[f64; 2]| Expected {
-        quantity: format!("receiver {x}, 0, {z}"),
-        place: Place::Point {
+        name: format!("receiver {x}, 0, {z}"),
+        figure: Figure::IrradianceAt(Spot {
             position: DVec3::new(x, 0.0, z),
             normal: DVec3::Y,
-        },
-        irradiance: irradiance(x, z),
+        }),
+        value: irradiance(x, z),
     };
     Case {
         group: Group::Pairs,

@@ -1,7 +1,6 @@
 //! Points of surfaces by their world coordinates.
 
-use glam::DVec3;
-
+use super::Spot;
 use crate::{
     geometry::barycentric_in_plane,
     reference::ReferencePoint,
@@ -15,10 +14,10 @@ const NEAR: f32 = 1e-5;
 /// Least cosine between the normal of a triangle and the one asked for.
 const ALONG: f32 = 0.99;
 
-/// The point of the one-sided surface at a world position that faces along a unit normal; `None` where there is none.
-pub(super) fn find(scene: &Scene, position: DVec3, normal: DVec3) -> Option<ReferencePoint> {
-    let position = scene.frame.from_world(position);
-    let normal = normal.as_vec3();
+/// The point of a one-sided surface at a spot; `None` where there is none.
+pub(super) fn find(scene: &Scene, spot: Spot) -> Option<ReferencePoint> {
+    let position = scene.frame.from_world(spot.position);
+    let normal = spot.normal.as_vec3();
     let on = |triangle: TriangleId| {
         let front = scene.surfaces[triangle.index()]
             .area_vector
