@@ -588,6 +588,35 @@ fn the_stability_suite_tells_what_holds_and_refuses_unknown_cases() {
 }
 
 #[test]
+fn exact_suites_list_every_figure_and_refuse_cases_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = report(folder.path(), &["--suite", "cie171", "--cases", "5.6"]);
+    assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+    let json = fs::read(folder.path().join("out/cie171.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!((&json["holds"], &json["fails"]), (&9.into(), &0.into()));
+    let table = fs::read_to_string(folder.path().join("out/cie171.md")).unwrap();
+    assert!(table.contains("| wall 2, 0, 0.75 | 35.9"), "{table}");
+    let csv = fs::read_to_string(folder.path().join("out/cie171.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 10);
+    // Discs are exact, too, but not of the standard.
+    let discs = |suite: &str| {
+        let flags = ["--suite", suite, "--cases", "discs", "--time-limit", "0"];
+        report(folder.path(), &flags)
+    };
+    let output = discs("cie171");
+    assert_eq!(output.status.code(), Some(2), "{}", error_of(&output));
+    // A case that has no time does not hold.
+    let output = discs("exact");
+    assert_eq!(output.status.code(), Some(1), "{}", error_of(&output));
+    let sentence = error_of(&output);
+    assert!(
+        sentence.contains("1 of 1 cases failed: coaxial discs"),
+        "{sentence}"
+    );
+}
+
+#[test]
 fn the_plan_suite_compares_what_is_kept_and_refuses_unknown_scenes() {
     let folder = tempfile::tempdir().unwrap();
     let output = report(

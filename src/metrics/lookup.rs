@@ -77,14 +77,25 @@ impl<'a> MeshLookup<'a> {
 
     /// Radiance at each point under this light; `None` where the mesh does not cover the point.
     pub fn radiance(&self, light: &VertexLight, points: &[ReferencePoint]) -> Vec<Option<Vec3>> {
+        let of = |point: &ReferencePoint| {
+            let irradiance = self.irradiance_at(light, point)?;
+            Some(point.emission + point.reflectance * irradiance * FRAC_1_PI)
+        };
+        points.par_iter().map(of).collect()
+    }
+
+    /// Irradiance at each point under this light, also where nothing is reflected; `None` where the mesh does not cover
+    /// the point.
+    pub fn irradiance(&self, light: &VertexLight, points: &[ReferencePoint]) -> Vec<Option<Vec3>> {
         points
             .par_iter()
-            .map(|point| {
-                let triangle = self.find(point)?;
-                let irradiance = interpolate(self.mesh, light, triangle, point.position);
-                Some(point.emission + point.reflectance * irradiance * FRAC_1_PI)
-            })
+            .map(|point| self.irradiance_at(light, point))
             .collect()
+    }
+
+    fn irradiance_at(&self, light: &VertexLight, point: &ReferencePoint) -> Option<Vec3> {
+        let triangle = self.find(point)?;
+        Some(interpolate(self.mesh, light, triangle, point.position))
     }
 
     /// The display triangle that holds a point best.

@@ -1,4 +1,4 @@
-//! Closed forms: view factors of plates and the furnace, in double precision.
+//! Closed forms: view factors of plates and discs, the sphere and the furnace, in double precision.
 //!
 //! The view factors are those of Howell, "A Catalog of Radiation Heat Transfer Configuration Factors"; the polygon
 //! is Lambert's formula. All lengths share one unit and are above 0.
@@ -47,6 +47,23 @@ pub fn point_to_perpendicular_rectangle(a: f64, b: f64, c: f64) -> f64 {
     ((b / c).atan() - c / slant * (b / slant).atan()) / TAU
 }
 
+/// View factor from a disc of radius `a` to a parallel one of radius `b` about the same axis at distance `c`
+/// (Howell C-41).
+pub fn coaxial_discs(a: f64, b: f64, c: f64) -> f64 {
+    let sum = a * a + b * b + c * c;
+    let root = (sum * sum - 4.0 * a * a * b * b).sqrt();
+    (sum - root) / (2.0 * a * a)
+}
+
+/// View factor from a point to a parallel disc of radius `radius` at distance `c`, whose axis passes the point at
+/// distance `offset`, at least 0 (Howell B-12).
+pub fn point_to_parallel_disc(offset: f64, radius: f64, c: f64) -> f64 {
+    let (offset2, radius2, c2) = (offset * offset, radius * radius, c * c);
+    let sum = offset2 + radius2 + c2;
+    let root = (sum * sum - 4.0 * offset2 * radius2).sqrt();
+    0.5 * (1.0 - (offset2 + c2 - radius2) / root)
+}
+
 /// View factor from a point with unit `normal` to a polygon that lies wholly above its horizon (Lambert 1760).
 /// Positive where the corners run counter-clockwise as seen from the point; the point may not lie on an edge.
 pub fn point_to_polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
@@ -58,6 +75,12 @@ pub fn point_to_polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
         sum += angle * to.cross(from).normalize_or_zero().dot(normal);
     }
     sum / TAU
+}
+
+/// Irradiance everywhere in a sphere, whatever the pattern on its wall: emitted power per area, and mean reflectance
+/// below 1. Every point of a sphere sees all of its parts in proportion to their areas.
+pub fn sphere_irradiance(emitted: f64, mean_reflectance: f64) -> f64 {
+    emitted / (1.0 - mean_reflectance)
 }
 
 /// Radiosity everywhere in a closed scene whose surfaces all have this emitted radiosity and reflectance below 1.
@@ -93,6 +116,30 @@ mod tests {
             + point_to_perpendicular_rectangle(c, b, a)
             + point_to_perpendicular_rectangle(c, a, b);
         assert!((sum - 0.25).abs() < 1e-12, "{sum}");
+    }
+
+    #[test]
+    fn factors_of_discs_agree_with_each_other_and_with_a_polygon() {
+        let (a, b, c) = (0.7, 0.5, 1.2);
+        // Reciprocity, and the mean of the factors of points over the disc by the midpoint rule.
+        let factor = coaxial_discs(a, b, c);
+        assert!((a * a * factor - b * b * coaxial_discs(b, a, c)).abs() < 1e-12);
+        let rings = 1000;
+        let width = a / f64::from(rings);
+        let sum: f64 = (0..rings)
+            .map(|ring| (f64::from(ring) + 0.5) * width)
+            .map(|radius| 2.0 * radius * width * point_to_parallel_disc(radius, b, c))
+            .sum();
+        assert!((sum / (a * a) - factor).abs() < 1e-6, "{sum} {factor}");
+        // A circle of 2,000 edges that runs clockwise from above.
+        let corner = |i: i32| {
+            let (sin, cos) = (-TAU * f64::from(i) / 2000.0).sin_cos();
+            DVec3::new(0.3 + b * cos, b * sin, c)
+        };
+        let corners: Vec<DVec3> = (0..2000).map(corner).collect();
+        let polygon = point_to_polygon(DVec3::ZERO, DVec3::Z, &corners);
+        let closed = point_to_parallel_disc(0.3, b, c);
+        assert!((polygon - closed).abs() < 1e-5, "{polygon} {closed}");
     }
 
     #[test]

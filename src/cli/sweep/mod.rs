@@ -5,6 +5,7 @@
 
 mod baselines;
 mod error_time;
+mod exact;
 mod omissions;
 mod run_flags;
 mod runs;
@@ -12,6 +13,7 @@ mod scaling;
 mod session;
 mod stability;
 mod suite;
+mod trials;
 
 use std::{fs, path::PathBuf, time::Duration};
 

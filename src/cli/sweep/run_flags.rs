@@ -48,7 +48,7 @@ pub struct ReportRunFlags {
     /// Triangles of the rooms in the scaling suite [default: 1022 to 1000000, about fourfold each]
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1_000..=16_000_000), help_heading = "Runs")]
     pub sizes: Vec<u32>,
-    /// Cases of the stability suite to try, or scenes of the plan suite: groups, or parts of names [default: all]
+    /// Cases of the stability, exact and cie171 suites to try, or scenes of the plan suite: groups, or parts of names [default: all]
     #[arg(
         long,
         value_name = "NAME",

@@ -1,18 +1,19 @@
 //! The stability suite: stiff and extreme cases, each with what is known of its light.
 
-use std::{
-    io::{self, Write},
-    time::Instant,
-};
+use std::io::{self, Write};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use serde::Serialize;
 
-use super::session::Session;
+use super::{
+    session::Session,
+    trials::{Trial, try_each},
+};
 use crate::{
     cli::{output::write_whole, report::Machine},
     experiments::stability::{Case, Outcome, Row, stability_cases, stability_markdown},
     export::write_csv,
+    solver::Cancel,
 };
 
 /// Everything in `stability.json`.
@@ -27,56 +28,32 @@ struct Report<'a> {
     cases: &'a [Outcome],
 }
 
+impl Trial for Case {
+    type Outcome = Outcome;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn run(&self, cancel: &Cancel) -> Outcome {
+        Self::run(self, cancel)
+    }
+
+    fn failed(&self, failure: String, seconds: f64) -> Outcome {
+        Outcome::failed(self, failure, seconds)
+    }
+
+    fn holds(outcome: &Outcome) -> bool {
+        outcome.holds()
+    }
+}
+
 /// Try every case that is asked for, and write the files after each.
 pub(super) fn try_cases(session: &mut Session<'_>) -> Result<()> {
     let is_meant = |case: &Case, word: &str| case.name.contains(word) || case.group.name() == word;
     let flags = &session.arguments.runs;
     let cases = flags.chosen(stability_cases(), is_meant, "case of the stability")?;
-    let mut outcomes: Vec<Outcome> = Vec::new();
-    for (number, case) in cases.iter().enumerate() {
-        if session.is_interrupted() {
-            break;
-        }
-        session.say(format!(
-            "case {} of {}: {}",
-            number + 1,
-            cases.len(),
-            case.name
-        ));
-        let outcome = try_case(session, case);
-        // A case that an interruption ended has not failed.
-        if session.is_interrupted() && !outcome.holds() {
-            break;
-        }
-        outcomes.push(outcome);
-        write(session, &outcomes)?;
-    }
-    if outcomes.is_empty() {
-        write(session, &outcomes)?;
-    }
-    let failed: Vec<&str> = outcomes
-        .iter()
-        .filter(|outcome| !outcome.holds())
-        .map(|outcome| outcome.case.as_str())
-        .collect();
-    if !failed.is_empty() {
-        session.tick();
-        bail!(
-            "{} of {} cases failed: {}",
-            failed.len(),
-            outcomes.len(),
-            failed.join("; ")
-        );
-    }
-    Ok(())
-}
-
-/// Run one case in the session's pool, and stop it when its time is over or Ctrl+C is pressed.
-fn try_case(session: &mut Session<'_>, case: &Case) -> Outcome {
-    let begin = Instant::now();
-    session
-        .watch(|cancel| case.run(cancel))
-        .unwrap_or_else(|panic| Outcome::failed(case, panic, begin.elapsed().as_secs_f64()))
+    try_each(session, &cases, write)
 }
 
 /// Write all files, each whole or not at all.

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::{
-    error_time, omissions, scaling,
+    error_time, exact, omissions, scaling,
     session::{Session, Source},
     stability,
 };
@@ -17,7 +17,7 @@ struct Suite {
 /// The three sizes of Sun, Gong and Pan.
 const PAPER: [&str; 3] = ["room-1022", "room-8621", "room-42879"];
 
-static SUITES: [Suite; 8] = [
+static SUITES: [Suite; 10] = [
     Suite {
         name: "paper",
         run: |session| on_builtins(session, &PAPER),
@@ -51,6 +51,14 @@ static SUITES: [Suite; 8] = [
     Suite {
         name: "stability",
         run: stability::try_cases,
+    },
+    Suite {
+        name: "exact",
+        run: exact::try_all,
+    },
+    Suite {
+        name: "cie171",
+        run: exact::try_cie171,
     },
     Suite {
         name: "plan",

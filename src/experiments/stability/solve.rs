@@ -4,9 +4,12 @@ use std::{f64::consts::PI, sync::Arc};
 
 use glam::{DVec3, Vec3};
 
-use super::{Claim, Finding, Trouble};
+use super::{
+    super::light::{arriving_power, emitted_power, mean_where},
+    Claim, Finding, Trouble,
+};
 use crate::{
-    geometry::{RayTree, area_vector},
+    geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
     scene::{Scene, SceneBuilder, SceneOptions, Sides, TriangleId},
@@ -173,31 +176,6 @@ impl Limits {
     }
 }
 
-/// Power of all emitters by channel, frame units.
-fn emitted_power(scene: &Scene) -> DVec3 {
-    let of = |(surface, triangle): (&crate::scene::Surface, &crate::scene::Triangle)| {
-        let sides = if triangle.two_sided { 2.0 } else { 1.0 };
-        surface.emission.as_dvec3() * (PI * sides * f64::from(surface.area_vector.length()))
-    };
-    scene.surfaces.iter().zip(&scene.triangles).map(of).sum()
-}
-
-/// Integral of the irradiance over all display triangles, by channel, frame units, each triangle of the scene weighed.
-fn arriving_power(snapshot: &Snapshot, weight: impl Fn(TriangleId) -> DVec3) -> DVec3 {
-    let mesh = &snapshot.mesh;
-    let mut sum = DVec3::ZERO;
-    for (index, vertices) in mesh.indices.iter().enumerate() {
-        let corners = vertices.map(|vertex| mesh.positions[vertex as usize]);
-        let area = f64::from(area_vector(corners).length());
-        let light: DVec3 = vertices
-            .iter()
-            .map(|&vertex| snapshot.light.irradiance[vertex as usize].as_dvec3())
-            .sum();
-        sum += weight(TriangleId(mesh.triangle_of[index])) * light * (area / 3.0);
-    }
-    sum
-}
-
 impl Lit {
     /// The findings, with these claims.
     pub(super) fn finding(&self, claims: Vec<Claim>) -> Finding {
@@ -230,18 +208,8 @@ impl Lit {
 
     /// Area-weighted mean irradiance over the display triangles that count.
     pub(super) fn mean_irradiance_where(&self, counts: impl Fn(TriangleId) -> bool) -> DVec3 {
-        let weight = |triangle| if counts(triangle) { 1.0 } else { 0.0 };
-        let mesh = &self.snapshot.mesh;
-        let area: f64 = mesh
-            .indices
-            .iter()
-            .zip(&mesh.triangle_of)
-            .map(|(vertices, &triangle)| {
-                let corners = vertices.map(|vertex| mesh.positions[vertex as usize]);
-                weight(TriangleId(triangle)) * f64::from(area_vector(corners).length())
-            })
-            .sum();
-        arriving_power(&self.snapshot, |triangle| DVec3::splat(weight(triangle))) / area
+        let light = &self.snapshot.light.irradiance;
+        mean_where(&self.snapshot.mesh, light, counts)
     }
 
     /// Largest and smallest irradiance (red) at a vertex of a material.

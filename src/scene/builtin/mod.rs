@@ -5,6 +5,7 @@
 
 mod cornell;
 mod courtyard;
+pub mod exact;
 mod furnace;
 mod gallery;
 mod palette;
