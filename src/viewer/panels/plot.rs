@@ -50,7 +50,7 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
     ];
     let height = |value: f64| value.max(FLOOR).log10();
     // Above the plot: within it they would hide the lines.
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for (name, color, ..) in curves.iter().filter(|(name, ..)| !name.is_empty()) {
             ui.colored_label(*color, "—");
             ui.label(*name);
