@@ -25,7 +25,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A window that opens with these options.
 pub(crate) fn window(options: Options) -> Harness<'static, App> {
-    window_of_size(options, [1280.0, 900.0])
+    window_of_size(options, [1280.0, 1000.0])
 }
 
 /// A window of a size in points.
@@ -37,7 +37,7 @@ pub(crate) fn window_of_size(options: Options, size: [f32; 2]) -> Harness<'stati
 
 /// A window that lights the two plates: a moment's work.
 pub(crate) fn plates() -> Harness<'static, App> {
-    plates_of_size([1280.0, 900.0])
+    plates_of_size([1280.0, 1000.0])
 }
 
 /// The same in a window of a size in points.

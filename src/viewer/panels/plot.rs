@@ -49,14 +49,6 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
         }),
     ];
     let height = |value: f64| value.max(FLOOR).log10();
-    // Above the plot: within it they would hide the lines.
-    ui.horizontal_wrapped(|ui| {
-        for (name, color, ..) in curves.iter().filter(|(name, ..)| !name.is_empty()) {
-            ui.colored_label(*color, "—");
-            ui.label(*name);
-        }
-        ui.weak("relative");
-    });
     let heights = reports
         .iter()
         .flat_map(|report| curves.map(|(.., of)| of(report)))
@@ -66,6 +58,18 @@ pub fn plot_ui(ui: &mut egui::Ui, state: &State) {
     // Whole decades, so that there are marks however little the lines move.
     let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), at| {
         (low.min(at.floor()), high.max(at.ceil()))
+    });
+    if low > high {
+        ui.weak("There is no light, and so no error to plot.");
+        return;
+    }
+    // Above the plot: within it they would hide the lines.
+    ui.horizontal_wrapped(|ui| {
+        for (name, color, ..) in curves.iter().filter(|(name, ..)| !name.is_empty()) {
+            ui.colored_label(*color, "—");
+            ui.label(*name);
+        }
+        ui.weak("relative");
     });
     Plot::new("residual")
         .include_y(low)

@@ -143,17 +143,6 @@ fn figures_ui(ui: &mut egui::Ui, state: &State) {
              interval: the light is gathered once more by rays at random points, and compared",
         );
         row(
-            "Estimated energy",
-            &|report| match report.estimated_error {
-                Some(error) => format!(
-                    "{:.3} ({:.3}…{:.3})",
-                    error.energy, error.energy_low, error.energy_high
-                ),
-                None => "–".to_owned(),
-            },
-            "Mean light over the mean of the true light, by the same rays; 1 is right",
-        );
-        row(
             "Time",
             &|report| seconds(report.elapsed_s),
             "Since the run began, without pauses",

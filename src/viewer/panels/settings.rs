@@ -48,7 +48,6 @@ fn accuracy_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
             }
         }
     });
-    ui.add_space(2.0);
 }
 
 fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
