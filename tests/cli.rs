@@ -127,6 +127,43 @@ fn a_solve_writes_glb_where_the_name_ends_so() {
 }
 
 #[test]
+fn an_error_that_is_asked_for_ends_the_run_and_wrong_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |error: &str, more: &[&str]| {
+        let flags = [
+            "solve", "--scene", "plates", "--report", "r.json", "--error",
+        ];
+        vecrad(folder.path(), &[&flags[..], &[error], more].concat())
+    };
+    for error in ["20%", "20"] {
+        let output = with(error, &[]);
+        assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+        let report = fs::read(folder.path().join("r.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+        let steps = report["steps"].as_array().unwrap();
+        let estimated = &steps[steps.len() - 1]["estimated_error"];
+        assert!(
+            estimated["trimmed_high"].as_f64().unwrap() <= 0.2,
+            "{estimated}"
+        );
+    }
+    for (error, more) in [
+        ("0", &[][..]),
+        ("120%", &[]),
+        ("little", &[]),
+        ("5%", &["--preset", "draft"]),
+    ] {
+        let output = with(error, more);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{error}: {}",
+            error_of(&output)
+        );
+    }
+}
+
+#[test]
 fn a_limit_ends_with_code_4_and_writes_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     let output = solve(

@@ -11,7 +11,7 @@ impl Solver {
     /// Whether an error is as small as was asked for.
     pub(super) fn is_error_reached(&self, estimated: EstimatedError) -> bool {
         let wanted = self.settings.error;
-        wanted.is_some_and(|wanted| estimated.trimmed_high <= f64::from(wanted))
+        wanted.is_some_and(|wanted| estimated.is_within(wanted))
     }
 
     /// Whether the solve ends with a step as fine as the settings ask, or goes on to the error that is asked for. Notes

@@ -56,6 +56,7 @@ impl RunStatus {
             Self::Finished(reason) => match reason {
                 StopReason::Converged => "Done".to_owned(),
                 StopReason::StepLimit => "Done: step limit reached".to_owned(),
+                StopReason::ErrorNotReached => "Done: accuracy not reached".to_owned(),
                 StopReason::TimeLimit => "Stopped by the time limit".to_owned(),
                 StopReason::MemoryLimit => "Stopped by the memory limit".to_owned(),
                 StopReason::Requested => "Stopped".to_owned(),

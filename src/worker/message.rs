@@ -29,10 +29,12 @@ pub struct RunOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
-    /// The threshold asked for is reached and light has converged.
+    /// The threshold asked for, or the error, is reached and light has converged.
     Converged,
     /// The steps asked for are used up before the threshold is reached.
     StepLimit,
+    /// Further steps do not lead to the error asked for; a note of the last step tells why.
+    ErrorNotReached,
     /// The time limit has passed.
     TimeLimit,
     /// The memory limit is reached.

@@ -245,11 +245,14 @@ impl Run {
             return Some(StopReason::MemoryLimit);
         }
         if report.is_final {
-            let reached = report.epsilon <= self.settings.epsilon;
-            return Some(if reached {
-                StopReason::Converged
-            } else {
-                StopReason::StepLimit
+            let estimated = report.estimated_error.as_ref();
+            return Some(match self.settings.error {
+                Some(wanted) if estimated.is_some_and(|error| error.is_within(wanted)) => {
+                    StopReason::Converged
+                }
+                Some(_) => StopReason::ErrorNotReached,
+                None if report.epsilon <= self.settings.epsilon => StopReason::Converged,
+                None => StopReason::StepLimit,
             });
         }
         let limit = self.options.memory_limit?;

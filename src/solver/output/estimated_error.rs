@@ -31,6 +31,11 @@ pub struct EstimatedError {
 }
 
 impl EstimatedError {
+    /// Whether the error is at most this, relative: the upper end of the interval of the trimmed one.
+    pub fn is_within(&self, wanted: f32) -> bool {
+        self.trimmed_high <= f64::from(wanted)
+    }
+
     /// The trimmed error and its interval in per cent, for people.
     pub fn text(&self) -> String {
         let per_cent = |share: f64| {
@@ -43,6 +48,28 @@ impl EstimatedError {
         };
         let [middle, low, high] =
             [self.trimmed_rms, self.trimmed_low, self.trimmed_high].map(per_cent);
-        format!("{middle} % ({low}…{high})")
+        match self.trimmed_low > 0.0 {
+            true => format!("{middle} % ({low}…{high})"),
+            // It cannot be told from none.
+            false => format!("below {high} %"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_told_with_their_interval() {
+        let error = |low: f64| EstimatedError {
+            trimmed_rms: 0.0123,
+            trimmed_low: low,
+            trimmed_high: 0.112,
+            ..EstimatedError::default()
+        };
+        assert_eq!(error(0.004).text(), "1.2 % (0.4…11)");
+        assert_eq!(error(0.0).text(), "below 11 %");
+        assert!(error(0.0).is_within(0.12) && !error(0.0).is_within(0.1));
     }
 }
