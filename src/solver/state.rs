@@ -209,10 +209,12 @@ impl Solver {
         // Where the error is small enough, this step is the last.
         self.vertex_factors.clear();
         let mut is_last = self.is_full || report.step >= step_count;
+        let mut estimated = None;
         if self.settings.error.is_some() && !is_last {
             self.show(report.step, cancel)?;
-            let estimated = self.estimate_error(cancel)?;
-            is_last = self.is_error_reached(estimated);
+            let coarse = self.estimate_error(cancel)?;
+            is_last = self.is_error_reached(coarse);
+            estimated = Some(coarse).filter(|_| !is_last);
         }
         // In the last step, factors of the linked light from rays at the vertices.
         if is_last {
@@ -220,8 +222,13 @@ impl Solver {
         }
         // Figures and picture.
         self.fill(&mut report);
-        self.show(report.step, cancel)?;
-        let estimated = self.estimate_error(cancel)?;
+        let estimated = match estimated {
+            Some(estimated) => estimated,
+            None => {
+                self.show(report.step, cancel)?;
+                self.estimate_error(cancel)?
+            }
+        };
         report.estimated_error = Some(estimated);
         self.step = report.step;
         report.is_final = is_last && self.ends_with(estimated, &mut report);
