@@ -1,5 +1,7 @@
 //! The estimated error of `Solver`, and the end of a solve by the error that is asked for.
 
+use std::sync::Arc;
+
 use super::{
     Cancel, EstimatedError, Note, Obstacle, Solver, StepReport,
     direct::Surfaces,
@@ -39,7 +41,7 @@ impl Solver {
         true
     }
 
-    /// Estimate the error of the light shown.
+    /// Estimate the error of the light shown; the snapshot gets it by point.
     pub(super) fn estimate_error(&mut self, cancel: &Cancel) -> Option<EstimatedError> {
         let (scene, rays) = (&self.scene, &self.rays);
         let shown = estimate::Shown {
@@ -56,6 +58,8 @@ impl Solver {
         let estimator = self
             .estimator
             .get_or_insert_with(|| ErrorEstimator::new(scene, &self.hierarchy, rays, seed));
-        estimator.estimate(shown)
+        let estimate = estimator.estimate(shown)?;
+        self.snapshot.errors = Arc::new(estimate.points);
+        Some(estimate.figures)
     }
 }

@@ -31,8 +31,8 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    ClusterBox, DisplayMesh, EstimatedError, InspectedLink, Inspection, Note, Obstacle, Omitted,
-    PathNode, Place, Relit, Snapshot, StepReport, Subject, VertexLight,
+    ClusterBox, DisplayMesh, ErrorPoint, EstimatedError, InspectedLink, Inspection, Note, Obstacle,
+    Omitted, PathNode, Place, Relit, Snapshot, StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

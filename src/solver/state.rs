@@ -250,7 +250,7 @@ impl Solver {
             + self
                 .estimator
                 .as_ref()
-                .map_or(0, ErrorEstimator::memory_bytes)
+                .map_or(0, |estimator| estimator.memory_bytes(&self.rays))
             + self.snapshot.memory_bytes();
         Budget {
             limit: self.memory_limit,

@@ -33,6 +33,14 @@ pub(crate) struct DirectFields {
 #[derive(Default)]
 pub(crate) struct PointLight(HashMap<usize, Vec<DirectLight>>);
 
+impl PointLight {
+    /// Memory in bytes.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        let lights = self.0.values().map(|lights| size_of_val(lights.as_slice()));
+        self.0.capacity() * size_of::<(usize, Vec<DirectLight>)>() + lights.sum::<usize>()
+    }
+}
+
 impl DirectFields {
     /// The fields before any sample. Emission that is linked has none; the sky and the sun are then read from
     /// directional tables, as the clusters are. Without `sees_outside` they have none either.

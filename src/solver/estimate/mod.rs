@@ -4,12 +4,13 @@
 //! sky, and over the hemisphere from the light shown, E′ = D + T b. The light shown is b, the truth b*, its error
 //! e = b − b*. From b* = D + T b* follows e = s + T e with the residual s = b − E′. So the residual alone is not the
 //! error: light that is wrong everywhere by a little has a small residual. The residual is measured also where rays from the
-//! points arrive, and the rays from there know which places send light to which: so the equation is solved for the mean
-//! errors of groups of such places (`groups`), and e follows at each point.
+//! points arrive, and all these rays know which places send light to which: so the equation is solved for the mean errors of
+//! groups of such places and of the points (`groups`), and e follows at each point.
 //!
 //! Two independent sets of rays give two estimates e₁ and e₂ with independent noise, and e₁e₂ is e² in expectation for any
-//! number of rays (`statistics`). The hits are kept, so that later steps only look up their light again and add rays where
-//! their errors are smaller.
+//! number of rays (`statistics`). The noise of a group's error is in all points that see it, so intervals count the
+//! influence of each place on the whole, and not only how much points differ. The hits are kept, so that later steps only
+//! look up their light again and add rays where their errors are smaller.
 
 mod groups;
 mod samples;
@@ -21,26 +22,27 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use self::{
-    groups::{Groups, Residual},
+    groups::{Groups, Residual, Solution},
     samples::{Appearances, Place, Point, Samples, Scenery},
-    statistics::Reflected,
+    statistics::{Influences, Reflected},
 };
 use super::{
-    Cancel, Direct, EstimatedError, SolveSettings,
+    Cancel, Direct, ErrorPoint, EstimatedError, SolveSettings,
     direct::{DirectFields, Surfaces},
 };
 use crate::{
     geometry::{Random, RayTree},
-    hierarchy::Hierarchy,
+    hierarchy::{Hierarchy, luminance},
     sampling::sample_points,
     scene::{Appearance, Scene},
 };
 
 /// How many points, and how many rays over the hemisphere from each in each of the two sets, from few to many. With few
-/// points the interval is wide because errors differ from place to place; with few rays it is wide by their noise, which
-/// counts squared. So rays come first, but for points enough to meet every surface.
+/// points the interval is wide because errors differ from place to place, and misses what they do not meet; with few rays it
+/// is wide by their noise, which counts squared. Errors of coarse steps are larger than noise, so that points come first;
+/// from there on rays.
 const LEVELS: [(usize, u32); 8] = [
-    (128, 32),
+    (256, 16),
     (256, 32),
     (256, 64),
     (256, 128),
@@ -68,11 +70,15 @@ const ADVANCE: f64 = 0.9;
 /// Rays of a point for each ray from a place that it sees. Smaller takes longer; larger makes the errors of groups noisy.
 const SEEN_DIVISOR: u32 = 4;
 
-/// Added to the seed, so that neither these points nor their rays are those of the solve or of a reference.
-const SEEDS: [u64; 3] = [
-    0x51f1_5eed_0000_0001,
-    0x51f1_5eed_0000_0002,
-    0x51f1_5eed_0000_0003,
+/// Combined with the seed for the points, so that they are not those of a reference.
+const POINT_SEED: u64 = 0x9d39_247e_3377_6d41;
+
+/// Likewise for the rays of each half: from its points, and from what they see. Random numbers, so that no set of rays is
+/// that of another, of the solve or of a reference, whatever the seed: two sets with the same rays have the same noise, and
+/// the product of their errors is too large.
+const RAY_SEEDS: [[u64; 2]; 2] = [
+    [0x2af7_3980_05aa_a5c7, 0x44db_0150_2462_3547],
+    [0x9c15_f73e_62a7_6ae2, 0x7583_4465_489c_0c89],
 ];
 
 /// What an estimate is made from.
@@ -94,6 +100,14 @@ pub(super) struct Shown<'a> {
     pub solve_rays: u64,
     /// The request to stop.
     pub cancel: &'a Cancel,
+}
+
+/// An estimate.
+pub(super) struct Estimate {
+    /// Its figures.
+    pub figures: EstimatedError,
+    /// The error at each point that takes part in the solve.
+    pub points: Vec<ErrorPoint>,
 }
 
 /// Points and rays of the estimates of a solve, kept from step to step.
@@ -133,23 +147,26 @@ impl ErrorEstimator {
             true => Arc::new(RayTree::new(scene)),
             false => rays.clone(),
         };
-        let (points, _) = sample_points(scene, &rays, STORED_POINTS, seed ^ SEEDS[0]);
+        let (points, _) = sample_points(scene, &rays, STORED_POINTS, seed ^ POINT_SEED);
         let mut points: Vec<Option<Point>> = points
             .iter()
             .map(|point| Point::of(scene, hierarchy, point))
             .collect();
         // Neighbours lie beside each other.
         points.sort_by_key(|point| point.map_or(u32::MAX, |point| point.place.patch));
-        let half = |own: u64| Half {
-            from_points: Samples::new(points.len(), seed ^ own),
-            from_seen: Samples::new(points.len(), (seed ^ own).wrapping_add(1)),
+        let half = |own: [u64; 2]| {
+            let [from_points, from_seen] = own.map(|own| Samples::new(points.len(), seed ^ own));
+            Half {
+                from_points,
+                from_seen,
+            }
         };
         Self {
-            halves: [SEEDS[1], SEEDS[2]].map(half),
+            halves: RAY_SEEDS.map(half),
             points,
             of_scene: scene.appearances(),
             rays,
-            seed: seed ^ SEEDS[0],
+            seed: seed ^ POINT_SEED,
             level: 0,
             ray_count: 0,
             errors: Vec::new(),
@@ -173,23 +190,23 @@ impl ErrorEstimator {
 
     /// The error of the light shown; `None` when cancelled. Where it is not clear whether an error that is asked for is
     /// reached, more rays are shot, as long as these are fewer than those of a further step.
-    pub(super) fn estimate(&mut self, shown: Shown<'_>) -> Option<EstimatedError> {
+    pub(super) fn estimate(&mut self, shown: Shown<'_>) -> Option<Estimate> {
         let mut share = RAY_SHARE;
         loop {
-            let estimated = self.estimate_by(shown, share)?;
+            let estimate = self.estimate_by(shown, share)?;
             let is_open = shown.settings.error.is_some_and(|wanted| {
-                let within = estimated.trimmed_low..estimated.trimmed_high;
+                let within = estimate.figures.trimmed_low..estimate.figures.trimmed_high;
                 within.contains(&f64::from(wanted))
             });
             if !is_open || share >= MOST_RAY_SHARE || self.level + 1 == LEVELS.len() {
-                return Some(estimated);
+                return Some(estimate);
             }
             share *= 2.0;
         }
     }
 
     /// The error, by at most this share of the rays of the solve.
-    fn estimate_by(&mut self, shown: Shown<'_>, share: f64) -> Option<EstimatedError> {
+    fn estimate_by(&mut self, shown: Shown<'_>, share: f64) -> Option<Estimate> {
         let Surfaces { hierarchy, direct } = shown.surfaces;
         // All direct light is sampled here, also that which the solve links.
         let own = (shown.settings.direct == Direct::Linked).then(|| {
@@ -217,10 +234,10 @@ impl ErrorEstimator {
             .iter()
             .map(|point| point.map(|point| point.place))
             .collect();
-        let mut errors = Vec::with_capacity(self.halves.len());
+        let mut found = Vec::with_capacity(self.halves.len());
         for half in &mut self.halves {
-            let (found, shot) = half.errors(scene, &places, &chosen, count)?;
-            errors.push(found);
+            let (of_half, shot) = half.errors(scene, &places, &chosen, count)?;
+            found.push(of_half);
             self.ray_count += shot;
         }
         let appearances = Appearances {
@@ -229,19 +246,40 @@ impl ErrorEstimator {
         };
         let stored = |point: Option<Point>| point?.stored(scene, appearances);
         let reflected = |(index, point): (usize, &Option<Point>)| {
-            let errors = [0, 1].map(|half| errors[half][index]);
-            stored(*point).map_or_else(Reflected::default, |stored| Reflected::new(&stored, errors))
+            let errors = [0, 1].map(|half: usize| found[half].at_point(index));
+            let stored = stored(*point).unwrap_or_default();
+            Reflected::new(index, &stored, errors)
         };
         let reflected: Vec<Reflected> = points.iter().enumerate().map(reflected).collect();
         let all = self.points.par_iter();
         let all: Vec<f64> = all
             .map(|point| stored(*point).map_or(0.0, |stored| statistics::stored_light(&stored)))
             .collect();
-        Some(EstimatedError {
+        let scale = statistics::true_rms(&reflected, &all);
+        let reflectances = points
+            .iter()
+            .map(|point| stored(*point).unwrap_or_default());
+        let common = Common {
+            halves: &found,
+            reflectances: reflectances.map(|stored| stored.reflectance).collect(),
+        };
+        let figures = EstimatedError {
             points: chosen.len() as u64,
             rays: self.ray_count,
-            ..statistics::estimated(&reflected, &all)
-        })
+            ..statistics::estimated(&reflected, &all, scale, &common)
+        };
+        let of_place = |(place, reflected): (&Option<Place>, &Reflected)| {
+            let receiver = place.as_ref()?.receiver;
+            let [light, first, second] = reflected.over(scale);
+            Some(ErrorPoint {
+                position: receiver.point,
+                normal: receiver.normal,
+                light,
+                errors: [first, second],
+            })
+        };
+        let points = places.iter().zip(&reflected).filter_map(of_place).collect();
+        Some(Estimate { figures, points })
     }
 
     /// The points of the present level: one by chance of as many neighbours as there are times more points. Those of a
@@ -269,10 +307,14 @@ impl ErrorEstimator {
         within.unwrap_or(0).max(self.level)
     }
 
-    /// Memory in bytes.
-    pub(super) fn memory_bytes(&self) -> usize {
+    /// Memory in bytes, without the ray tree of the solve.
+    pub(super) fn memory_bytes(&self, of_solve: &Arc<RayTree>) -> usize {
         let of = |half: &Half| half.from_points.memory_bytes() + half.from_seen.memory_bytes();
-        self.halves.iter().map(of).sum()
+        let own_tree = match Arc::ptr_eq(&self.rays, of_solve) {
+            true => 0,
+            false => self.rays.memory_bytes(),
+        };
+        own_tree + size_of_val(self.points.as_slice()) + self.halves.iter().map(of).sum::<usize>()
     }
 }
 
@@ -290,26 +332,96 @@ impl Half {
         places: &[Option<Place>],
         chosen: &[usize],
         count: u32,
-    ) -> Option<(Vec<Vec3>, u64)> {
+    ) -> Option<(HalfErrors, u64)> {
         let mut shot = self.from_points.shoot(scene, places, chosen, count)?;
-        // What the points see, in the order of the patches.
+        // What the points see.
         let first_seen = |&point: &usize| self.from_points.first_met(scene.hierarchy, point);
         let seen = chosen.iter().map(|point| (*point, first_seen(point)));
         let mut seen: Vec<(usize, Option<Place>)> = seen.collect();
         seen.retain(|(_, place)| place.is_some());
-        seen.sort_by_key(|(_, place)| place.map(|place| place.patch));
         let (indices, seen): (Vec<usize>, Vec<Option<Place>>) = seen.into_iter().unzip();
         shot += self
             .from_seen
             .shoot(scene, &seen, &indices, rays_from_seen(count))?;
-        // Errors of groups of it, and of the points.
-        let groups = Groups::new(seen.iter().flatten().map(|place| place.patch));
-        let of_seen = self.from_seen.residuals(scene, &seen, &indices, &groups);
-        let errors = groups.errors(&of_seen);
+        // Groups of both.
+        let both = places.iter().chain(&seen).enumerate();
+        let ordered = both.filter_map(|(number, place)| {
+            let place = place.as_ref()?;
+            Some((scene.order(place.patch, place.receiver.point), number))
+        });
+        let mut ordered: Vec<(u64, usize)> = ordered.collect();
+        ordered.sort_unstable();
+        let (orders, order): (Vec<u64>, Vec<usize>) = ordered.into_iter().unzip();
+        let groups = Groups::new(&orders);
         let of_points = self.from_points.residuals(scene, places, chosen, &groups);
-        let at_point = |residual: &Residual| residual.explained_by(&errors);
-        Some((of_points.iter().map(at_point).collect(), shot))
+        let of_seen = self.from_seen.residuals(scene, &seen, &indices, &groups);
+        let residual = |&number: &usize| {
+            let of_point = of_points.get(number);
+            of_point.unwrap_or_else(|| &of_seen[number - of_points.len()])
+        };
+        let grouped = order.iter().map(residual).cloned().collect();
+        let solution = groups.solve(grouped);
+        let found = HalfErrors {
+            of_points,
+            order,
+            solution,
+        };
+        Some((found, shot))
     }
+}
+
+/// Errors by one set of rays.
+struct HalfErrors {
+    /// The residuals at the points.
+    of_points: Vec<Residual>,
+    /// The places whose groups have errors: points by their number, and from there on what they see.
+    order: Vec<usize>,
+    solution: Solution,
+}
+
+impl HalfErrors {
+    /// The error of the irradiance at a point, W/m².
+    fn at_point(&self, point: usize) -> Vec3 {
+        self.of_points[point].explained_by(self.solution.errors())
+    }
+}
+
+/// What the errors of points have in common: those of the groups that they see.
+struct Common<'a> {
+    halves: &'a [HalfErrors],
+    /// By point.
+    reflectances: Vec<Vec3>,
+}
+
+impl Influences for Common<'_> {
+    fn of(&self, derivatives: [Vec<f64>; 2]) -> (Vec<f64>, f64) {
+        let count = self.reflectances.len();
+        let (mut of_points, mut elsewhere) = (vec![0.0; count], 0.0);
+        for (half, derivatives) in self.halves.iter().zip(derivatives) {
+            let mut of_groups = vec![Vec3::ZERO; half.solution.errors().len()];
+            let points = half.of_points.iter().zip(&self.reflectances);
+            for ((residual, reflectance), derivative) in points.zip(derivatives) {
+                let factor = luminance_weights(*reflectance) * derivative as f32;
+                for (sum, row) in of_groups.iter_mut().zip(&residual.row) {
+                    *sum += factor * row;
+                }
+            }
+            let influences = half.solution.influences(&of_groups);
+            for (&number, influence) in half.order.iter().zip(influences) {
+                match of_points.get_mut(number) {
+                    Some(sum) => *sum += influence,
+                    None => elsewhere += influence * influence,
+                }
+            }
+        }
+        (of_points, elsewhere)
+    }
+}
+
+/// The factors of the channels of an irradiance in the luminance of what is reflected of it.
+fn luminance_weights(reflectance: Vec3) -> Vec3 {
+    let channels = [Vec3::X, Vec3::Y, Vec3::Z];
+    Vec3::from_array(channels.map(|channel| luminance((reflectance * channel).extend(0.0))))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::groups::{Groups, Residual};
+use super::groups::{Groups, Residual, order};
 use crate::{
     geometry::{Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Channels as _, Hierarchy},
@@ -37,7 +37,7 @@ impl Kept {
 }
 
 /// Light stored at a point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stored {
     /// Irradiance, W/m².
     pub irradiance: Vec3,
@@ -101,9 +101,8 @@ pub(super) struct Appearances<'a> {
 impl Place {
     /// The place of a point; `None` where it takes no part.
     pub(super) fn of(hierarchy: &Hierarchy, point: &SurfacePoint) -> Option<Self> {
-        let patch = hierarchy.side_met(point.triangle, -point.normal)?;
-        let is_active = hierarchy.active_patches().contains(&patch);
-        is_active.then_some(Self {
+        let patch = hierarchy.patch_met(point.triangle, -point.normal)?;
+        Some(Self {
             patch: patch as u32,
             receiver: Receiver {
                 point: point.position,
@@ -141,15 +140,20 @@ impl Scenery<'_> {
         })
     }
 
+    /// The place of a point of a patch in the order of groups.
+    pub(super) fn order(&self, patch: u32, point: Vec3) -> u64 {
+        let corners = self.hierarchy.mesh.corners(patch as usize);
+        order(patch, barycentric(point, corners))
+    }
+
     /// What a ray meets, and its tint.
     fn meet(&self, from: &Receiver, direction: Vec3) -> (Kept, Vec3) {
         let start = Some(from.triangle);
         let hit = self.rays.closest(from.point, direction, start);
         let tint = self.rays.tint(from.point, direction, start, hit);
         let met = hit.and_then(|hit| {
-            let patch = self.hierarchy.side_met(hit.triangle, direction)?;
-            let is_active = self.hierarchy.active_patches().contains(&patch);
-            is_active.then(|| Kept {
+            let patch = self.hierarchy.patch_met(hit.triangle, direction)?;
+            Some(Kept {
                 patch: patch as u32,
                 point: from.point + direction * hit.distance,
             })
@@ -256,13 +260,15 @@ impl Samples {
         let residual = |(&index, place): (&usize, &Option<Place>)| {
             let stored = place.and_then(|place| scene.stored(place.patch, place.receiver.point));
             let mut row = vec![Vec3::ZERO; groups.count()];
+            let (kept, tints) = (&self.kept[index], &self.tints[index]);
+            let weight = kept.len() as f32;
             let Some(stored) = stored else {
                 return Residual {
                     residual: Vec3::ZERO,
                     row,
+                    weight,
                 };
             };
-            let (kept, tints) = (&self.kept[index], &self.tints[index]);
             let by_ray = 1.0 / kept.len().max(1) as f32;
             let mut gathered = scene.direct.at_point(&self.direct, index).color();
             for (ray, kept) in kept.iter().enumerate() {
@@ -275,13 +281,15 @@ impl Samples {
                 let tint = tints.get(ray).copied().unwrap_or(Vec3::ONE);
                 let factor = met.reflectance * tint * by_ray;
                 gathered += factor * met.irradiance;
-                if let Some(factors) = row.get_mut(groups.of_patch(kept.patch)) {
+                let group = groups.of(scene.order(kept.patch, kept.point));
+                if let Some(factors) = row.get_mut(group) {
                     *factors += factor;
                 }
             }
             Residual {
                 residual: stored.irradiance - gathered,
                 row,
+                weight,
             }
         };
         indices.par_iter().zip(places).map(residual).collect()
@@ -291,6 +299,7 @@ impl Samples {
     pub(super) fn memory_bytes(&self) -> usize {
         let kept = self.kept.iter().map(|kept| size_of_val(kept.as_slice()));
         let tints = self.tints.iter().map(|tints| size_of_val(tints.as_slice()));
-        kept.chain(tints).sum()
+        let lists = size_of_val(self.kept.as_slice()) + size_of_val(self.tints.as_slice());
+        lists + kept.chain(tints).sum::<usize>() + self.direct.memory_bytes()
     }
 }

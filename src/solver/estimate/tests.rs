@@ -13,6 +13,11 @@ fn estimated(
     settings: &SolveSettings,
     factor: impl Fn(Vec3) -> f32,
 ) -> EstimatedError {
+    estimate(scene, settings, factor).figures
+}
+
+/// The same with the errors at the points.
+fn estimate(scene: Scene, settings: &SolveSettings, factor: impl Fn(Vec3) -> f32) -> Estimate {
     let cancel = Cancel::default();
     let scene = Arc::new(scene);
     let mut solver = Solver::new(scene.clone(), settings.clone(), None, &cancel).unwrap();
@@ -61,6 +66,35 @@ fn light_that_is_too_bright_everywhere_has_just_that_error() {
         assert!((wrong.energy - 1.1).abs() < 0.01, "{wrong:?}");
         assert!(wrong.rms_low < 0.1 && wrong.rms_high > 0.095, "{wrong:?}");
     }
+}
+
+#[test]
+fn light_that_is_too_bright_on_one_side_has_its_error_there() {
+    // Surfaces that are a quarter too bright: a fifth of what they show is wrong.
+    let is_wrong = |point: Vec3| point.x < -10.0;
+    let factor = |point: Vec3| if is_wrong(point) { 1.25 } else { 1.0 };
+    let scene = one_sided(empty_cornell());
+    let found = estimate(scene, &SolveSettings::normal(), factor);
+    let mean = |wrong: bool| {
+        // Without the elements between both.
+        let clear = |point: &&ErrorPoint| (point.position.x + 10.0).abs() > 8.0;
+        let points = found.points.iter().filter(clear);
+        let points = points.filter(|point| is_wrong(point.position) == wrong);
+        let (error, light) = points.fold((0.0, 0.0), |(error, light), point| {
+            (error + point.error(), light + point.light)
+        });
+        error / light
+    };
+    let (there, elsewhere) = (mean(true), mean(false));
+    assert!((there - 0.2).abs() < 0.02, "{there}");
+    assert!(elsewhere.abs() < 0.02, "{elsewhere}");
+    // The light is relative to the root mean square of the true light.
+    let squares = found.points.iter().map(|point| {
+        let truth = point.light - point.error();
+        truth * truth
+    });
+    let square = squares.sum::<f32>() / found.points.len() as f32;
+    assert!((square - 1.0).abs() < 0.15, "{square}");
 }
 
 #[test]
@@ -118,4 +152,28 @@ fn steps_advance_while_the_error_falls_within_two_of_them() {
         })
     });
     assert_eq!(advances, [true, true, false, true, false]);
+}
+
+#[test]
+fn no_set_of_rays_is_that_of_another() {
+    let mut seeds: Vec<u64> = RAY_SEEDS
+        .into_iter()
+        .flatten()
+        .chain([POINT_SEED])
+        .collect();
+    // Far apart: small changes of the seed do not lead from one to another.
+    seeds.sort_unstable();
+    assert!(seeds.windows(2).all(|pair| pair[1] - pair[0] > 1 << 32));
+}
+
+#[test]
+fn memory_of_points_light_and_an_own_ray_tree_counts() {
+    let scene = Arc::new(one_sided(empty_cornell()));
+    let hierarchy = Hierarchy::new(&scene, 30.0);
+    let (tree, clear) = (Arc::new(RayTree::new(&scene)), Arc::new(RayTree::clear()));
+    let shared = ErrorEstimator::new(&scene, &hierarchy, &tree, 1);
+    let own = ErrorEstimator::new(&scene, &hierarchy, &clear, 1);
+    let difference = own.memory_bytes(&clear) - shared.memory_bytes(&tree);
+    assert_eq!(difference, tree.memory_bytes());
+    assert!(shared.memory_bytes(&tree) >= STORED_POINTS as usize * size_of::<Point>());
 }

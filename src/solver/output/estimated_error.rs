@@ -1,5 +1,6 @@
 //! The estimated error of a step.
 
+use glam::Vec3;
 use serde::Serialize;
 
 /// How far the light shown is from the truth, estimated by rays at random points (see `solver::estimate`). All of
@@ -28,6 +29,27 @@ pub struct EstimatedError {
     pub points: u64,
     /// Rays shot for it in all steps so far, beside those of the solve.
     pub rays: u64,
+}
+
+/// The error at one of the random points, of the luminance of the reflected radiance, relative to the root mean square of
+/// the true light over all points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorPoint {
+    /// Position in frame units.
+    pub position: Vec3,
+    /// Unit normal towards the lit side.
+    pub normal: Vec3,
+    /// The light shown there.
+    pub light: f32,
+    /// Its error by two estimates with independent noise; positive where it is too bright.
+    pub errors: [f32; 2],
+}
+
+impl ErrorPoint {
+    /// The mean of both estimates.
+    pub fn error(&self) -> f32 {
+        0.5 * (self.errors[0] + self.errors[1])
+    }
 }
 
 impl EstimatedError {

@@ -8,7 +8,7 @@ mod relit;
 mod snapshot;
 mod step_report;
 
-pub use estimated_error::EstimatedError;
+pub use estimated_error::{ErrorPoint, EstimatedError};
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use note::{Note, Obstacle};
 pub use omitted::Omitted;

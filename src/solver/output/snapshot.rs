@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::omitted::Omitted;
+use super::{estimated_error::ErrorPoint, omitted::Omitted};
 use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
@@ -90,6 +90,9 @@ pub struct Snapshot {
     pub clusters: Arc<Vec<ClusterBox>>,
     /// The parts that the scene does not need.
     pub omitted: Arc<Vec<Omitted>>,
+    /// The estimated error of its light at random points; none before the first step, and after a change of emitters and
+    /// materials until the next.
+    pub errors: Arc<Vec<ErrorPoint>>,
 }
 
 impl Snapshot {
@@ -120,5 +123,6 @@ impl Snapshot {
             + size_of_val(light.direct.as_slice())
             + size_of_val(light.uncertainty.as_slice())
             + size_of_val(self.clusters.as_slice())
+            + size_of_val(self.errors.as_slice())
     }
 }
