@@ -315,6 +315,7 @@ fn drain(
             None => progress.show(),
             Some(Event::Prepared { seconds }) => {
                 prepare_s = seconds;
+                progress.prepared(seconds, arguments.setting_flags.settings().error);
                 times = (seconds, seconds);
                 if arguments.explain {
                     explain(&worker.latest().unwrap_or_default());

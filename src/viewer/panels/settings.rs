@@ -9,6 +9,7 @@ use super::{
     row::{self, slider},
 };
 use crate::{
+    metrics::{Expected, Pace, about},
     scene::Sides,
     solver::SolveSettings,
     viewer::{action::Action, figures::number, state::State},
@@ -17,8 +18,10 @@ use crate::{
 /// Show the settings; requested actions go into `actions`.
 pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
     let mut settings = state.settings.clone();
-    accuracy_ui(ui, &mut settings);
-    presets_ui(ui, &mut settings);
+    let prepared = state.run.prepare_secs.unwrap_or_default();
+    let pace = Pace::of(prepared, &state.run.reports);
+    accuracy_ui(ui, &pace, &mut settings);
+    presets_ui(ui, &pace, &mut settings);
     ui.add_space(4.0);
     quality_ui(ui, state, &mut settings);
     method_ui(ui, state, &mut settings);
@@ -32,11 +35,11 @@ pub fn settings_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Actio
 const ACCURACIES: [f32; 4] = [0.1, 0.05, 0.02, 0.01];
 
 /// The error that is asked for. A solve that is asked for one goes on until its estimate is that small.
-fn accuracy_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
-    ui.horizontal(|ui| {
-        ui.label("Accuracy").on_hover_text(
-            "Refine until the estimated error is this small. Each half of the error takes about four times as long",
-        );
+fn accuracy_ui(ui: &mut egui::Ui, pace: &Pace, settings: &mut SolveSettings) {
+    let grid = egui::Grid::new("accuracy").num_columns(1 + ACCURACIES.len());
+    grid.spacing([8.0, 2.0]).show(ui, |ui| {
+        ui.label("Accuracy")
+            .on_hover_text("Refine until the estimated error is this small");
         for error in ACCURACIES {
             let chosen = with_quality_of(&SolveSettings::towards(error), settings);
             let is_active = settings.error == Some(error);
@@ -47,33 +50,49 @@ fn accuracy_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
                 *settings = chosen;
             }
         }
+        ui.end_row();
+        // Before the first step nothing is known, but the row stands there, so that nothing below moves.
+        ui.weak("takes about").on_hover_text(
+            "Time of a run until then, by the error and the time of the steps of this one; finer steps may take longer, or \
+             not come that far",
+        );
+        for error in ACCURACIES {
+            ui.weak(time_to(pace, error));
+        }
+        ui.end_row();
     });
 }
 
-fn presets_ui(ui: &mut egui::Ui, settings: &mut SolveSettings) {
-    const PRESETS: [(&str, SolveSettings, &str); 3] = [
-        (
-            "Draft",
-            SolveSettings::draft(),
-            "Seconds to a first impression",
-        ),
-        ("Normal", SolveSettings::normal(), "About 2 % error"),
-        (
-            "Final",
-            SolveSettings::finest(),
-            "For the final bake: about 1 % error, many times the time",
-        ),
+/// The time to an error as it stands below its button.
+fn time_to(pace: &Pace, error: f32) -> String {
+    match pace.to(f64::from(error)) {
+        None => "–".to_owned(),
+        Some(Expected::Reached) => "reached".to_owned(),
+        Some(Expected::After(seconds)) => about(seconds),
+    }
+}
+
+fn presets_ui(ui: &mut egui::Ui, pace: &Pace, settings: &mut SolveSettings) {
+    /// With the error that they lead to in ordinary scenes.
+    const PRESETS: [(&str, SolveSettings, f32); 3] = [
+        ("Draft", SolveSettings::draft(), 0.05),
+        ("Normal", SolveSettings::normal(), 0.02),
+        ("Final", SolveSettings::finest(), 0.01),
     ];
     ui.horizontal(|ui| {
         let width = (ui.available_width() - 2.0 * ui.spacing().item_spacing.x) / 3.0;
-        for (label, preset, explanation) in PRESETS {
+        for (label, preset, error) in PRESETS {
+            let mut explanation = format!("About {} % error", 100.0 * error);
+            if let Some(Expected::After(seconds)) = pace.to(f64::from(error)) {
+                explanation += &format!(", after about {}", about(seconds));
+            }
             let chosen = with_quality_of(&preset, settings);
             let is_active = *settings == preset;
             let (label, explanation) = if *settings == chosen && !is_active {
                 let but = "This quality is set, but something of the method, or the seed, differs from the preset";
                 (format!("{label} *"), format!("{explanation}. {but}"))
             } else {
-                (label.to_owned(), explanation.to_owned())
+                (label.to_owned(), explanation)
             };
             let button = egui::Button::selectable(is_active, label)
                 .min_size(egui::vec2(width, 24.0))
