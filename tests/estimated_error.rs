@@ -4,14 +4,14 @@
 
 mod common;
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use common::{prepare, solve, step_to_end};
 use vecrad::{
     geometry::RayTree,
-    metrics::{ErrorMeasures, MeshLookup, measure_error},
+    metrics::{ErrorMap, ErrorMeasures, MeshLookup, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
-    scene::{Scene, SceneOptions, Sides, builtin},
+    scene::{Scene, SceneOptions, Sides, builtin, luminance},
     solver::{Cancel, Note, Obstacle, Snapshot, SolveSettings, Solver},
 };
 
@@ -68,6 +68,37 @@ fn the_interval_holds_the_measured_error_in_nearly_all_steps() {
         });
     }
     assert!(10 * held >= 9 * steps, "{held} of {steps}");
+}
+
+#[test]
+fn the_map_is_red_where_light_is_too_bright_and_blue_where_it_is_too_dark() {
+    for name in ["cornell", "room-8621"] {
+        let truth = Truth::of(name);
+        let mut solver = prepare(&truth.scene, SolveSettings::draft());
+        solver.step(&Cancel::default()).unwrap();
+        let snapshot = solver.snapshot();
+        let map = ErrorMap::new(&snapshot.errors);
+        let lookup = MeshLookup::new(&truth.scene, &snapshot.mesh);
+        let shown = lookup.radiance(&snapshot.light, &truth.points);
+        // Measured errors by the error that the map shows, which is the same over a part of the surfaces.
+        let mut parts: BTreeMap<u32, Vec<f32>> = BTreeMap::new();
+        for (point, shown) in truth.points.iter().zip(shown) {
+            let error = luminance(shown.unwrap()) - luminance(point.radiance());
+            let mapped = map.at(point.position, point.normal).error;
+            parts.entry(mapped.to_bits()).or_default().push(error);
+        }
+        let (mut told, mut agreed) = (0, 0);
+        for (mapped, errors) in parts {
+            let mapped = f32::from_bits(mapped);
+            if mapped.abs() > 0.005 {
+                let is_alike = mapped * errors.iter().sum::<f32>() > 0.0;
+                told += errors.len();
+                agreed += if is_alike { errors.len() } else { 0 };
+            }
+        }
+        assert!(5 * told > truth.points.len(), "{name}: {told}");
+        assert!(10 * agreed >= 8 * told, "{name}: {agreed} of {told}");
+    }
 }
 
 #[test]

@@ -16,11 +16,12 @@ use vecrad::{
         Environment, Material, Scene, SceneBuilder, SceneOptions, Sides, Sky, SkyPicture, Texture,
         UpAxis, builtin::find_builtin,
     },
-    solver::{ClusterBox, Snapshot, VertexLight},
+    solver::{ClusterBox, ErrorPoint, Snapshot, VertexLight},
     viewer::{
         camera::Camera,
         cluster_lines,
         headless::{self, HeadlessError, HeadlessPicture, Subject},
+        light_range::false_color_range,
         render::{Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target},
         view::{ClusterOverlay, ViewMode, ViewSettings},
     },
@@ -81,6 +82,7 @@ fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
         }),
         clusters: Arc::new(vec![root]),
         omitted: Arc::default(),
+        errors: Arc::default(),
     }
 }
 
@@ -386,7 +388,7 @@ fn draw_with(
         camera: &camera(),
         view: &plain(mode),
         is_unlit: false,
-        range: [0.0, 100.0],
+        range: [if mode.is_signed() { -100.0 } else { 0.0 }, 100.0],
         interior: None,
         overlay: &Overlay::default(),
         background: Vec3::ZERO,
@@ -423,6 +425,52 @@ fn measured_errors_are_shown_where_they_are_known() {
     assert!(none[2] > none[1], "the low end is blue: {none:?}");
     assert!(much[0] > 2 * much[2], "the high end is red: {much:?}");
     assert_eq!(excess, [255; 3]);
+}
+
+#[test]
+fn estimated_errors_are_red_where_too_bright_and_blue_where_too_dark() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene();
+    let snapshot = snapshot(&scene, Vec3::ONE);
+    let count = snapshot.mesh.positions.len();
+    let pictures = [-99.0, 0.0, 99.0, 200.0].map(|percent| {
+        let errors = Arc::new(vec![percent; count]);
+        let (gpu, mode) = (gpu.clone(), ViewMode::EstimatedError);
+        let (said, picture) = draw_with(gpu, &scene, &snapshot, Some(&errors), mode, false);
+        said.expect("a small mesh");
+        left(&picture.expect("read back"))
+    });
+    let [dark, none, bright, excess] = pictures;
+    assert!(dark[2] > 2 * dark[0], "blue: {dark:?}");
+    assert!(none[0].abs_diff(none[2]) < 3, "grey: {none:?}");
+    assert!(bright[0] > 2 * bright[2], "red: {bright:?}");
+    assert!(
+        excess[0] > 240 && excess[0] == excess[2],
+        "white: {excess:?}"
+    );
+}
+
+#[test]
+fn the_range_of_estimated_errors_is_as_far_below_0_as_above_it() {
+    let scene = scene();
+    let mut lit = snapshot(&scene, Vec3::ONE);
+    let mut view = ViewSettings {
+        logarithmic: true,
+        ..plain(ViewMode::EstimatedError)
+    };
+    let range = |lit: &Snapshot, view: &ViewSettings| false_color_range(lit, view, None);
+    assert_eq!(range(&lit, &view), [-1.0, 1.0], "nothing is known");
+    let point = ErrorPoint {
+        position: Vec3::ZERO,
+        normal: Vec3::Z,
+        light: 1.0,
+        errors: [-0.07; 2],
+    };
+    lit.errors = Arc::new(vec![point; 64]);
+    let [low, high] = range(&lit, &view);
+    assert!((high - 7.0).abs() < 1e-3 && low == -high, "{low} {high}");
+    view.fixed_range = Some([2.0, 5.0]);
+    assert_eq!(range(&lit, &view), [-5.0, 5.0]);
 }
 
 #[test]

@@ -427,6 +427,53 @@ fn the_reference_measures_each_run_and_the_view_of_errors_is_offered() {
 }
 
 #[test]
+fn the_view_of_the_estimated_error_needs_no_reference() {
+    assert!(ViewMode::offered(false).any(|mode| mode == ViewMode::EstimatedError));
+    let mut harness = picked_in_the_box();
+    // The picked place has a figure of its own.
+    let count = |harness: &Harness<'static, App>| {
+        let named = harness.get_all_by_label("Estimated error");
+        named.count()
+    };
+    let with_picked = count(&harness);
+    perform(&mut harness, Action::ClearSelection);
+    assert_eq!(count(&harness), with_picked - 1);
+    perform(&mut harness, Action::Mode(ViewMode::EstimatedError));
+    wait_for(&mut harness, |app| {
+        let staged = app.state.staged.as_ref();
+        staged.is_some_and(|staged| staged.errors.is_some())
+    });
+    let state = &harness.state().state;
+    let [low, high] = state.false_color_range;
+    assert!(low == -high && high >= 1.0, "{low} {high}");
+    let staged = state.staged.as_ref().expect("it is shown");
+    let errors = staged.errors.as_ref().expect("they are known");
+    assert_eq!(errors.len(), staged.wanted.snapshot.mesh.positions.len());
+    assert!(errors.iter().all(|error| error.abs() <= high));
+    // A scale with a sign has no logarithm.
+    assert!(harness.query_by_label("Log").is_none());
+    harness.get_by_label("Fixed range");
+}
+
+#[test]
+fn below_the_accuracies_stands_when_to_expect_them() {
+    let harness = picked_in_the_box();
+    harness.get_by_label("takes about");
+    let reports = harness.state().state.run.reports.iter();
+    let errors = reports.filter_map(|report| Some(report.estimated_error?.trimmed_high));
+    let error = errors.fold(f64::INFINITY, f64::min);
+    let reached = [0.1, 0.05, 0.02, 0.01]
+        .iter()
+        .filter(|&&wanted| error <= wanted)
+        .count();
+    assert!(
+        reached > 0,
+        "a draft of the box is as good as 10 %: {error}"
+    );
+    assert_eq!(harness.get_all_by_label("reached").count(), reached);
+}
+
+#[test]
 fn a_reference_of_another_scene_is_dropped() {
     let mut harness = plates();
     perform(&mut harness, Action::TraceReference);

@@ -307,6 +307,7 @@ pub fn bindings() -> Vec<Binding> {
         Key::Num9,
         Key::Num0,
         Key::Minus,
+        Key::Equals,
     ];
     all.extend(
         ROW.into_iter()
@@ -422,6 +423,8 @@ mod tests {
         assert_eq!(found(Key::Num1, Modifiers::ALT), Some(radiance));
         let error = Action::Mode(ViewMode::Error);
         assert_eq!(found(Key::Minus, Modifiers::ALT), Some(error));
+        let estimated = Action::Mode(ViewMode::EstimatedError);
+        assert_eq!(found(Key::Equals, Modifiers::ALT), Some(estimated));
         assert_eq!(
             found(Key::F12, Modifiers::COMMAND),
             Some(Action::Screenshot)

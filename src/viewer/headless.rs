@@ -14,8 +14,9 @@ use super::{
     render::{
         Cutout, CutoutTarget, Gpu, Overlay, Picture, ReadError, RenderError, Renderer, Target,
     },
+    stage::estimated_errors,
     theme,
-    view::ViewSettings,
+    view::{ViewMode, ViewSettings},
 };
 use crate::{scene::Scene, solver::Snapshot};
 
@@ -203,6 +204,10 @@ fn with_picture<T>(
         interior,
         ..
     } = subject;
+    let estimated = (view.mode == ViewMode::EstimatedError)
+        .then(|| estimated_errors(snapshot))
+        .flatten();
+    let errors = errors.or(estimated.as_ref());
     let shown = clusters::shown(&snapshot.clusters, &view.clusters);
     let boxes = cluster_lines::boxes(&snapshot.clusters, &shown, &view.clusters);
     let overlay = Overlay {

@@ -1,10 +1,14 @@
 //! Where the light of a snapshot lies: the ends of automatic false colours.
 
 use super::view::{ViewMode, ViewSettings};
-use crate::{scene::luminance, solver::Snapshot};
+use crate::{metrics::ErrorMap, scene::luminance, solver::Snapshot};
 
 /// Vertices looked at. Fewer miss small bright spots; more take longer than a frame of a large scene may.
 const SAMPLES: usize = 20_000;
+/// Least end of the scale of estimated errors, in per cent. Smaller, and what noise leaves of an error is as red as one that
+/// can be seen; larger, and small errors have no colour.
+const LEAST_ERROR_PERCENT: f32 = 1.0;
+
 /// Below this nothing counts as light, in W/(sr·m²).
 const DARKNESS: f32 = 1e-12;
 
@@ -14,6 +18,14 @@ pub fn false_color_range(
     view: &ViewSettings,
     errors: Option<&[f32]>,
 ) -> [f32; 2] {
+    if view.mode.is_signed() {
+        let largest = || ErrorMap::new(&snapshot.errors).largest_percent();
+        let high = match view.fixed_range {
+            Some([_, high]) => high.max(f32::MIN_POSITIVE),
+            None => largest().max(LEAST_ERROR_PERCENT),
+        };
+        return [-high, high];
+    }
     if let Some([low, high]) = view.fixed_range {
         return [low, high.max(low.next_up())];
     }
@@ -64,7 +76,8 @@ fn value(snapshot: &Snapshot, mode: ViewMode, vertex: usize) -> f32 {
         | ViewMode::Elements
         | ViewMode::FaceOrientation
         | ViewMode::FalseIrradiance
-        | ViewMode::Error => luminance(light.irradiance[vertex]),
+        | ViewMode::Error
+        | ViewMode::EstimatedError => luminance(light.irradiance[vertex]),
     }
 }
 

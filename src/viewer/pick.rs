@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use super::{camera::Camera, loader::LoadedScene, view::ViewSettings};
 use crate::{
     geometry::barycentric_in_plane,
+    metrics::{ErrorMap, PooledError},
     scene::{TriangleId, luminance},
     solver::Snapshot,
 };
@@ -31,8 +32,10 @@ pub struct Probe {
     pub direct: Vec3,
     /// Radiance that leaves, in W/(sr·m²).
     pub radiance: Vec3,
-    /// Estimated error of the irradiance, in W/m².
+    /// Bound of the error of the irradiance, in W/m².
     pub uncertainty: f32,
+    /// The estimated error, where there is one: emitters have none.
+    pub estimated_error: Option<PooledError>,
 }
 
 impl Probe {
@@ -125,14 +128,18 @@ pub fn probe(snapshot: &Snapshot, pick: &Pick) -> Option<Probe> {
     };
     let light = &snapshot.light;
     let irradiance = mix(&light.irradiance);
+    let emission = mix(&mesh.emission);
+    let map = ErrorMap::new(&snapshot.errors);
+    let is_estimated = !map.is_empty() && emission == Vec3::ZERO;
     Some(Probe {
         element: mesh.element_of[index],
         irradiance,
         direct: mix(&light.direct),
-        radiance: mix(&mesh.emission) + mix(&mesh.reflectance) * irradiance / std::f32::consts::PI,
+        radiance: emission + mix(&mesh.reflectance) * irradiance / std::f32::consts::PI,
         uncertainty: (0..3)
             .map(|corner| light.uncertainty[corners[corner]] * weights[corner])
             .sum(),
+        estimated_error: is_estimated.then(|| map.at(pick.point, mix(&mesh.normals))),
     })
 }
 

@@ -21,6 +21,7 @@ use super::{
     view::{ClusterOverlay, ViewMode},
 };
 use crate::{
+    metrics::ErrorMap,
     scene::{Scene, TriangleId},
     solver::{ClusterBox, Snapshot},
     worker::Wake,
@@ -33,7 +34,7 @@ pub struct Wanted {
     pub scene: Arc<Scene>,
     /// Its mesh, light and clusters.
     pub snapshot: Arc<Snapshot>,
-    /// Measured errors at its vertices, where they are shown.
+    /// Measured errors at its vertices in per cent, where they are shown.
     pub errors: Option<Arc<Vec<f32>>>,
     /// The view mode.
     pub mode: ViewMode,
@@ -66,6 +67,8 @@ pub struct Staged {
     pub wanted: Wanted,
     /// Its uploads; `None` without an adapter.
     pub uploads: Option<Uploads>,
+    /// Errors at the vertices in per cent, where the mode shows them and they are known.
+    pub errors: Option<Arc<Vec<f32>>>,
     /// Why there is no mesh among it.
     pub error: Option<RenderError>,
     /// Whether there is light.
@@ -105,6 +108,7 @@ impl Stage {
             adapter,
             clusters: ShownClusters::default(),
             boxes: Boxes::default(),
+            estimated: None,
         };
         thread::Builder::new()
             .name("stage".to_owned())
@@ -187,6 +191,13 @@ struct StageHand {
     adapter: Option<(Gpu, Uploads)>,
     clusters: ShownClusters,
     boxes: Boxes,
+    estimated: Option<Estimated>,
+}
+
+/// Estimated errors at vertices, where there are any, and of what.
+struct Estimated {
+    of: Arc<Snapshot>,
+    errors: Option<Arc<Vec<f32>>>,
 }
 
 impl StageHand {
@@ -205,10 +216,12 @@ impl StageHand {
                 ends: boxes.ends,
             };
         }
-        let error = self.upload(&wanted);
+        let errors = self.errors(&wanted);
+        let error = self.upload(&wanted, errors.as_ref());
         let picked = wanted.picked.as_ref();
         Staged {
             uploads: self.adapter.as_ref().map(|(_, uploads)| uploads.clone()),
+            errors,
             error,
             is_lit: wanted.snapshot.is_lit(),
             clusters: self.clusters.clone(),
@@ -222,13 +235,30 @@ impl StageHand {
         }
     }
 
-    fn upload(&mut self, wanted: &Wanted) -> Option<RenderError> {
+    /// The errors at the vertices that the mode shows.
+    fn errors(&mut self, wanted: &Wanted) -> Option<Arc<Vec<f32>>> {
+        if wanted.mode != ViewMode::EstimatedError {
+            return wanted.errors.clone();
+        }
+        let is_current = |known: &Estimated| Arc::ptr_eq(&known.of, &wanted.snapshot);
+        if !self.estimated.as_ref().is_some_and(is_current) {
+            self.estimated = Some(Estimated {
+                of: wanted.snapshot.clone(),
+                errors: estimated_errors(&wanted.snapshot),
+            });
+        }
+        self.estimated
+            .as_ref()
+            .and_then(|known| known.errors.clone())
+    }
+
+    fn upload(&mut self, wanted: &Wanted, errors: Option<&Arc<Vec<f32>>>) -> Option<RenderError> {
         let (gpu, uploads) = self.adapter.as_mut()?;
         let source = Source {
             scene: &wanted.scene,
             mesh: &wanted.snapshot.mesh,
             light: &wanted.snapshot.light,
-            errors: wanted.errors.as_ref(),
+            errors,
             mode: wanted.mode,
             edges: wanted.edges,
             boxes: &self.boxes.instances,
@@ -238,4 +268,10 @@ impl StageHand {
         gpu.queue.submit([]);
         error
     }
+}
+
+/// Estimated errors at the vertices of a snapshot in per cent, where there is an estimate.
+pub(super) fn estimated_errors(snapshot: &Snapshot) -> Option<Arc<Vec<f32>>> {
+    let map = ErrorMap::new(&snapshot.errors);
+    (!map.is_empty()).then(|| Arc::new(map.percent_at_vertices(&snapshot.mesh)))
 }

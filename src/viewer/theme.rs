@@ -41,19 +41,37 @@ const RAMP: [[u8; 3]; 9] = [
     [0xe0, 0x4a, 0x2c],
 ];
 
-/// The ramp, display-linear.
-pub(super) fn ramp_stops() -> &'static [Vec3; 9] {
-    static STOPS: LazyLock<[Vec3; 9]> = LazyLock::new(|| {
-        RAMP.map(|color| {
-            Vec3::from_array(color.map(|byte| linear_from_srgb(f32::from(byte) / 255.0)))
-        })
-    });
-    &STOPS
+/// The ramp of quantities with a sign, likewise: blue below 0, red above it.
+const SIGNED_RAMP: [[u8; 3]; 9] = [
+    [0x1c, 0x4f, 0xd8],
+    [0x45, 0x72, 0xdc],
+    [0x6b, 0x90, 0xdc],
+    [0x8f, 0xa8, 0xcf],
+    [0xa8, 0xa8, 0xa8],
+    [0xcf, 0xa0, 0x90],
+    [0xde, 0x80, 0x6b],
+    [0xe0, 0x5a, 0x47],
+    [0xd8, 0x24, 0x24],
+];
+
+/// A ramp, display-linear.
+pub(super) fn ramp_stops(is_signed: bool) -> &'static [Vec3; 9] {
+    type Stops = LazyLock<[Vec3; 9]>;
+    static STOPS: Stops = LazyLock::new(|| RAMP.map(linear_color));
+    static SIGNED_STOPS: Stops = LazyLock::new(|| SIGNED_RAMP.map(linear_color));
+    if is_signed { &SIGNED_STOPS } else { &STOPS }
+}
+
+fn linear_color(color: [u8; 3]) -> Vec3 {
+    Vec3::from_array(color.map(|byte| linear_from_srgb(f32::from(byte) / 255.0)))
 }
 
 /// Display-linear colour of the ramp at 0…1.
 pub(super) fn ramp(t: f32) -> Vec3 {
-    let stops = ramp_stops();
+    between(ramp_stops(false), t)
+}
+
+fn between(stops: &[Vec3; 9], t: f32) -> Vec3 {
     let at = t.clamp(0.0, 1.0) * (stops.len() - 1) as f32;
     let below = (at as usize).min(stops.len() - 2);
     stops[below].lerp(stops[below + 1], at - below as f32)
@@ -61,7 +79,16 @@ pub(super) fn ramp(t: f32) -> Vec3 {
 
 /// The ramp at 0…1 for the window.
 pub fn ramp_color(t: f32) -> Color32 {
-    let [r, g, b] = ramp(t).to_array().map(srgb_byte);
+    display_color(ramp(t))
+}
+
+/// The ramp of quantities with a sign, likewise; 0 is at 0.5.
+pub fn signed_color(t: f32) -> Color32 {
+    display_color(between(ramp_stops(true), t))
+}
+
+fn display_color(linear: Vec3) -> Color32 {
+    let [r, g, b] = linear.to_array().map(srgb_byte);
     Color32::from_rgb(r, g, b)
 }
 

@@ -36,11 +36,13 @@ pub enum ViewMode {
     Uncertainty,
     /// Measured error of radiance against the reference, in false colour.
     Error,
+    /// Estimated error of the reflected radiance, pooled over the surfaces, in false colour with its sign.
+    EstimatedError,
 }
 
 impl ViewMode {
     /// All modes in the order of their keys.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Radiance,
         Self::LightOnly,
         Self::DirectOnly,
@@ -52,6 +54,7 @@ impl ViewMode {
         Self::FalseRadiance,
         Self::Uncertainty,
         Self::Error,
+        Self::EstimatedError,
     ];
 
     /// The modes that can be shown, with or without a reference.
@@ -75,6 +78,7 @@ impl ViewMode {
             Self::FalseRadiance => "False colour: radiance",
             Self::Uncertainty => "False colour: error bound",
             Self::Error => "Measured error",
+            Self::EstimatedError => "Estimated error",
         }
     }
 
@@ -96,6 +100,9 @@ impl ViewMode {
             Self::Error => {
                 "Difference of radiance from the path-traced reference, in per cent of its root mean square."
             }
+            Self::EstimatedError => {
+                "Where the light is too bright or too dark, in per cent of its root mean square, from rays at random points; grey where no error is told from their noise."
+            }
         }
     }
 
@@ -113,6 +120,7 @@ impl ViewMode {
             Self::FalseRadiance => "false-radiance",
             Self::Uncertainty => "uncertainty",
             Self::Error => "error",
+            Self::EstimatedError => "estimated-error",
         }
     }
 
@@ -131,7 +139,7 @@ impl ViewMode {
         match self {
             Self::FalseIrradiance | Self::Uncertainty => Some("W/m²"),
             Self::FalseRadiance => Some("W/(sr·m²)"),
-            Self::Error => Some("% of RMS"),
+            Self::Error | Self::EstimatedError => Some("% of RMS"),
             _ => None,
         }
     }
@@ -143,8 +151,19 @@ impl ViewMode {
             Self::FalseRadiance => "Radiance",
             Self::Uncertainty => "Error bound",
             Self::Error => "Measured error",
+            Self::EstimatedError => "Estimated error",
             _ => "",
         }
+    }
+
+    /// Whether false colours have a sign: their range is as far below 0 as above it, and never logarithmic.
+    pub fn is_signed(self) -> bool {
+        self == Self::EstimatedError
+    }
+
+    /// Whether it shows errors at the vertices, which may not be known.
+    pub(crate) fn shows_errors(self) -> bool {
+        matches!(self, Self::Error | Self::EstimatedError)
     }
 
     /// Number by which the shader knows the mode.
@@ -315,6 +334,34 @@ impl Default for ViewSettings {
             clusters: ClusterOverlay::default(),
             links: LinkOverlay::default(),
             is_in_metres: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modes_are_known_by_their_names() {
+        for mode in ViewMode::ALL {
+            assert_eq!(ViewMode::from_name(mode.name()), Some(mode));
+            // False colours have a legend with quantity and unit, the others none.
+            let is_named = !mode.false_color_quantity().is_empty();
+            assert_eq!(is_named, mode.false_color_unit().is_some(), "{mode:?}");
+        }
+    }
+
+    #[test]
+    fn errors_are_relative_whatever_the_emission() {
+        for mode in ViewMode::ALL.into_iter().filter(|mode| mode.shows_errors()) {
+            let view = ViewSettings {
+                mode,
+                emission_scale: 3.0,
+                ..ViewSettings::default()
+            };
+            assert_eq!(view.light_factor(), 1.0);
+            assert_eq!(mode.false_color_unit(), Some("% of RMS"));
         }
     }
 }

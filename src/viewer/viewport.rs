@@ -306,7 +306,7 @@ impl Viewport {
             scene: &wanted.scene,
             mesh: &wanted.snapshot.mesh,
             light: &wanted.snapshot.light,
-            errors: wanted.errors.as_ref(),
+            errors: key.staged.errors.as_ref(),
             camera: &key.camera,
             view: &key.view,
             is_unlit: key.is_unlit,

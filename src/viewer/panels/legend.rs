@@ -101,9 +101,14 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         return;
     };
     const SIZE: egui::Vec2 = vec2(18.0, 180.0);
-    let at = rect.right_top() + vec2(-108.0, 58.0);
+    // Room for words above and below.
+    let words = if mode.is_signed() { 14.0 } else { 0.0 };
+    let at = rect.right_top() + vec2(-108.0, 58.0 + words);
     let painter = ui.painter().with_clip_rect(rect);
-    let plate = Rect::from_min_size(at - vec2(14.0, 48.0), vec2(114.0, SIZE.y + 78.0));
+    let plate = Rect::from_min_size(
+        at - vec2(14.0, 48.0 + words),
+        vec2(114.0, SIZE.y + 78.0 + 2.0 * words),
+    );
     painter.rect_filled(plate, 4.0, Color32::from_black_alpha(190));
     let text = |at, anchor, text: String| {
         painter.text(
@@ -115,8 +120,18 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         );
     };
     let quantity = mode.false_color_quantity().to_owned();
-    text(at - vec2(2.0, 42.0), Align2::LEFT_TOP, quantity);
-    text(at - vec2(2.0, 27.0), Align2::LEFT_TOP, unit.to_owned());
+    text(at - vec2(2.0, 42.0 + words), Align2::LEFT_TOP, quantity);
+    text(
+        at - vec2(2.0, 27.0 + words),
+        Align2::LEFT_TOP,
+        unit.to_owned(),
+    );
+    if mode.is_signed() {
+        let above = at - vec2(2.0, 10.0);
+        text(above, Align2::LEFT_BOTTOM, "too bright".to_owned());
+        let below = at + vec2(-2.0, SIZE.y + 10.0);
+        text(below, Align2::LEFT_TOP, "too dark".to_owned());
+    }
     // The ramp, and the marks of what lies outside it.
     const BANDS: usize = 90;
     let band = SIZE.y / BANDS as f32;
@@ -124,7 +139,12 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         let t = 1.0 - (index as f32 + 0.5) / BANDS as f32;
         let top = at + vec2(0.0, index as f32 * band);
         let rect = Rect::from_min_size(top, vec2(SIZE.x, band + 0.5));
-        painter.rect_filled(rect, 0.0, theme::ramp_color(t));
+        let color = if mode.is_signed() {
+            theme::signed_color(t)
+        } else {
+            theme::ramp_color(t)
+        };
+        painter.rect_filled(rect, 0.0, color);
     }
     let above = Rect::from_min_size(at - vec2(0.0, 9.0), vec2(SIZE.x, 7.0));
     let below = Rect::from_min_size(at + vec2(0.0, SIZE.y + 2.0), vec2(SIZE.x, 7.0));
@@ -137,12 +157,12 @@ pub fn legend_ui(ui: &egui::Ui, rect: Rect, state: &State) {
         StrokeKind::Inside,
     );
     let unit = match mode {
-        ViewMode::Error => 1.0,
+        mode if mode.shows_errors() => 1.0,
         _ => f64::from(state.radiance_unit()),
     };
     let scale = Scale {
         ends: state.false_color_range.map(|end| f64::from(end) * unit),
-        is_logarithmic: state.view.logarithmic,
+        is_logarithmic: state.view.logarithmic && !mode.is_signed(),
     };
     let stroke = Stroke::new(1.0, Color32::from_gray(225));
     for value in scale.marks() {

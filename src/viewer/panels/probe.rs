@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::{materials, path::path_ui, power::PowerScale, row};
 use crate::{
+    metrics::PooledError,
     scene::luminance,
     viewer::{
         action::Action,
@@ -102,6 +103,13 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
                     figure(f64::from(luminance(probe.radiance) * std::f32::consts::PI))
                 ),
                 "π times the radiance",
+            );
+            row::figure(
+                ui,
+                "Estimated error",
+                estimated_error(probe.estimated_error),
+                "Mean over the part of the surfaces around this place whose error is told from noise, of the light that is \
+                 shown there: the view 'Estimated error' as a figure",
             );
             row::figure(
                 ui,
@@ -232,6 +240,20 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
     });
 }
 
+/// The estimated error of the light at a place.
+fn estimated_error(pooled: Option<PooledError>) -> String {
+    let Some(pooled) = pooled else {
+        return "–".to_owned();
+    };
+    if pooled.error == 0.0 {
+        return "not told from noise".to_owned();
+    }
+    let side = if pooled.error > 0.0 { "bright" } else { "dark" };
+    let [of_rms, of_local] =
+        [pooled.error, pooled.of_local].map(|share| figure(f64::from(100.0 * share.abs())));
+    format!("{of_local} % too {side} ({of_rms} % of RMS)")
+}
+
 /// An error bound relative to the irradiance that it is of; without either there is nothing to be wrong.
 fn error_bound(error: f32, irradiance: f32) -> String {
     if error > 0.0 {
@@ -253,6 +275,21 @@ fn rgb(color: Vec3) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn estimated_errors_have_a_side() {
+        let text = |error: f32| {
+            estimated_error(Some(PooledError {
+                error,
+                of_local: 2.0 * error,
+                points: 8,
+            }))
+        };
+        assert_eq!(text(0.02), "4.00 % too bright (2.00 % of RMS)");
+        assert_eq!(text(-0.02), "4.00 % too dark (2.00 % of RMS)");
+        assert_eq!(text(0.0), "not told from noise");
+        assert_eq!(estimated_error(None), "–");
+    }
 
     #[test]
     fn a_bound_above_the_light_itself_is_no_figure() {

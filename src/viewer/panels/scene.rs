@@ -67,7 +67,12 @@ pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
                 loaded.source.label()
             )
         }
-        (_, Some(_)) if lacks_errors(state) => "Tracing the reference at the vertices…".to_owned(),
+        (_, Some(_)) if lacks_measured_errors(state) => {
+            "Tracing the reference at the vertices…".to_owned()
+        }
+        (_, Some(_)) if lacks_estimate(state) => {
+            "The error is estimated at the end of each step".to_owned()
+        }
         _ => return,
     };
     ui.painter().text(
@@ -79,8 +84,15 @@ pub fn waiting_ui(ui: &egui::Ui, rect: egui::Rect, state: &State) {
     );
 }
 
-/// Whether errors are to be shown that are not known yet.
-fn lacks_errors(state: &State) -> bool {
+/// Whether an estimate is to be shown and there is none yet.
+fn lacks_estimate(state: &State) -> bool {
+    let snapshot = state.run.snapshot.as_ref();
+    state.view.mode == ViewMode::EstimatedError
+        && snapshot.is_some_and(|snapshot| snapshot.errors.is_empty())
+}
+
+/// Whether measured errors are to be shown that are not known yet.
+fn lacks_measured_errors(state: &State) -> bool {
     let snapshot = state.run.snapshot.as_ref();
     state.view.mode == ViewMode::Error
         && snapshot.is_some_and(|snapshot| state.truth.vertex_errors(snapshot).is_none())

@@ -140,13 +140,16 @@ fn exposure_text(value: f64) -> String {
 }
 
 fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
-    ui.toggle_value(&mut view.logarithmic, "Log")
-        .on_hover_text("Space the colours logarithmically");
+    let is_signed = view.mode.is_signed();
+    if !is_signed {
+        ui.toggle_value(&mut view.logarithmic, "Log")
+            .on_hover_text("Space the colours logarithmically");
+    }
     let mut is_fixed = view.fixed_range.is_some();
     ui.toggle_value(&mut is_fixed, "Fixed range")
         .on_hover_text("Keep the range while the light changes; otherwise it follows the light");
     view.fixed_range = match (is_fixed, view.fixed_range) {
-        (true, None) => Some(in_use),
+        (true, None) => Some(in_use.map(|end| end.max(0.0))),
         (true, chosen) => chosen,
         (false, _) => None,
     };
@@ -158,9 +161,11 @@ fn range_ui(ui: &mut egui::Ui, view: &mut ViewSettings, in_use: [f32; 2]) {
                 .speed(speed)
                 .custom_formatter(|value, _| figure(value))
         };
-        let label = ui.label("from");
-        ui.add(drag(low)).labelled_by(label.id);
-        let label = ui.label("to");
+        if !is_signed {
+            let label = ui.label("from");
+            ui.add(drag(low)).labelled_by(label.id);
+        }
+        let label = ui.label(if is_signed { "up to ±" } else { "to" });
         ui.add(drag(high)).labelled_by(label.id);
     }
 }

@@ -22,7 +22,8 @@ struct Surface {
     @location(2) texcoord: vec2<f32>,
     @location(3) reflectance: vec3<f32>,
     @location(4) emission: vec3<f32>,
-    @location(5) light: vec3<f32>,
+    // Within the triangle: at the rim of one that is seen edge-on, light would be extrapolated without bounds.
+    @location(5) @interpolate(perspective, centroid) light: vec3<f32>,
 };
 
 @vertex
@@ -141,6 +142,8 @@ fn shown(surface: Surface) -> vec4<f32> {
         case 8u: { return vec4<f32>(false_color(luminance(surface.emission + surface.reflectance * surface.light / PI)), 0.0); }
         // Uncertainty, and the measured error.
         case 9u, 10u: { return vec4<f32>(false_color(surface.light.x), 0.0); }
+        // The estimated error. Shaded, so that surfaces without an error are told from each other.
+        case 11u: { return vec4<f32>(false_color(surface.light.x) * (0.5 + 0.5 * facing), 0.0); }
         // No light yet: the surfaces as a lamp beside the eye would show them.
         case 255u: { return vec4<f32>(reflectance * (0.15 + 0.6 * facing), 0.0); }
         default: { return exposed(radiance); }

@@ -202,7 +202,7 @@ pub struct Picture<'a> {
     pub mesh: &'a Arc<DisplayMesh>,
     /// Its light.
     pub light: &'a Arc<VertexLight>,
-    /// Measured errors at its vertices, where they are known.
+    /// Errors at its vertices in per cent, for the modes that show them, where they are known.
     pub errors: Option<&'a Arc<Vec<f32>>>,
     /// From where.
     pub camera: &'a Camera,

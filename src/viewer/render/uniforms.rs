@@ -91,8 +91,9 @@ impl ViewUniforms {
         floats.extend(camera.clip_from_frame(aspect).to_cols_array());
         floats.extend([eye.x, eye.y, eye.z, flag(camera.orthographic)]);
         floats.extend([backward.x, backward.y, backward.z, flag(view.backs)]);
-        floats.extend([low, high, flag(view.logarithmic), theme::BACK_LIGHTNESS]);
-        let lacks_errors = view.mode == ViewMode::Error && picture.errors.is_none();
+        let is_logarithmic = view.logarithmic && !view.mode.is_signed();
+        floats.extend([low, high, flag(is_logarithmic), theme::BACK_LIGHTNESS]);
+        let lacks_errors = view.mode.shows_errors() && picture.errors.is_none();
         let is_preview = (picture.is_unlit && view.mode.is_light()) || lacks_errors;
         floats.extend([
             if is_preview {
@@ -125,7 +126,7 @@ impl ViewUniforms {
         {
             floats.extend([vector.x, vector.y, vector.z, 0.0]);
         }
-        for color in theme::ramp_stops() {
+        for color in theme::ramp_stops(view.mode.is_signed()) {
             floats.extend([color.x, color.y, color.z, 1.0]);
         }
         debug_assert_eq!(floats.len(), FLOAT_COUNT);

@@ -23,7 +23,7 @@ pub struct Source<'a> {
     pub mesh: &'a Arc<DisplayMesh>,
     /// Its light.
     pub light: &'a Arc<VertexLight>,
-    /// Measured errors at its vertices, where they are known.
+    /// Errors at its vertices in per cent, for the modes that show them, where they are known.
     pub errors: Option<&'a Arc<Vec<f32>>>,
     /// Which light is shown.
     pub mode: ViewMode,
@@ -134,7 +134,7 @@ enum LightSource {
 impl LightSource {
     fn of(source: &Source<'_>) -> Self {
         match (source.mode, source.errors) {
-            (ViewMode::Error, Some(errors)) => Self::Errors(errors.clone()),
+            (mode, Some(errors)) if mode.shows_errors() => Self::Errors(errors.clone()),
             (mode, _) => Self::Light(source.light.clone(), Channel::of(mode)),
         }
     }
