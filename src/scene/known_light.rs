@@ -50,9 +50,9 @@ impl Scene {
         self.painted(materials, textures, Sky::Uniform(Vec3::ONE))
     }
 
-    /// The scene with one reflectance everywhere, lit by its own emitters, or, where `all_emit`, with a radiance of 1
-    /// everywhere, in units of [`Self::radiance_unit`]; without sky and sun. What passes is colourless.
-    pub fn with_one_reflectance(&self, reflectance: f32, all_emit: bool) -> Self {
+    /// The scene with one reflectance everywhere, and this emission everywhere, or its own, in units of
+    /// [`Self::radiance_unit`]; without sky and sun. What passes is colourless.
+    pub fn with_one_reflectance(&self, reflectance: f32, emission: Option<Vec3>) -> Self {
         let paint = |material: &Material| {
             let mut plain = Material {
                 reflectance: Vec3::splat(reflectance),
@@ -60,8 +60,8 @@ impl Scene {
                 filter: Vec3::ONE,
                 ..material.clone()
             };
-            if all_emit {
-                (plain.emission, plain.emission_texture) = (Vec3::ONE, None);
+            if let Some(emission) = emission {
+                (plain.emission, plain.emission_texture) = (emission, None);
             }
             plain
         };
@@ -80,10 +80,7 @@ impl Scene {
             }),
             ..self.clone()
         };
-        painted.averages = Arc::new(TextureAverages::new(
-            painted.pictures(),
-            &painted.materials,
-        ));
+        painted.averages = Arc::new(TextureAverages::new(painted.pictures(), &painted.materials));
         let appearances = painted.appearances();
         painted.surfaces = self
             .surfaces

@@ -177,20 +177,31 @@ mod tests {
                 let copy = placement.faces(builder.clone(), up).finish(&options);
                 let lighting = placement.lighting(&scene, &Lighting::default());
                 let copy = lighting.apply(copy.expect("a face"));
-                let moved = |direction: Vec3| placement.direction(direction.as_dvec3(), up).as_vec3();
-                let near = |a: Vec3, b: Vec3| assert!(a.distance(b) < 1e-4, "{a} {b} {placement:?}");
+                let moved =
+                    |direction: Vec3| placement.direction(direction.as_dvec3(), up).as_vec3();
+                let near =
+                    |a: Vec3, b: Vec3| assert!(a.distance(b) < 1e-4, "{a} {b} {placement:?}");
                 let normal = |of: &Scene| of.surfaces[0].area_vector.normalize_or_zero();
                 near(normal(&copy), moved(normal(&scene)));
                 let sun = |of: &Scene| of.environment.sun.expect("it has one").direction;
                 near(sun(&copy), moved(sun(&scene)));
                 near(copy.up.vector(), moved(scene.up.vector()));
-                for direction in [Vec3::X, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, 0.6, 0.64)] {
+                for direction in [
+                    Vec3::X,
+                    Vec3::new(0.6, 0.0, 0.8),
+                    Vec3::new(-0.48, 0.6, 0.64),
+                ] {
                     let radiance = |of: &Scene, at: Vec3| of.environment.sky.radiance(at);
                     let expected = radiance(&scene, direction);
                     let found = radiance(&copy, moved(direction));
-                    assert!((found - expected).abs().max_element() < 1e-2, "{placement:?}");
+                    assert!(
+                        (found - expected).abs().max_element() < 1e-2,
+                        "{placement:?}"
+                    );
                 }
-                let corner = scene.frame.to_world(scene.corners(crate::scene::TriangleId(0))[2]);
+                let corner = scene
+                    .frame
+                    .to_world(scene.corners(crate::scene::TriangleId(0))[2]);
                 let there = copy.frame.from_world(placement.point(corner, up));
                 assert!(copy.positions.iter().any(|at| at.distance(there) < 1e-3));
             }
@@ -205,7 +216,11 @@ mod tests {
             height: 2,
             pixels: [1.0, 2.0, 3.0, 4.0].map(Vec3::splat).to_vec(),
         };
-        let found = mirrored(&texture).pixels.iter().map(|pixel| pixel.x).collect::<Vec<_>>();
+        let found = mirrored(&texture)
+            .pixels
+            .iter()
+            .map(|pixel| pixel.x)
+            .collect::<Vec<_>>();
         assert_eq!(found, [2.0, 1.0, 4.0, 3.0]);
         assert_eq!(texture.sample(Vec2::new(0.25, 0.75)).x, 1.0);
     }
