@@ -128,10 +128,10 @@ impl<'a> Trial<'a> {
         let painted = Arc::new(scene.with_one_reflectance(ONE_REFLECTANCE, emission));
         let lit = self.light(&painted)?;
         let survey = &self.check.survey;
-        // What absorbs light: by the part of it that is met, and not within solids.
+        // What absorbs light, by the part of it that is met.
         let weight = |triangle: TriangleId, is_back: bool| {
             let opacity = painted.surfaces[triangle.index()].opacity;
-            let counts = !survey.is_buried(triangle, is_back);
+            let counts = !survey.is_apart(triangle, is_back);
             if counts { f64::from(opacity) } else { 0.0 }
         };
         let (mut power, mut area) = (DVec3::ZERO, 0.0);
@@ -141,7 +141,7 @@ impl<'a> Trial<'a> {
             let sides = 1 + usize::from(painted.triangles[triangle.index()].two_sided);
             for is_back in [false, true].into_iter().take(sides) {
                 area += own * weight(triangle, is_back);
-                if !survey.is_buried(triangle, is_back) {
+                if !survey.is_apart(triangle, is_back) {
                     power += surface.emission.as_dvec3() * (PI * own);
                 }
             }

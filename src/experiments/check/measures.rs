@@ -10,21 +10,22 @@ use crate::{
     scene::{MaterialId, Scene},
 };
 
-/// Points of a material that tell about its mean. Fewer, and one leak under an edge names the material.
+/// Points that tell about the mean of a material. Fewer, and one leak under an edge names the material.
 const FEW_POINTS: usize = 20;
 
-/// Deviations of the irradiance at points, relative to the root mean square of what is expected.
+/// Deviations of the light at points, as it is reflected: of the irradiance times the reflectance, relative to the root mean
+/// square of what is expected. Where nothing reflects, of the irradiance.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Deviations {
     /// Points that are compared.
     pub points: usize,
     /// Points at which no light is known.
     pub unmatched: usize,
-    /// Mean of what is expected, over points and channels, W/m².
+    /// Mean irradiance that is expected, over points and channels, weighted by their reflectance, W/m².
     pub expected: f64,
-    /// Mean of what was found, W/m².
+    /// The mean of what was found, W/m².
     pub found: f64,
-    /// Mean deviation, relative.
+    /// Deviation of the mean, relative.
     pub mean: f64,
     /// Root mean square of the deviations, relative.
     pub rms: f64,
@@ -41,7 +42,7 @@ pub struct Deviations {
 pub struct WorstMaterial {
     /// Its name.
     pub name: String,
-    /// Mean deviation, relative to the root mean square of what is expected at all points.
+    /// Deviation of the mean irradiance of its points, weighted likewise, relative.
     pub mean: f64,
     /// Its points.
     pub points: usize,
@@ -56,62 +57,63 @@ impl Deviations {
         expected: &[Option<Vec3>],
         found: &[Option<Vec3>],
     ) -> Option<Self> {
-        let pairs: Vec<(MaterialId, DVec3, DVec3)> = points
+        let is_black = points.iter().all(|point| point.reflectance == Vec3::ZERO);
+        let samples: Vec<Sample> = points
             .iter()
             .zip(expected.iter().zip(found))
             .filter_map(|(point, (expected, found))| {
-                let material = scene.triangles[point.triangle.index()].material;
-                Some((material, (*expected)?.as_dvec3(), (*found)?.as_dvec3()))
+                Some(Sample {
+                    material: scene.triangles[point.triangle.index()].material,
+                    weight: if is_black {
+                        DVec3::ONE
+                    } else {
+                        point.reflectance.as_dvec3()
+                    },
+                    expected: (*expected)?.as_dvec3(),
+                    found: (*found)?.as_dvec3(),
+                })
             })
             .collect();
-        let count = pairs.len().max(1) as f64;
-        let squares = pairs.iter().map(|(_, expected, _)| square(*expected));
-        let scale = (squares.sum::<f64>() / count).sqrt();
-        if pairs.is_empty() || scale == 0.0 {
+        let sum = |of: &dyn Fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>();
+        let count = samples.len() as f64;
+        let scale = (sum(&|s| (s.weight * s.expected).length_squared()) / count).sqrt();
+        let weights = sum(&|s| s.weight.element_sum());
+        // Written so that NaN of what is expected goes on.
+        if samples.is_empty() || scale == 0.0 {
             return None;
         }
-        let mean_of = |of: &dyn Fn(&(MaterialId, DVec3, DVec3)) -> f64| {
-            pairs.iter().map(of).sum::<f64>() / count
-        };
-        let mut errors: Vec<f64> = pairs
-            .iter()
-            .map(|(_, expected, found)| square(*found - *expected).sqrt() / scale)
-            .collect();
+        let mut errors: Vec<f64> = samples.iter().map(|s| s.error().length() / scale).collect();
         errors.sort_by(f64::total_cmp);
         let trimmed = &errors[..errors.len() - errors.len() / 100];
         let rms = |errors: &[f64]| {
             let squares = errors.iter().map(|error| error.powi(2));
-            (squares.sum::<f64>() / errors.len().max(1) as f64).sqrt()
+            (squares.sum::<f64>() / errors.len() as f64).sqrt()
         };
+        let mean = |light: &dyn Fn(&Sample) -> DVec3| {
+            sum(&|s| (s.weight * light(s)).element_sum()) / weights
+        };
+        let [expected, found] = [mean(&|s| s.expected), mean(&|s| s.found)];
+        let is_finite = samples.iter().all(|s| s.found.is_finite());
+        let worst_percent = trimmed.last().copied().unwrap_or(0.0);
         Some(Self {
-            points: pairs.len(),
-            unmatched: points.len() - pairs.len(),
-            expected: mean_of(&|(_, expected, _)| mean(*expected)),
-            found: mean_of(&|(_, _, found)| mean(*found)),
-            mean: mean_of(&|(_, expected, found)| mean(*found - *expected)) / scale,
+            points: samples.len(),
+            unmatched: points.len() - samples.len(),
+            expected,
+            found,
+            mean: found / expected - 1.0,
             rms: rms(&errors),
-            trimmed_rms: rms(trimmed),
-            worst_percent: trimmed.last().copied().unwrap_or(0.0),
-            worst_material: worst_material(scene, &pairs, scale),
+            trimmed_rms: if is_finite { rms(trimmed) } else { f64::NAN },
+            worst_percent,
+            worst_material: worst_material(scene, &samples),
         })
     }
 
     /// Where and how it is off, in a clause.
     pub(super) fn remark(&self) -> String {
-        let signed = |share: f64| {
-            let way = if share < 0.0 {
-                "too dark"
-            } else {
-                "too bright"
-            };
-            format!("{:.2} % {way}", 100.0 * share.abs())
-        };
-        let worst = self
-            .worst_material
-            .as_ref()
-            .map_or_else(String::new, |worst| {
-                format!("; most in {}: {}", worst.name, signed(worst.mean))
-            });
+        let worst = self.worst_material.as_ref();
+        let worst = worst.map_or_else(String::new, |worst| {
+            format!("; most in {}: {}", worst.name, signed(worst.mean))
+        });
         format!(
             "mean {}, worst 1 % of {} points off by {:.1} % and more{worst}",
             signed(self.mean),
@@ -121,22 +123,46 @@ impl Deviations {
     }
 }
 
-fn worst_material(
-    scene: &Scene,
-    pairs: &[(MaterialId, DVec3, DVec3)],
-    scale: f64,
-) -> Option<WorstMaterial> {
-    let mut sums: BTreeMap<MaterialId, (f64, usize)> = BTreeMap::new();
-    for (material, expected, found) in pairs {
-        let (sum, count) = sums.entry(*material).or_default();
-        *sum += mean(*found - *expected) / scale;
+/// How far a mean is off.
+fn signed(share: f64) -> String {
+    let percent = 100.0 * share.abs();
+    match share {
+        _ if percent < 0.005 => "right".to_owned(),
+        _ if share < 0.0 => format!("{percent:.2} % too dark"),
+        _ => format!("{percent:.2} % too bright"),
+    }
+}
+
+/// Light at a point.
+struct Sample {
+    material: MaterialId,
+    /// Reflectance.
+    weight: DVec3,
+    /// Irradiance, W/m².
+    expected: DVec3,
+    found: DVec3,
+}
+
+impl Sample {
+    /// Deviation of what is reflected.
+    fn error(&self) -> DVec3 {
+        self.weight * (self.found - self.expected)
+    }
+}
+
+fn worst_material(scene: &Scene, samples: &[Sample]) -> Option<WorstMaterial> {
+    let mut sums: BTreeMap<MaterialId, ([f64; 2], usize)> = BTreeMap::new();
+    for sample in samples {
+        let ([expected, error], count) = sums.entry(sample.material).or_default();
+        *expected += (sample.weight * sample.expected).element_sum();
+        *error += sample.error().element_sum();
         *count += 1;
     }
     sums.into_iter()
-        .filter(|(_, (_, count))| *count >= FEW_POINTS)
-        .map(|(material, (sum, points))| WorstMaterial {
+        .filter(|(_, ([expected, _], count))| *count >= FEW_POINTS && *expected > 0.0)
+        .map(|(material, ([expected, error], points))| WorstMaterial {
             name: material_name(scene, material),
-            mean: sum / points as f64,
+            mean: error / expected,
             points,
         })
         .max_by(|a, b| a.mean.abs().total_cmp(&b.mean.abs()))
@@ -148,14 +174,4 @@ pub(super) fn material_name(scene: &Scene, material: MaterialId) -> String {
         "" => "the material without a name".to_owned(),
         name => format!("'{name}'"),
     }
-}
-
-/// Mean over the channels.
-fn mean(color: DVec3) -> f64 {
-    color.element_sum() / 3.0
-}
-
-/// Mean square over the channels.
-fn square(color: DVec3) -> f64 {
-    color.length_squared() / 3.0
 }

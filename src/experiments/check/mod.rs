@@ -7,8 +7,8 @@
 //! * Copies of another size, far away, mirrored and with another axis up are lit the same.
 //! * The light of all lamps is the sum of the light of each.
 //!
-//! Light is compared at random points of the surfaces, by the root mean square of the deviations without the worst 1 % of
-//! the points.
+//! Light is compared at random points of the surfaces, by what is reflected of it: the root mean square of the deviations
+//! without the worst 1 % of the points, as errors are measured elsewhere. What is not seen does not count.
 
 mod laws;
 mod measures;

@@ -1,12 +1,10 @@
 //! What surfaces see: whether light can leave, or end on the black backs of one-sided faces.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::{
-    geometry::{
-        Hit, RAY_OFFSET, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d,
-    },
+    geometry::{Hit, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     reference::ReferencePoint,
     scene::{Scene, TriangleId},
     solver::Cancel,
@@ -26,22 +24,21 @@ const MOST_BOUNCES: u32 = 200;
 /// a closed scene that reflects half is known to twice that.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// Axes along which is told what lies within solids. Oblique, so that edges of upright walls are missed.
-const PROBES: [Vec3; 3] = [
-    Vec3::new(0.36, 0.48, 0.8),
-    Vec3::new(-0.6, 0.64, 0.48),
-    Vec3::new(0.48, -0.8, -0.36),
-];
+/// Rays from the middle of each side that tell whether it is apart.
+const SIDE_RAYS: u32 = 6;
 
 /// What all surfaces see.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Survey {
-    /// By side (twice the triangle, plus 1 for the back): whether it lies within a solid, where no light comes.
-    is_buried: Vec<bool>,
-    /// Part of the rays from all lit sides that are not buried that leave the scene, 0…1.
+    /// By side (twice the triangle, plus 1 for the back): whether most that it sees is outside or black backs, as of what
+    /// lies within a solid or reaches out through a wall.
+    is_apart: Vec<bool>,
+    /// Part of the rays from all other lit sides that leave the scene, 0…1.
     pub(super) leaving: f64,
     /// Part of them that end on black backs, 0…1.
     pub(super) blocked: f64,
+    /// Whether any ray met a black back.
+    has_backs: bool,
 }
 
 /// Where a ray ends.
@@ -63,13 +60,11 @@ impl Survey {
         seed: u64,
         cancel: &Cancel,
     ) -> Option<Self> {
-        let bounds = |triangle: TriangleId| scene.triangles[triangle.index()].bounds_solid;
-        let has_solids = scene.triangle_ids().any(bounds);
-        let is_buried: Vec<bool> = (0..scene.triangles.len() as u32)
+        let is_apart: Vec<bool> = (0..scene.triangles.len() as u32)
             .into_par_iter()
             .flat_map_iter(|index| {
-                let of = |is_back| is_buried(scene, rays, TriangleId(index), is_back);
-                [false, true].map(|is_back| has_solids && of(is_back))
+                let of = |is_back| is_apart(scene, rays, TriangleId(index), is_back);
+                [false, true].map(|is_back| !cancel.is_cancelled() && of(is_back))
             })
             .collect();
         let ends: Vec<[u32; 3]> = points
@@ -77,7 +72,7 @@ impl Survey {
             .enumerate()
             .map(|(index, point)| {
                 let mut counts = [0; 3];
-                if is_buried[side(point)] || cancel.is_cancelled() {
+                if cancel.is_cancelled() {
                     return counts;
                 }
                 let shift = Random::new(seed, index as u64).uniform_2d();
@@ -95,19 +90,27 @@ impl Survey {
         if cancel.is_cancelled() {
             return None;
         }
-        let sum = |of: usize| ends.iter().map(|counts| f64::from(counts[of])).sum::<f64>();
-        let [lit, outside, back] = [0, 1, 2].map(sum);
-        let all = (lit + outside + back).max(1.0);
+        let part_of = |end: usize| {
+            let enclosed = points
+                .iter()
+                .zip(&ends)
+                .filter(|(point, _)| !is_apart[side(point)]);
+            let (some, all) = enclosed.fold((0, 0), |(some, all), (_, counts)| {
+                (some + u64::from(counts[end]), all + u64::from(RAYS))
+            });
+            some as f64 / all.max(1) as f64
+        };
         Some(Self {
-            is_buried,
-            leaving: outside / all,
-            blocked: back / all,
+            leaving: part_of(1),
+            blocked: part_of(2),
+            has_backs: ends.iter().any(|counts| counts[2] > 0),
+            is_apart,
         })
     }
 
-    /// Whether a side lies within a solid.
-    pub(super) fn is_buried(&self, triangle: TriangleId, is_back: bool) -> bool {
-        self.is_buried[2 * triangle.index() + usize::from(is_back)]
+    /// Whether a side is no part of what the others enclose.
+    pub(super) fn is_apart(&self, triangle: TriangleId, is_back: bool) -> bool {
+        self.is_apart[2 * triangle.index() + usize::from(is_back)]
     }
 
     /// Why the scene is not closed; `None` where it is.
@@ -133,10 +136,7 @@ impl Survey {
         cancel: &Cancel,
     ) -> Option<Vec<bool>> {
         let sees = |(index, point): (usize, &ReferencePoint)| {
-            if self.is_buried[side(point)] {
-                return true;
-            }
-            if self.blocked <= 0.0 || cancel.is_cancelled() {
+            if !self.has_backs || cancel.is_cancelled() {
                 return false;
             }
             let mut random = Random::new(!seed, index as u64);
@@ -152,25 +152,23 @@ fn side(point: &ReferencePoint) -> usize {
     2 * point.triangle.index() + usize::from(point.is_back)
 }
 
-/// Whether the middle of a side lies within a solid, by most of three rays.
-fn is_buried(scene: &Scene, rays: &RayTree, triangle: TriangleId, is_back: bool) -> bool {
+/// Whether most that is seen from the middle of a side is outside or black backs; not for backs that are black themselves.
+fn is_apart(scene: &Scene, rays: &RayTree, triangle: TriangleId, is_back: bool) -> bool {
+    if is_back && !scene.triangles[triangle.index()].two_sided {
+        return false;
+    }
     let [a, b, c] = scene.corners(triangle);
     let front = scene.surfaces[triangle.index()]
         .area_vector
         .normalize_or_zero();
     let normal = if is_back { -front } else { front };
-    let bounds = |id: TriangleId| scene.triangles[id.index()].bounds_solid;
-    let middle = (a + b + c) / 3.0 + normal * RAY_OFFSET;
-    let is_within = |probe: &&Vec3| {
-        // Upward from the side, so that its own neighbours are left behind.
-        let direction = if probe.dot(normal) < 0.0 {
-            -**probe
-        } else {
-            **probe
-        };
-        rays.solids_left(middle, direction, Some(triangle), bounds) > 0
+    let middle = (a + b + c) / 3.0;
+    let is_lit = |ray: &u32| {
+        let direction = cosine_direction(normal, low_discrepancy_2d(*ray, Vec2::splat(0.3)));
+        let hit = rays.closest(middle, direction, Some(triangle));
+        hit.is_some_and(|hit| arrival(scene, middle, direction, hit).is_some())
     };
-    PROBES.iter().filter(is_within).count() >= 2
+    2 * (0..SIDE_RAYS).filter(is_lit).count() < SIDE_RAYS as usize
 }
 
 /// Follow a diffuse path until light would be absorbed, and tell whether it ends on a back before.
