@@ -9,6 +9,7 @@ use super::{
     Check, Deviations, Law, ONE_REFLECTANCE, Verdict,
     measures::material_name,
     survey::arrival,
+    table::per_cent,
 };
 use crate::{
     geometry::RayTree,
@@ -273,10 +274,10 @@ fn verdict(claim: &Claim, what: &str, remark: &str) -> Verdict {
     if claim.holds() {
         return Verdict::Holds;
     }
-    let [off, most] = [claim.deviation, claim.allowed].map(|share| 100.0 * share);
+    let [off, most] = [claim.deviation, claim.allowed].map(per_cent);
     let colon = if remark.is_empty() { "" } else { ": " };
     Verdict::Fails(format!(
-        "{what} is off by {off:.2} %, more than {most} %{colon}{remark}"
+        "{what} is off by {off}, more than {most}{colon}{remark}"
     ))
 }
 

@@ -78,7 +78,6 @@ impl Deviations {
         let count = samples.len() as f64;
         let scale = (sum(&|s| (s.weight * s.expected).length_squared()) / count).sqrt();
         let weights = sum(&|s| s.weight.element_sum());
-        // Written so that NaN of what is expected goes on.
         if samples.is_empty() || scale == 0.0 {
             return None;
         }

@@ -169,11 +169,14 @@ impl Check {
     fn lit_by(light: Box<Light>, subject: Subject, cancel: &Cancel) -> Option<Self> {
         let (scene, seed) = (&subject.scene, subject.settings.seed);
         let rays = RayTree::new(scene);
-        let sampled = |scene: &Scene| -> Vec<ReferencePoint> {
-            let (points, _) = sample_points(scene, &rays, POINTS, seed);
+        let sampled = |painted: &Scene| -> Vec<ReferencePoint> {
+            let (points, _) = sample_points(painted, &rays, POINTS, seed);
+            let points = points.into_iter().map(|point| ReferencePoint {
+                reflectance: scene.reflectance_at(point.triangle, point.barycentric),
+                ..ReferencePoint::from(point)
+            });
             let is_there =
                 |point: &ReferencePoint| scene.opacity_at(point.triangle, point.barycentric) > 0.0;
-            let points = points.into_iter().map(ReferencePoint::from);
             points.filter(is_there).collect()
         };
         let bare = scene.with_one_reflectance(ONE_REFLECTANCE, Some(Vec3::ZERO));
