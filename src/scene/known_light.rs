@@ -103,3 +103,110 @@ impl Scene {
         painted
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec2};
+
+    use super::*;
+    use crate::scene::{Cutout, CutoutId, Face, MaterialId, SceneBuilder, SceneOptions};
+
+    /// A triangle of each material, under texture coordinates.
+    fn scene(materials: Vec<Material>) -> Scene {
+        let mut builder = SceneBuilder::default();
+        builder.textures.push(Texture {
+            name: String::new(),
+            width: 4,
+            height: 1,
+            pixels: [0.1, 0.9, 0.4, 0.6]
+                .map(|red| Vec3::new(red, 0.5, 1.0))
+                .to_vec(),
+        });
+        builder
+            .cutouts
+            .push(Cutout::new("", [2, 2], |column, _| column == 0));
+        for (number, material) in materials.into_iter().enumerate() {
+            builder.push_material(material);
+            let corners = [DVec3::ZERO, DVec3::X, DVec3::Y]
+                .map(|corner| builder.push_position(corner + DVec3::Z * number as f64));
+            builder.faces.push(Face {
+                corners,
+                texcoords: Some([Vec2::ZERO, Vec2::X * 0.8, Vec2::Y]),
+                normals: None,
+                material: MaterialId(number as u32),
+                line: 0,
+            });
+        }
+        builder.finish(&SceneOptions::default()).expect("faces")
+    }
+
+    fn materials() -> Vec<Material> {
+        let grey = Material::plain("grey", Vec3::new(0.2, 0.5, 0.98), Vec3::splat(7.0));
+        let painted = Material {
+            reflectance_texture: Some(TextureId(0)),
+            emission_texture: Some(TextureId(0)),
+            ..grey.clone()
+        };
+        let glass = Material {
+            opacity: 0.25,
+            filter: Vec3::new(1.0, 0.5, 0.0),
+            ..painted.clone()
+        };
+        let leaf = Material {
+            cutout: Some(CutoutId(0)),
+            ..painted.clone()
+        };
+        let air = Material {
+            opacity: 0.0,
+            filter: Vec3::X,
+            ..grey.clone()
+        };
+        vec![grey, painted, glass, leaf, air]
+    }
+
+    #[test]
+    fn an_evenly_lit_surface_emits_what_it_absorbs() {
+        let own = scene(materials());
+        let even = own.evenly_lit();
+        for (index, triangle) in even.triangle_ids().enumerate() {
+            let (surface, material) = (even.surfaces[index], &even.materials[index]);
+            assert_eq!(surface.reflectance, own.surfaces[index].reflectance);
+            // What is there, on average: the cut-out leaves a part of each pixel that the texture shows.
+            let there = match material.cutout {
+                Some(_) => surface.opacity,
+                None => 1.0,
+            };
+            let sum = surface.emission + surface.reflectance + material.transmission();
+            assert!(
+                (sum - there).abs().max_element() < 1e-5,
+                "{}: {sum}",
+                material.name
+            );
+            // At points, of what rays meet there.
+            for at in [Vec3::splat(1.0 / 3.0), Vec3::new(0.7, 0.1, 0.2), Vec3::X] {
+                let met = even.emission_at(triangle, at) + even.reflectance_at(triangle, at);
+                let seen = met * material.met_share() + material.transmission();
+                assert!(
+                    (seen - 1.0).abs().max_element() < 1e-5,
+                    "{}: {seen}",
+                    material.name
+                );
+            }
+        }
+        assert!(!even.environment.is_dark() && own.environment.is_dark());
+    }
+
+    #[test]
+    fn one_reflectance_leaves_lamps_and_what_passes() {
+        let own = scene(materials());
+        let lit = own.with_one_reflectance(0.5, None);
+        let bare = own.with_one_reflectance(0.5, Some(Vec3::ZERO));
+        for (index, surface) in lit.surfaces.iter().enumerate() {
+            assert_eq!(surface.emission, own.surfaces[index].emission);
+            assert_eq!(bare.surfaces[index].emission, Vec3::ZERO);
+            let expected = 0.5 * surface.opacity;
+            assert!((surface.reflectance - expected).abs().max_element() < 1e-6);
+        }
+        assert!(!bare.has_light());
+    }
+}

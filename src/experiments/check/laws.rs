@@ -120,15 +120,19 @@ impl<'a> Trial<'a> {
         if let Some(why) = self.check.survey.opening() {
             return Err(Trouble::NotApplicable(why));
         }
-        let scene = &self.check.subject.scene;
-        let emission = (!scene.has_emitter()).then_some(Vec3::ONE);
+        let (scene, survey) = (&self.check.subject.scene, &self.check.survey);
+        let shines = |triangle: TriangleId| {
+            let emits = scene.surfaces[triangle.index()].emission != Vec3::ZERO;
+            let is_lit_from_it = |is_back| !survey.is_apart(triangle, is_back);
+            emits && (is_lit_from_it(false) || is_lit_from_it(true))
+        };
+        let emission = (!scene.triangle_ids().any(shines)).then_some(Vec3::ONE);
         if emission.is_some() {
-            let remark = "nothing in it emits, so all of it does here";
+            let remark = "nothing within emits, so all of it does here";
             self.finding.remarks.push(remark.to_owned());
         }
         let painted = Arc::new(scene.with_one_reflectance(ONE_REFLECTANCE, emission));
         let lit = self.light(&painted)?;
-        let survey = &self.check.survey;
         // What absorbs light, by the part of it that is met.
         let weight = |triangle: TriangleId, is_back: bool| {
             let opacity = painted.surfaces[triangle.index()].opacity;
@@ -154,7 +158,12 @@ impl<'a> Trial<'a> {
             |power: DVec3| power.element_sum() / 3.0 / area * f64::from(painted.radiance_unit);
         let expected = mean(power) / (1.0 - f64::from(ONE_REFLECTANCE));
         let limit = self.check.limit();
-        let claim = Claim::near("mean E of all surfaces", expected, mean(arriving), limit);
+        let claim = Claim::near(
+            "mean E of what encloses light",
+            expected,
+            mean(arriving),
+            limit,
+        );
         let verdict = verdict(&claim, "the mean irradiance", "");
         self.finding.claim = Some(claim);
         Ok(verdict)

@@ -290,3 +290,6 @@ impl Outcome {
         self.verdict == Verdict::Stopped
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -37,6 +37,8 @@ pub(super) struct Survey {
     pub(super) leaving: f64,
     /// Part of them that end on black backs, 0…1.
     pub(super) blocked: f64,
+    /// Whether there are such sides.
+    encloses: bool,
     /// Whether any ray met a black back.
     has_backs: bool,
 }
@@ -101,6 +103,7 @@ impl Survey {
             some as f64 / all.max(1) as f64
         };
         Some(Self {
+            encloses: points.iter().any(|point| !is_apart[side(point)]),
             leaving: part_of(1),
             blocked: part_of(2),
             has_backs: ends.iter().any(|counts| counts[2] > 0),
@@ -115,7 +118,10 @@ impl Survey {
 
     /// Why the scene is not closed; `None` where it is.
     pub(super) fn opening(&self) -> Option<String> {
-        let part = |share: f64| format!("{:.2} % of all rays", 100.0 * share);
+        let part = |share: f64| format!("{:.2} % of the rays within", 100.0 * share);
+        if !self.encloses {
+            return Some("open".to_owned());
+        }
         if self.leaving > NEGLIGIBLE {
             return Some(format!("open: {} leave", part(self.leaving)));
         }
@@ -152,10 +158,10 @@ fn side(point: &ReferencePoint) -> usize {
     2 * point.triangle.index() + usize::from(point.is_back)
 }
 
-/// Whether most that is seen from the middle of a side is outside or black backs; not for backs that are black themselves.
+/// Whether most that is seen from the middle of a side is outside or black backs. Backs that are black themselves are no part of anything.
 fn is_apart(scene: &Scene, rays: &RayTree, triangle: TriangleId, is_back: bool) -> bool {
     if is_back && !scene.triangles[triangle.index()].two_sided {
-        return false;
+        return true;
     }
     let [a, b, c] = scene.corners(triangle);
     let front = scene.surfaces[triangle.index()]

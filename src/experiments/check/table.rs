@@ -64,11 +64,11 @@ pub fn summary(outcomes: &[Outcome]) -> Result<String, String> {
     })
 }
 
-/// A share in per cent, with two digits or so.
+/// A share in per cent.
 pub(super) fn per_cent(share: f64) -> String {
     match 100.0 * share {
-        percent if percent.abs() < 0.995 => format!("{percent:.2} %"),
-        percent => format!("{percent:.1} %"),
+        percent if percent.abs() < 9.95 => format!("{percent:.2} %"),
+        percent => format!("{percent:.0} %"),
     }
 }
 
