@@ -91,6 +91,36 @@ fn a_closed_file_has_the_mean_light_that_is_known() {
 }
 
 #[test]
+fn convex_bodies_and_lone_sheets_are_lit_by_the_sky_around_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let outward = |line: &str| match line.strip_prefix("f ") {
+        Some(corners) => format!(
+            "f {}\n",
+            corners.split(' ').rev().collect::<Vec<_>>().join(" ")
+        ),
+        None => format!("{line}\n"),
+    };
+    let body: String = CUBE.lines().skip(1).map(outward).collect();
+    fs::write(folder.path().join("body.obj"), body).unwrap();
+    let sheet = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(folder.path().join("sheet.obj"), sheet).unwrap();
+    for name in ["body.obj", "sheet.obj"] {
+        let output = check(folder.path(), &[name, "--preset", "draft", "-q"]);
+        let said = text(&output.stdout);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{name}: {said}{}",
+            text(&output.stderr)
+        );
+        assert!(
+            said.contains("| constant radiance | 3.1416 | 3.14"),
+            "{name}: {said}"
+        );
+    }
+}
+
+#[test]
 fn light_outside_its_limit_ends_with_code_1_and_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     // Nothing can be as right as that.
