@@ -124,7 +124,7 @@ mod tests {
         });
         builder
             .cutouts
-            .push(Cutout::new("", [2, 2], |column, _| column == 0));
+            .push(Cutout::new("", [4, 1], |column, _| column < 2));
         for (number, material) in materials.into_iter().enumerate() {
             builder.push_material(material);
             let corners = [DVec3::ZERO, DVec3::X, DVec3::Y]
