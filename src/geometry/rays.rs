@@ -167,9 +167,8 @@ impl RayTree {
                 let triangle = TriangleId(met.triangle);
                 let is_nearer = counted < nearest
                     || counted == nearest && hit.is_none_or(|hit| triangle.0 < hit.triangle.0);
-                let is_there = |panes: &Panes| {
-                    meets(panes, met.triangle, point_at(&ray, met.distance))
-                };
+                let is_there =
+                    |panes: &Panes| meets(panes, met.triangle, point_at(&ray, met.distance));
                 if is_nearer && self.panes.as_deref().is_none_or(is_there) {
                     nearest = counted;
                     hit = Some(Hit {

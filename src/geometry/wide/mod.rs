@@ -70,7 +70,12 @@ impl Tree {
     /// Calls `on_met` with the triangles on a ray in no order that means anything, but always the same, until it returns
     /// false; says whether it never did. A ray that is not finite meets nothing.
     #[inline]
-    pub(super) fn each(&self, ray: &Ray, reach: Reach, mut on_met: impl FnMut(Met) -> bool) -> bool {
+    pub(super) fn each(
+        &self,
+        ray: &Ray,
+        reach: Reach,
+        mut on_met: impl FnMut(Met) -> bool,
+    ) -> bool {
         let until = reach.until;
         self.descend::<false>(ray, reach, |met| on_met(met).then_some(until))
     }
@@ -78,7 +83,12 @@ impl Tree {
     /// Calls `on_met` with the triangles on a ray, near ones first as far as their boxes tell. It returns the distance
     /// up to which triangles still count, at most the last one.
     #[inline]
-    pub(super) fn nearest_first(&self, ray: &Ray, reach: Reach, mut on_met: impl FnMut(Met) -> f32) {
+    pub(super) fn nearest_first(
+        &self,
+        ray: &Ray,
+        reach: Reach,
+        mut on_met: impl FnMut(Met) -> f32,
+    ) {
         self.descend::<true>(ray, reach, |met| Some(on_met(met)));
     }
 
@@ -90,6 +100,10 @@ impl Tree {
         mut reach: Reach,
         mut on_met: impl FnMut(Met) -> Option<f32>,
     ) -> bool {
+        // What is not a number would be within every box.
+        if !ray.is_finite() {
+            return true;
+        }
         let mut stack = Stack::new();
         let mut current = self.root;
         loop {

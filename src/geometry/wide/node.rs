@@ -81,7 +81,9 @@ impl Node {
                 let side = (ray.near_side[axis] + 1) % 2;
                 ray.far.distances(axis, self.sides[axis][side][half])
             };
-            let near = near(0).max(near(1)).max(near(2).max(Vec4::splat(reach.from)));
+            let near = near(0)
+                .max(near(1))
+                .max(near(2).max(Vec4::splat(reach.from)));
             let far = far(0).min(far(1)).min(far(2).min(Vec4::splat(reach.until)));
             (near, near.cmple(far).bitmask())
         };

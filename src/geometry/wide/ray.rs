@@ -75,6 +75,12 @@ impl Ray {
         }
     }
 
+    /// Whether the ray is made of numbers that are not beyond all bounds.
+    #[inline]
+    pub(super) fn is_finite(&self) -> bool {
+        (self.origin + self.direction).element_sum().is_finite()
+    }
+
     /// The distances between which the ray is in a box; the first is the larger one if it passes by.
     #[inline]
     pub(super) fn within(&self, bounds: &Bounds) -> [f32; 2] {
