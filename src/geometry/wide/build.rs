@@ -147,12 +147,13 @@ fn plans(binary: &Bvh2) -> Vec<Plan> {
 fn planned(area: f32, first: &Least, second: &Least) -> (Plan, Least) {
     let mut plan = Plan::default();
     let mut costs = [f32::MAX; WIDTH];
-    for slots in 1..WIDTH {
+    let choices = costs.iter_mut().zip(&mut plan.firsts);
+    for (slots, (least, firsts)) in choices.enumerate().skip(1) {
         for of_first in 0..slots {
             let cost = first.costs[of_first] + second.costs[slots - 1 - of_first];
-            if cost < costs[slots] {
-                costs[slots] = cost;
-                plan.firsts[slots] = of_first as u8 + 1;
+            if cost < *least {
+                *least = cost;
+                *firsts = of_first as u8 + 1;
             }
         }
     }
