@@ -114,6 +114,7 @@ impl Stepper for FakeSolver {
             linked: Vec3::ZERO,
             direct: Vec3::ZERO,
             row_sum: 0.0,
+            error_bound: 0.0,
             path: Vec::new(),
         })
     }

@@ -16,6 +16,7 @@ impl Solver {
             surfaces: self.surfaces(),
             linked: &self.linked,
             reading: self.settings.method.reading(),
+            is_clear: self.plan.is_clear,
             coverage: &self.coverage,
             leaves: &self.leaves,
             boxes: &self.snapshot.clusters,

@@ -2,18 +2,15 @@
 //! nodes.
 
 use super::{
-    Judgement, Link, element_form_factor, element_form_factors,
+    Judgement, Link, element_form_factor, element_form_factors, is_too_near_for_tables,
     kernel::inner_points,
+    link::LEAST_RAYS,
     refiner::{Decision, Refinement, Refiner},
 };
 use crate::{
     geometry::Vectors4,
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
 };
-
-/// Fewest visibility rays of a link. Fewer, and the two halves that correct the bias are missing; more cost time on all
-/// weak links.
-const LEAST_RAYS: u32 = 2;
 
 /// Most visibility rays of a link. Fewer, and strong links are noisy; more cost time.
 const MOST_RAYS: u32 = 8;
@@ -85,7 +82,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 self.link(source, receiver, error, ray_count, out)
             }
         };
-        if self.judge.is_too_near_for_tables(source, receiver) {
+        if is_too_near_for_tables(self.hierarchy(), source, receiver) {
             // A few rays must not decide: among pairs of low visibility, only those without any hit would stay.
             return Decision::Keep(link.with_error(bound));
         }
@@ -95,9 +92,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if let (false, Some(decision)) = (fits(error), self.division(source, receiver)) {
             return decision;
         }
-        // The bound of the transfer, and twice the standard error of a visibility that `LEAST_RAYS` rays estimate.
-        let share = (visibility.min(1.0) * LEAST_RAYS as f32 + 1.0) / (LEAST_RAYS as f32 + 2.0);
-        let deviation = (share * (1.0 - share) / LEAST_RAYS as f32).sqrt();
+        // The bound of the transfer, and twice the standard error of the visibility.
+        let deviation = link.visibility_variance().sqrt();
         Decision::Keep(link.with_error(bound + 2.0 * deviation * irradiance))
     }
 
@@ -195,7 +191,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mut random = self.random(source, receiver);
         let hierarchy = self.hierarchy();
         let sampler = self.judge.sampler;
-        let (visibility, of_area) = if self.judge.is_too_near_for_tables(source, receiver) {
+        let (visibility, of_area) = if is_too_near_for_tables(self.hierarchy(), source, receiver) {
             let ray_count = (2 * ray_count).clamp(*NEAR_RAYS.start(), *NEAR_RAYS.end());
             out.ray_count += u64::from(ray_count);
             let seen = sampler.seen_fraction(source, receiver, ray_count, &mut random);

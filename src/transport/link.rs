@@ -6,6 +6,10 @@ use glam::{Vec3, Vec4};
 
 use crate::hierarchy::{Hierarchy, NodeId};
 
+/// Fewest visibility rays of a link. Fewer, and the two halves that correct the bias are missing; more cost time on all
+/// weak links.
+pub(super) const LEAST_RAYS: u32 = 2;
+
 /// Transport from a source to one receiver. The receiver is implied by where the link is stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
@@ -58,6 +62,13 @@ impl Link {
     /// The form factor, visibility included, 0…1. Only between elements.
     pub fn form_factor(&self) -> f32 {
         self.form_or_area_factor
+    }
+
+    /// Variance of the visibility as an estimate of [`LEAST_RAYS`] rays, with a prior of one ray seen and one not.
+    pub fn visibility_variance(&self) -> f32 {
+        let rays = LEAST_RAYS as f32;
+        let share = (self.light_factor.min(1.0) * rays + 1.0) / (rays + 2.0);
+        share * (1.0 - share) / rays
     }
 
     /// Factor by channel of an unoccluded irradiance, where one end at least is a cluster.

@@ -1,5 +1,6 @@
 //! Transport between pairs of nodes: the kernel, visibility, the error oracle, refinement, and the links.
 
+mod bounds;
 mod clear;
 mod decide;
 mod kernel;
@@ -13,10 +14,11 @@ mod tint;
 mod validate;
 mod visibility;
 
+pub use bounds::{Face, Interval};
 pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};
 pub use link::{Link, LinkStore, TintedLink, TintedLinks};
 pub(crate) use oracle::self_irradiance;
-pub use oracle::{Estimate, Judge, Judgement};
+pub use oracle::{Estimate, Judge, Judgement, is_too_near_for_tables};
 pub use patch_sums::PatchSums;
 pub use refiner::{LinkBudget, Refinement, Refiner};
 pub use sights::Sights;

@@ -85,21 +85,6 @@ impl Judge<'_> {
         self.can_face(source, receiver) && self.can_face(receiver, source)
     }
 
-    /// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is
-    /// undetermined, and the tables say nothing.
-    pub fn is_too_near_for_tables(&self, source: NodeId, receiver: NodeId) -> bool {
-        let hierarchy = self.hierarchy();
-        let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
-        let are_elements = [source, receiver]
-            .iter()
-            .all(|&node| matches!(hierarchy.kind(node), Kind::Element(_)));
-        !are_elements
-            && hierarchy
-                .centroid(source)
-                .distance(hierarchy.centroid(receiver))
-                <= reach
-    }
-
     /// Luminance of a quantity of light, with the ambient radiosity added.
     fn judged(&self, light: Vec4) -> f32 {
         luminance(light) + self.ambient * light.unit_response()
@@ -261,6 +246,18 @@ impl Judge<'_> {
         let power = self.judged(self.kernel.projected_power(source, unit));
         power * self.kernel.projected_power(receiver, -unit).area() / (PI * squared * area)
     }
+}
+
+/// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is undetermined,
+/// and the tables say nothing.
+pub fn is_too_near_for_tables(hierarchy: &Hierarchy, source: NodeId, receiver: NodeId) -> bool {
+    let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
+    let is_element = |&node: &NodeId| matches!(hierarchy.kind(node), Kind::Element(_));
+    !([source, receiver].iter().all(is_element))
+        && hierarchy
+            .centroid(source)
+            .distance(hierarchy.centroid(receiver))
+            <= reach
 }
 
 /// Mean irradiance of a cluster that received all of this power itself.

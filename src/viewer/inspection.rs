@@ -118,6 +118,7 @@ mod tests {
             linked: Vec3::ZERO,
             direct: Vec3::ZERO,
             row_sum: 0.0,
+            error_bound: 0.0,
             path: Vec::new(),
         })
     }

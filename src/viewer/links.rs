@@ -140,6 +140,7 @@ mod tests {
             linked: Vec3::splat(10.0),
             direct: Vec3::ZERO,
             row_sum: 0.3,
+            error_bound: 0.0,
             path: Vec::new(),
         }
     }

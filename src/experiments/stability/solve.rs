@@ -108,7 +108,7 @@ fn broken_by(report: &StepReport) -> Option<String> {
         ("smallest row sum", f64::from(report.row_sum_min)),
         ("mean row sum", f64::from(report.row_sum_mean)),
         ("largest row sum", f64::from(report.row_sum_max)),
-        ("estimated error", f64::from(report.error_bound)),
+        ("error bound", f64::from(report.error_bound)),
     ];
     figures
         .into_iter()

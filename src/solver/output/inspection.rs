@@ -44,7 +44,7 @@ pub struct InspectedLink {
     pub irradiance: Vec3,
     /// Its part of the sum of form factors, visibility included.
     pub form_factor: f32,
-    /// Estimated error of the receiver's irradiance (luminance); infinite if it is unknown.
+    /// Bound of the error of its irradiance of the inspected node (luminance), W/m²; of a cluster, at any face below it.
     pub error: f32,
 }
 
@@ -87,6 +87,10 @@ pub struct Inspection {
     /// Sum of form factors: about 1 for a leaf of an enclosed scene; less for a cluster, whose descendants have links
     /// of their own.
     pub row_sum: f32,
+    /// Bound of the error of the light over links, before it is scaled to the coverage (luminance of the irradiance,
+    /// W/m²), for what the sources send: the kernel's by bounds, and twice the standard error of the visibilities. Of a
+    /// cluster, the sum of the errors of the links.
+    pub error_bound: f32,
     /// The path from the root to the inspected node.
     pub path: Vec<PathNode>,
 }

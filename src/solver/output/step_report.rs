@@ -42,7 +42,8 @@ pub struct StepReport {
     pub row_sum_mean: f32,
     /// Largest sum of form factors of an element.
     pub row_sum_max: f32,
-    /// Sum of the estimated errors of the links, root mean square over the area, relative to the mean irradiance.
+    /// Bound of the error of the light over links, root mean square over the area, relative to the mean irradiance: see
+    /// [`Inspection::error_bound`](super::Inspection::error_bound).
     pub error_bound: f32,
     /// Estimated error of the light shown; `None` where it was not estimated.
     pub estimated_error: Option<EstimatedError>,

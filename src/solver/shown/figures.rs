@@ -2,6 +2,7 @@
 
 use std::f32::consts::PI;
 
+use super::leaf_bounds::Bounding;
 use crate::{
     hierarchy::{Channels as _, Hierarchy, luminance},
     solver::{
@@ -19,6 +20,7 @@ pub(crate) fn fill(
     surfaces: Surfaces<'_>,
     linked: &LinkedLight,
     leaves: &[LeafLight],
+    bounding: Bounding<'_>,
 ) {
     let hierarchy = surfaces.hierarchy;
     report.links = linked.links.len() as u64;
@@ -26,7 +28,8 @@ pub(crate) fn fill(
     report.elements = leaves.len() as u64;
     report.vertices = hierarchy.mesh.vertices.len() as u64;
     report.energy_balance = energy_balance(surfaces, linked);
-    report.error_bound = error_bound(surfaces, linked, leaves);
+    let mean = mean(hierarchy, |leaf| linked.total(surfaces, leaf));
+    report.error_bound = bounding.relative_error(leaves, luminance(mean));
     fill_row_sums(report, hierarchy, linked);
 }
 
@@ -47,28 +50,6 @@ fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
         reflectance * linked.total(surfaces, leaf) + emitted + outside
     });
     if sent > 0.0 { arrived / sent } else { 1.0 }
-}
-
-/// Root mean square over the area of the sum of link errors, relative to the mean irradiance.
-fn error_bound(surfaces: Surfaces<'_>, linked: &LinkedLight, leaves: &[LeafLight]) -> f32 {
-    let hierarchy = surfaces.hierarchy;
-    let sum: f64 = leaves
-        .iter()
-        .map(|leaf| {
-            let element = &hierarchy.mesh.elements[leaf.element as usize];
-            let measure = hierarchy.importance.measure(element.patch as usize);
-            let area = element.area_vector.length() * measure;
-            f64::from(area) * f64::from(leaf.error).powi(2)
-        })
-        .sum();
-    let mean = mean(hierarchy, |leaf| linked.total(surfaces, leaf));
-    let reference = f64::from(luminance(mean));
-    let root = (sum / hierarchy.importance.area.max(f64::MIN_POSITIVE)).sqrt();
-    if reference > 0.0 {
-        (root / reference) as f32
-    } else {
-        0.0
-    }
 }
 
 /// Fill in the sums of form factors: the irradiance of leaves if every radiosity were 1.

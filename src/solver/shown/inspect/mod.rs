@@ -11,6 +11,10 @@ use std::f32::consts::PI;
 
 use glam::{Vec3, Vec4};
 
+use super::{
+    leaf_bounds::{BoundedLink, Bounding},
+    path::path_to,
+};
 use crate::{
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Reading},
     solver::{
@@ -18,7 +22,7 @@ use crate::{
         coverage::CoverageMap,
         direct::Surfaces,
         iteration::LinkedLight,
-        vertices::{LeafLight, link_irradiance, own_irradiance},
+        vertices::{LeafLight, own_irradiance},
     },
     transport::{Kernel, TintedLink, luminance},
 };
@@ -32,6 +36,8 @@ pub(crate) struct Inspector<'a> {
     pub linked: &'a LinkedLight,
     /// How tables are read.
     pub reading: Option<Reading>,
+    /// Whether nothing is ever hidden.
+    pub is_clear: bool,
     /// Coverage to which form factors are scaled.
     pub coverage: &'a CoverageMap,
     /// Linked light of the leaves when they gathered last.
@@ -50,8 +56,8 @@ impl<'a> Inspector<'a> {
             Subject::Cluster(node) => (node.index() < hierarchy.clusters.len()).then_some(node)?,
             Subject::Element { node, point } => self.leaf_at(node, point)?,
         };
-        let path = self.path_to(node);
-        let mut links = self.links_along(&path, node);
+        let path = path_to(hierarchy, node);
+        let (mut links, error_bound) = self.links_along(&path, node);
         let row_sum = links.iter().map(|link| link.form_factor).sum();
         let (direct, scale) = match hierarchy.kind(node) {
             Kind::Element(leaf) => {
@@ -73,6 +79,7 @@ impl<'a> Inspector<'a> {
             linked: links.iter().map(|link| link.irradiance).sum(),
             direct,
             row_sum,
+            error_bound,
             path: path
                 .iter()
                 .enumerate()
@@ -98,70 +105,43 @@ impl<'a> Inspector<'a> {
         Some(NodeId((base + leaf) as u32))
     }
 
-    /// The path from the root to a node.
-    fn path_to(&self, node: NodeId) -> Vec<NodeId> {
-        let hierarchy = self.hierarchy();
-        let as_nodes = |clusters: Vec<usize>| clusters.into_iter().map(|at| NodeId(at as u32));
-        match hierarchy.kind(node) {
-            Kind::Cluster(index) => {
-                let first_patch = hierarchy.clusters[index].start as usize;
-                let mut path: Vec<NodeId> =
-                    as_nodes(hierarchy.clusters_over(first_patch).collect()).collect();
-                // All ancestors of its first patch that are not descendants of the cluster.
-                path.retain(|above| *above <= node);
-                path
-            }
-            Kind::Element(index) => {
-                let elements = &hierarchy.mesh.elements;
-                let mut below = vec![index];
-                let mut at = index;
-                while elements[at].parent != u32::MAX {
-                    at = elements[at].parent as usize;
-                    below.push(at);
-                }
-                let base = hierarchy.clusters.len();
-                let mut path: Vec<NodeId> = as_nodes(
-                    hierarchy
-                        .clusters_over(elements[index].patch as usize)
-                        .collect(),
-                )
-                .collect();
-                path.extend(below.iter().rev().map(|at| NodeId((base + at) as u32)));
-                path
-            }
-        }
-    }
-
-    /// The links of all nodes of a path with their irradiance at its last node, not yet scaled to the coverage.
-    fn links_along(&self, path: &[NodeId], node: NodeId) -> Vec<InspectedLink> {
-        let kernel = self.kernel();
-        let mut found = Vec::new();
-        for &receiver in path {
-            let place = self.place(receiver);
-            self.linked.links.tinted(receiver).for_each(|link| {
-                let share = match self.hierarchy().kind(node) {
-                    Kind::Cluster(index) => mean_irradiance(kernel, index, receiver, link),
-                    Kind::Element(leaf) => {
-                        if link.source == receiver {
-                            own_irradiance(kernel, receiver.index(), link)
-                        } else {
-                            let point = self.hierarchy().mesh.elements[leaf].centroid;
-                            let normal = self.hierarchy().patch_of(leaf).normal;
-                            link_irradiance(kernel, link, point, normal)
-                        }
-                    }
+    /// The links of all nodes of a path with their irradiance at its last node, not yet scaled to the coverage, and the
+    /// bound of the error of their sum.
+    fn links_along(&self, path: &[NodeId], node: NodeId) -> (Vec<InspectedLink>, f32) {
+        let (kernel, store) = (self.kernel(), &self.linked.links);
+        let inspected = |link: TintedLink<'_>, receiver, share: Vec4, error| InspectedLink {
+            source: self.place(link.source),
+            receiver: self.place(receiver),
+            visibility: link.light_factor(),
+            irradiance: share.color(),
+            form_factor: share.form_factor_sum(),
+            error,
+        };
+        match self.hierarchy().kind(node) {
+            Kind::Element(leaf) => {
+                let bounding = Bounding {
+                    kernel,
+                    links: store,
+                    is_clear: self.is_clear,
                 };
-                found.push(InspectedLink {
-                    source: self.place(link.source),
-                    receiver: place,
-                    visibility: link.light_factor(),
-                    irradiance: share.color(),
-                    form_factor: share.form_factor_sum(),
-                    error: link.error,
-                });
-            });
+                let bounds = bounding.leaf(path, leaf);
+                let of = |bound: &BoundedLink<'_>| {
+                    inspected(bound.link, bound.receiver, bound.irradiance, bound.error())
+                };
+                (bounds.links.iter().map(of).collect(), bounds.error())
+            }
+            Kind::Cluster(index) => {
+                let mut found = Vec::new();
+                for &receiver in path {
+                    store.tinted(receiver).for_each(|link| {
+                        let share = mean_irradiance(kernel, index, receiver, link);
+                        found.push(inspected(link, receiver, share, link.error));
+                    });
+                }
+                let error = found.iter().map(|link| link.error).sum();
+                (found, error)
+            }
         }
-        found
     }
 
     /// Factor by colour of the light of a leaf, with the sum of its form factors, so that these add to the coverage.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
+    geometry::{Random, cosine_direction},
     scene::{SceneOptions, Sides, builtin},
     solver::{Cancel, SolveSettings, Solver},
 };
@@ -55,8 +56,55 @@ fn links_of_a_leaf_add_to_the_displayed_light() {
             .links
             .is_sorted_by(|a, b| strength(a) >= strength(b));
         assert!(ordered, "the strongest come first");
-        let error: f32 = inspection.path.iter().map(|node| node.error).sum();
-        assert!((error - light.error).abs() <= 1e-3 * light.error + 1e-9);
+        let errors: f32 = inspection.links.iter().map(|link| link.error).sum();
+        let bound = inspection.error_bound;
+        assert!(0.0 < bound && bound <= errors * 1.001, "{bound}, {errors}");
+    }
+}
+
+/// Irradiance (luminance) of a leaf from what surfaces send over links, by rays, and its standard error.
+fn gathered_by_rays(solver: &Solver, leaf: usize) -> (f32, f32) {
+    let hierarchy = &solver.hierarchy;
+    let (patch, from) = (hierarchy.patch_of(leaf), &hierarchy.mesh.elements[leaf]);
+    let mut random = Random::new(17, leaf as u64);
+    let mut one = || {
+        let direction = cosine_direction(patch.normal, random.uniform_2d());
+        let Some(hit) = (solver.rays).closest(from.centroid, direction, Some(patch.triangle))
+        else {
+            return 0.0;
+        };
+        let point = from.centroid + direction * hit.distance;
+        let met = hierarchy.patch_met(hit.triangle, direction);
+        let leaf = met.and_then(|patch| hierarchy.mesh.leaf_at(patch, point));
+        leaf.map_or(0.0, |leaf| luminance(solver.linked.power.elements[leaf]))
+    };
+    let found: Vec<f32> = (0..2048).map(|_| one()).collect();
+    let count = found.len() as f32;
+    let mean = found.iter().sum::<f32>() / count;
+    let squares = found
+        .iter()
+        .map(|value| (value - mean).powi(2))
+        .sum::<f32>();
+    (mean, (squares / count / count).sqrt())
+}
+
+#[test]
+fn the_bound_of_a_leaf_holds_what_rays_find_and_is_tight() {
+    for name in ["cornell", "room-1022"] {
+        let solver = solved(name, SolveSettings::draft());
+        let (mut held, mut count, mut widths) = (0, 0, Vec::new());
+        for light in solver.leaves.iter().step_by(solver.leaves.len() / 100) {
+            let inspection = inspect_leaf(&solver, light.element as usize);
+            let (truth, noise) = gathered_by_rays(&solver, light.element as usize);
+            let shown = luminance(light.centre);
+            count += 1;
+            held += usize::from((shown - truth).abs() <= inspection.error_bound + 3.0 * noise);
+            widths.push(inspection.error_bound / shown.max(f32::MIN_POSITIVE));
+        }
+        assert!(held * 100 >= count * 95, "{name}: {held} of {count}");
+        widths.sort_by(f32::total_cmp);
+        let median = widths[widths.len() / 2];
+        assert!(median < 0.5, "{name}: the bound is {median} of the light");
     }
 }
 
