@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-/// Part of a coordinate by which boxes are wider than what is in them, on either side. Corners of a triangle relative to a
-/// ray are off by at most three such units of single precision of the coordinates of both: one for the difference to the
-/// origin, which counts once more where it is sheared, and four roundings there. Smaller, and a triangle might be met
-/// outside its box; larger, and flat boxes are met in vain.
+/// By which part of the largest coordinate boxes are wider than what is in them, on either side. The corner of a triangle
+/// as a ray sees it is off by six roundings at most, each half an epsilon of the coordinates of both: one of its difference
+/// to the origin, three of the sheared part, two of what is left. Smaller, and a triangle may be met outside its box, so
+/// that rays leak; larger, and flat boxes are met in vain.
 pub(super) const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// A box.
