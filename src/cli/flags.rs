@@ -265,9 +265,9 @@ impl SettingFlags {
     }
 }
 
-/// Flags of [`RunOptions`] and of the colours of exports.
+/// Flags of [`RunOptions`].
 #[derive(Clone, Debug, Args)]
-pub struct RunFlags {
+pub struct LimitFlags {
     /// Stop after this time [default: none]
     #[arg(long, value_name = "SEC", value_parser = seconds, help_heading = "Limits")]
     pub time_limit: Option<Duration>,
@@ -277,6 +277,26 @@ pub struct RunFlags {
     /// Solver threads [default: automatic, one for each core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Limits")]
     pub threads: Option<u16>,
+}
+
+impl LimitFlags {
+    /// The options that the flags ask for.
+    pub fn options(&self) -> RunOptions {
+        RunOptions {
+            threads: self.threads.map_or(0, usize::from),
+            time_limit: self.time_limit,
+            memory_limit: self.memory_limit.map(|mebibytes| mebibytes << 20),
+            gives_way: false,
+        }
+    }
+}
+
+/// Limits of a run, and the colours of exports.
+#[derive(Clone, Debug, Args)]
+pub struct RunFlags {
+    /// Limits
+    #[command(flatten)]
+    pub limits: LimitFlags,
     /// Exposure in stops [default: 0 in exported files, automatic in pictures and the window]
     #[arg(long, value_name = "EV", value_parser = exposure, allow_hyphen_values = true, help_heading = "Output")]
     pub exposure: Option<f32>,
@@ -291,12 +311,7 @@ pub struct RunFlags {
 impl RunFlags {
     /// The options that the flags ask for.
     pub fn options(&self) -> RunOptions {
-        RunOptions {
-            threads: self.threads.map_or(0, usize::from),
-            time_limit: self.time_limit,
-            memory_limit: self.memory_limit.map(|mebibytes| mebibytes << 20),
-            gives_way: false,
-        }
+        self.limits.options()
     }
 
     /// How exported files of a scene with this [`crate::scene::Scene::radiance_unit`] look.

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::scene::{self, BuildError, Lighting, ReadError, Scene, SceneOptions, SkyError, builtin};
+use crate::scene::{
+    self, BuildError, Lighting, ReadError, Scene, SceneBuilder, SceneOptions, SkyError, builtin,
+};
 
 /// Why there is no scene.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +51,28 @@ pub fn load(
         scene::read_obj(path, options)?
     };
     light(scene, lighting)
+}
+
+/// As [`load`], with the faces as they are before they are cleaned and scaled.
+///
+/// # Errors
+/// As [`load`].
+pub(super) fn load_with_faces(
+    path: Option<&Path>,
+    name: Option<&str>,
+    options: &SceneOptions,
+    lighting: &Lighting,
+) -> Result<(Scene, SceneBuilder), LoadError> {
+    let (scene, faces) = if let Some(name) = name {
+        let found = builtin::find_builtin(name);
+        let found = found.ok_or_else(|| LoadError::Unknown(name.to_owned()))?;
+        (found.scene(options)?, found.builder())
+    } else {
+        let path = path.ok_or(LoadError::Nothing)?;
+        check_is_file(path)?;
+        scene::read_obj_and_faces(path, options)?
+    };
+    Ok((light(scene, lighting)?, faces))
 }
 
 /// Light a scene as it is asked for.

@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 2 usage, 3 scene cannot be read, 4 stopped early with the outputs written, 5 no graphics
 //! adapter, 1 anything else.
 
+mod check;
 mod flags;
 mod light_flags;
 mod load;
@@ -17,6 +18,7 @@ mod solve;
 mod sweep;
 mod truth;
 mod values;
+mod watched;
 #[cfg(feature = "viewer")]
 mod window;
 
@@ -24,7 +26,7 @@ use std::{io, path::PathBuf, process::ExitCode};
 
 use clap::{Parser, Subcommand};
 
-pub use flags::{Preset, Reference, RunFlags, SceneFlags, SettingFlags};
+pub use flags::{LimitFlags, Preset, Reference, RunFlags, SceneFlags, SettingFlags};
 pub use light_flags::{LampFlag, LightFlags, SkyFlag, SunFlag};
 pub use load::{LoadError, load};
 
@@ -50,6 +52,8 @@ pub enum Command {
     Solve(Box<solve::SolveArguments>),
     /// Measure error against run time and write tables and plots
     Report(Box<sweep::ReportArguments>),
+    /// Test the light of a scene where it is known without a reference
+    Check(Box<check::CheckArguments>),
     /// List the built-in scenes, or write them as OBJ and MTL
     Scenes(scenes::ScenesArguments),
 }
@@ -74,6 +78,7 @@ pub fn run() -> ExitCode {
     let result = match arguments.command {
         Some(Command::Solve(solve)) => solve::solve(&solve),
         Some(Command::Report(report)) => sweep::report(&report),
+        Some(Command::Check(check)) => check::check(&check),
         Some(Command::Scenes(scenes)) => scenes::scenes(&scenes),
         #[cfg(feature = "viewer")]
         None => window::open(arguments.path, &arguments.window),

@@ -258,7 +258,7 @@ impl Interruption {
     }
 
     /// Whether an interruption ends the program, as is right while there is nothing to be written and no file open.
-    fn ends_at_once(&self, whether: bool) {
+    pub(super) fn ends_at_once(&self, whether: bool) {
         self.at_once.store(whether, Ordering::Relaxed);
     }
 }

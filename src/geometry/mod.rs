@@ -6,6 +6,7 @@ mod panes;
 mod polygon;
 mod rays;
 mod sampling;
+mod wide;
 
 pub use lanes::Vectors4;
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};

@@ -1,42 +1,19 @@
 //! The ray tree: what passes along a segment, and what does a ray meet first.
 //!
-//! An obvhs CWBVH over the scene's triangles. It serves rays only: clusters of light come from a tree of their own.
-
-use std::time::Duration;
+//! It serves rays only: clusters of light come from a tree of their own.
 
 use glam::Vec3;
-use obvhs::{
-    BvhBuildParams,
-    aabb::Aabb,
-    cwbvh::{CwBvh, builder::build_cwbvh_from_tris},
-    ray::{Ray, RayHit},
-    rt_triangle::RtTriangle,
-    triangle::Triangle as RayTriangle,
-};
 
-use super::panes::{self, Panes};
-use crate::scene::{Frame, Scene, TriangleId};
+use super::{
+    panes::{self, Panes},
+    wide::{Ray, Reach, Tree},
+};
+use crate::scene::{Scene, TriangleId};
 
 /// Rays start and end this far from their ends, in frame units: a millionth of the scene's extent.
 /// Much smaller, and a ray meets the surface that it leaves; much larger, and thin gaps leak or close.
 /// At the rim of the frame (50 units) single precision resolves 4e-6.
 pub const RAY_OFFSET: f32 = 1e-4;
-
-/// Triangles with longer edges are stored in pieces, unless they are far from the origin: an intersection is known to about
-/// a millionth of the triangle's size. Smaller costs memory, larger lets a huge ground be met beside where it is.
-const LONGEST_EDGE: f32 = 4.0 * Frame::EXTENT as f32;
-
-/// Longest edge of a piece in multiples of its distance from the origin, about which all detail lies.
-const LONGEST_BY_DISTANCE: f32 = 1.0;
-
-/// How the tree is built. The search for the best partner of a box must begin with the leaves: where the first levels take
-/// neighbours along a curve through space instead, as the usual settings have it, large walls share nodes with fine
-/// bodies, and rays through rooms take three to six times as long. Much more reinsertion, wider searches and splitting
-/// triangles beforehand take several times as long to build, and rays gain a tenth at most.
-const BUILD: BvhBuildParams = BvhBuildParams {
-    search_depth_threshold: 0,
-    ..BvhBuildParams::medium_build()
-};
 
 /// The first hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,11 +26,8 @@ pub struct Hit {
 
 /// Answers occlusion and closest-hit questions about a scene.
 pub struct RayTree {
-    tree: CwBvh,
-    /// In the order of the tree's primitives.
-    triangles: Vec<RtTriangle>,
-    /// Which triangle of the scene each of them is, or is a piece of.
-    ids: Vec<u32>,
+    /// Triangles have the numbers that they have in the scene.
+    tree: Tree,
     crossings: f32,
     /// Nothing where all triangles are opaque.
     panes: Option<Box<Panes>>,
@@ -63,9 +37,7 @@ impl RayTree {
     /// A tree without triangles: nothing blocks anything, and nothing is met.
     pub fn clear() -> Self {
         Self {
-            tree: CwBvh::default(),
-            triangles: Vec::new(),
-            ids: Vec::new(),
+            tree: Tree::new(&[]),
             crossings: 0.0,
             panes: None,
         }
@@ -73,34 +45,17 @@ impl RayTree {
 
     /// Whether there are no triangles: then no ray need be shot.
     pub fn is_clear(&self) -> bool {
-        self.triangles.is_empty()
+        self.tree.is_empty()
     }
 
     /// Build the tree over all triangles of a scene.
     pub fn new(scene: &Scene) -> Self {
-        let mut triangles: Vec<RayTriangle> = Vec::with_capacity(scene.triangles.len());
-        let mut ids = Vec::with_capacity(scene.triangles.len());
-        for id in scene.triangle_ids() {
-            for piece in pieces(scene.corners(id)) {
-                let [a, b, c] = piece.map(Into::into);
-                triangles.push(RayTriangle {
-                    v0: a,
-                    v1: b,
-                    v2: c,
-                });
-                ids.push(id.0);
-            }
-        }
-        let tree = build_cwbvh_from_tris(&triangles, BUILD, &mut Duration::default());
-        let order = || tree.primitive_indices.iter().map(|&index| index as usize);
+        let corners = scene.triangle_ids().map(|id| scene.corners(id));
+        let triangles: Vec<[Vec3; 3]> = corners.collect();
         Self {
-            triangles: order()
-                .map(|index| RtTriangle::from(&triangles[index]))
-                .collect(),
-            ids: order().map(|index| ids[index]).collect(),
+            tree: Tree::new(&triangles),
             crossings: crossings(&triangles),
             panes: Panes::of(scene),
-            tree,
         }
     }
 
@@ -135,9 +90,8 @@ impl RayTree {
         if self.is_clear() || length <= 2.0 * RAY_OFFSET {
             return Vec3::ONE;
         }
-        let until = length - RAY_OFFSET;
-        let ray = ray_until(from, separation / length, until);
-        self.passing(ray, ends)
+        let ray = Ray::new(from, separation / length);
+        self.passing(&ray, length - RAY_OFFSET, ends)
     }
 
     /// What passes along a ray of unit direction out of the scene, by channel, 0…1: the product over all triangles that it
@@ -151,35 +105,20 @@ impl RayTree {
         if self.is_clear() {
             return Vec3::ONE;
         }
-        let ray = ray_until(origin, direction, f32::MAX);
-        self.passing(ray, [from, None])
+        self.passing(&Ray::new(origin, direction), f32::MAX, [from, None])
     }
 
-    /// What passes through all triangles on a ray but two.
-    fn passing(&self, ray: Ray, ends: [Option<TriangleId>; 2]) -> Vec3 {
-        let [first, second] = ends.map(|end| end.map_or(u32::MAX, |id| id.0));
+    /// What passes through all triangles on a ray but two, up to a distance.
+    fn passing(&self, ray: &Ray, until: f32, ends: [Option<TriangleId>; 2]) -> Vec3 {
         let mut passing = Vec3::ONE;
-        let is_open = self.tree.ray_traverse_miss(ray, |ray, primitive| {
-            let distance = self.triangles[primitive].intersect(ray);
-            // Most triangles are missed, and which one it was is then of no interest.
-            if distance == f32::INFINITY {
-                return distance;
-            }
-            let id = self.ids[primitive];
-            if id == first || id == second {
-                return f32::INFINITY;
-            }
-            let Some(panes) = &self.panes else {
-                return distance;
+        self.tree.each(ray, reach(until, ends), |met| {
+            passing *= match &self.panes {
+                None => Vec3::ZERO,
+                Some(panes) => panes.passing(met.triangle, point_at(ray, met.distance)),
             };
-            passing *= panes.passing(id, point_at(ray, distance));
-            if passing == Vec3::ZERO {
-                distance
-            } else {
-                f32::INFINITY
-            }
+            passing != Vec3::ZERO
         });
-        if is_open { passing } else { Vec3::ZERO }
+        passing
     }
 
     /// Whether nothing passes along a segment; see [`Self::transmittance`].
@@ -217,32 +156,29 @@ impl RayTree {
         if self.is_clear() {
             return None;
         }
-        let ray = ray_until(origin, direction, f32::MAX);
-        let start = from.map_or(u32::MAX, |id| id.0);
-        let mut hit = RayHit::none();
-        let met = self.tree.ray_traverse(ray, &mut hit, |ray, primitive| {
-            let triangle = &self.triangles[primitive];
-            let distance = triangle.intersect(ray);
-            let id = self.ids[primitive];
-            if distance == f32::INFINITY || id == start {
-                return f32::INFINITY;
-            }
-            if let Some(panes) = &self.panes
-                && !meets(panes, id, point_at(ray, distance))
-            {
-                return f32::INFINITY;
-            }
-            let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
-            if is_back {
-                distance + RAY_OFFSET
-            } else {
-                distance
-            }
-        });
-        met.then(|| Hit {
-            triangle: TriangleId(self.ids[hit.primitive_id as usize]),
-            distance: self.triangles[hit.primitive_id as usize].intersect(&ray),
-        })
+        let ray = Ray::new(origin, direction);
+        // Distances of backs count as a little larger, so that of two triangles back to back the front is nearer. Of two
+        // that are as near it is the one that comes first in the scene.
+        let mut nearest = f32::MAX;
+        let mut hit: Option<Hit> = None;
+        self.tree
+            .nearest_first(&ray, reach(f32::MAX, [from, None]), |met| {
+                let counted = met.distance + if met.is_back { RAY_OFFSET } else { 0.0 };
+                let triangle = TriangleId(met.triangle);
+                let is_nearer = counted < nearest
+                    || counted == nearest && hit.is_none_or(|hit| triangle.0 < hit.triangle.0);
+                let is_there =
+                    |panes: &Panes| meets(panes, met.triangle, point_at(&ray, met.distance));
+                if is_nearer && self.panes.as_deref().is_none_or(is_there) {
+                    nearest = counted;
+                    hit = Some(Hit {
+                        triangle,
+                        distance: met.distance,
+                    });
+                }
+                nearest
+            });
+        hit
     }
 
     /// By what the light that comes along a ray to [`Self::closest`] is to be multiplied, by channel, for the colours of the
@@ -259,24 +195,17 @@ impl RayTree {
             return Vec3::ONE;
         };
         let end = hit.map_or(f32::MAX, |hit| hit.distance);
-        let ray = ray_until(origin, direction, end);
-        let met = hit.map_or(u32::MAX, |hit| hit.triangle.0);
-        let start = from.map_or(u32::MAX, |id| id.0);
+        let ray = Ray::new(origin, direction);
         let mut tint = Vec3::ONE;
-        // Nothing counts as met, so that the ray goes through everything.
-        self.tree
-            .ray_traverse(ray, &mut RayHit::none(), |ray, primitive| {
-                let id = self.ids[primitive];
-                let distance = self.triangles[primitive].intersect(ray);
-                if distance < f32::INFINITY && id != start && id != met {
-                    let passing = panes.passing(id, point_at(ray, distance));
-                    let chance = panes::mean(passing);
-                    if chance > 0.0 {
-                        tint *= passing / chance;
-                    }
-                }
-                f32::INFINITY
-            });
+        let between = reach(end, [from, hit.map(|hit| hit.triangle)]);
+        self.tree.each(&ray, between, |met| {
+            let passing = panes.passing(met.triangle, point_at(&ray, met.distance));
+            let chance = panes::mean(passing);
+            if chance > 0.0 {
+                tint *= passing / chance;
+            }
+            true
+        });
         tint
     }
 
@@ -289,75 +218,50 @@ impl RayTree {
         from: Option<TriangleId>,
         bounds: impl Fn(TriangleId) -> bool,
     ) -> i32 {
-        let ray = ray_until(origin, direction, f32::MAX);
+        let ray = Ray::new(origin, direction);
         let mut left = 0;
-        // Nothing counts as met, so that the ray goes through everything.
-        self.tree
-            .ray_traverse(ray, &mut RayHit::none(), |ray, primitive| {
-                let id = TriangleId(self.ids[primitive]);
-                let triangle = &self.triangles[primitive];
-                if bounds(id) && from != Some(id) && triangle.intersect(ray) < f32::INFINITY {
-                    let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
-                    left += if is_back { 1 } else { -1 };
-                }
-                f32::INFINITY
-            });
+        self.tree.each(&ray, reach(f32::MAX, [from, None]), |met| {
+            if bounds(TriangleId(met.triangle)) {
+                left += if met.is_back { 1 } else { -1 };
+            }
+            true
+        });
         left
     }
 
     /// Bytes that the tree holds.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.tree.nodes.as_slice())
-            + size_of_val(self.triangles.as_slice())
-            + size_of_val(self.tree.primitive_indices.as_slice())
-            + size_of_val(self.ids.as_slice())
-            + self.panes.as_ref().map_or(0, |panes| panes.memory_bytes())
+        self.tree.memory_bytes() + self.panes.as_ref().map_or(0, |panes| panes.memory_bytes())
     }
 }
 
-/// A ray of unit direction that ends at a distance.
-fn ray_until(origin: Vec3, direction: Vec3, until: f32) -> Ray {
-    // Adding 0 turns -0 into 0: the tree takes it for a direction below 0, and misses what lies across it.
-    Ray::new(origin.into(), (direction + 0.0).into(), RAY_OFFSET, until)
+/// A ray's part from its offset up to a distance, without the triangles of its ends.
+fn reach(until: f32, ends: [Option<TriangleId>; 2]) -> Reach {
+    Reach {
+        from: RAY_OFFSET,
+        until,
+        except: ends.map(|end| end.map_or(u32::MAX, |id| id.0)),
+    }
 }
 
 fn point_at(ray: &Ray, distance: f32) -> Vec3 {
-    (ray.origin + ray.direction * distance).into()
-}
-
-/// A triangle, or, where it is huge, its pieces: halves across the longest edge, again and again.
-fn pieces(corners: [Vec3; 3]) -> Vec<[Vec3; 3]> {
-    let (mut pieces, mut pending) = (Vec::new(), vec![corners]);
-    while let Some([a, b, c]) = pending.pop() {
-        let edges = [(a - b).length(), (b - c).length(), (c - a).length()];
-        let longest = edges.into_iter().fold(0.0, f32::max);
-        let distance = ((a + b + c) / 3.0).length() - longest;
-        if longest <= LONGEST_EDGE.max(LONGEST_BY_DISTANCE * distance) {
-            pieces.push([a, b, c]);
-            continue;
-        }
-        // Turned so that the longest edge comes first.
-        let [a, b, c] = match edges.iter().position(|&edge| edge >= longest) {
-            Some(1) => [b, c, a],
-            Some(2) => [c, a, b],
-            _ => [a, b, c],
-        };
-        let middle = (a + b) * 0.5;
-        pending.extend([[a, middle, c], [middle, b, c]]);
-    }
-    pieces
+    ray.origin + ray.direction * distance
 }
 
 /// See [`RayTree::crossings`]: areas of boxes relative to that of the box about all.
-fn crossings(triangles: &[RayTriangle]) -> f32 {
-    let (mut whole, mut sum) = (Aabb::empty(), 0.0);
-    for triangle in triangles {
-        let bounds = triangle.aabb();
-        whole.extend(bounds.min);
-        whole.extend(bounds.max);
-        sum += f64::from(bounds.half_area());
+fn crossings(triangles: &[[Vec3; 3]]) -> f32 {
+    let half_area = |low: Vec3, high: Vec3| {
+        let size = (high - low).as_dvec3();
+        size.x * size.y + size.y * size.z + size.z * size.x
+    };
+    let (mut lowest, mut highest, mut sum) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0);
+    for &[a, b, c] in triangles {
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        lowest = lowest.min(low);
+        highest = highest.max(high);
+        sum += half_area(low, high);
     }
-    let whole = f64::from(whole.half_area());
+    let whole = half_area(lowest, highest);
     if whole > 0.0 {
         (sum / whole) as f32
     } else {

@@ -232,8 +232,9 @@ impl PatchTree {
         false
     }
 
-    /// Whether the active patches close a surface: each edge between two points belongs to two of them that run along
-    /// it in opposite senses.
+    /// Whether the active patches close a surface around what they face: each edge between two points belongs to two of them
+    /// that run along it in opposite senses, and they do not face outward. Of a surface that is convex, as one without
+    /// occlusion is, nothing rises before any patch then; nor does it where the two sides of a sheet share its rim.
     pub fn is_enclosed(&self, scene: &Scene) -> bool {
         let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(self.active_patches().len() * 3);
         for patch in &self.patches[self.active_patches()] {
@@ -246,6 +247,7 @@ impl PatchTree {
         edges
             .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
             .all(|run| matches!(run, [(.., false), (.., true)]))
+            && !self.is_open(scene)
     }
 }
 
@@ -354,6 +356,13 @@ mod tests {
 
         let open = scene(Sides::One, &walls[1..]);
         assert!(tree(&open).is_clear(&open) && !tree(&open).is_enclosed(&open));
+
+        // Seen from outside, and as a sheet, it encloses nothing.
+        let outward = walls.map(|(paint, corner, u, v)| (paint, corner, v, u));
+        for body in [scene(Sides::One, &outward), scene(Sides::Two, &walls[..1])] {
+            let around = tree(&body);
+            assert!(around.is_clear(&body) && around.is_open(&body) && !around.is_enclosed(&body));
+        }
 
         // A speck in the middle has parts of the room on both sides.
         let speck = (BLACK, [0.5, 0.5, 0.5], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]);

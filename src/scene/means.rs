@@ -232,7 +232,7 @@ impl Scene {
         })
     }
 
-    fn pictures(&self) -> Pictures<'_> {
+    pub(super) fn pictures(&self) -> Pictures<'_> {
         Pictures {
             textures: &self.textures,
             cutouts: &self.cutouts,

@@ -46,6 +46,28 @@ pub fn read_obj_with_progress(
     options: &SceneOptions,
     progress: &ReadProgress,
 ) -> Result<Scene, ReadError> {
+    import(path, options, progress)?.finish(path)
+}
+
+/// Read an OBJ file, and keep its faces as they are before they are cleaned and scaled.
+///
+/// # Errors
+/// As [`read_obj`].
+pub fn read_obj_and_faces(
+    path: &Path,
+    options: &SceneOptions,
+) -> Result<(Scene, SceneBuilder), ReadError> {
+    let import = import(path, options, &ReadProgress::default())?;
+    let faces = import.builder.clone();
+    Ok((import.finish(path)?, faces))
+}
+
+/// Read the faces of an OBJ file, and what they show.
+fn import<'a>(
+    path: &Path,
+    options: &'a SceneOptions,
+    progress: &ReadProgress,
+) -> Result<Import<'a>, ReadError> {
     let (reader, watch) = source::open(path)?;
     let reader = progress.count(reader, watch.length());
     let file = path
@@ -81,7 +103,7 @@ pub fn read_obj_with_progress(
     import.materials(&models);
     import.models(&models);
     drop(models);
-    import.finish(path)
+    Ok(import)
 }
 
 /// Run the parser over the clean text.

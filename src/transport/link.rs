@@ -64,7 +64,7 @@ impl Link {
         self.form_or_area_factor
     }
 
-    /// Variance of the visibility as an estimate of `LEAST_RAYS` rays, with a prior of one ray seen and one not.
+    /// Variance of the visibility as an estimate of the fewest rays of a link, with a prior of one ray seen and one not.
     pub fn visibility_variance(&self) -> f32 {
         let rays = LEAST_RAYS as f32;
         let share = (self.light_factor.min(1.0) * rays + 1.0) / (rays + 2.0);

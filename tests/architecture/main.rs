@@ -41,6 +41,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "visibility",
             "tint",
             "oracle",
+            "bounds",
             "validate",
             "refiner",
             "clear",

@@ -29,12 +29,15 @@ const CREASE: f32 = 30.0;
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     polygons(&mut criterion);
-    let scene = builtin("room-42879", &SceneOptions::default())
-        .unwrap()
-        .unwrap();
-    shadow_rays(&mut criterion, &scene);
-    pairs(&mut criterion, &scene);
+    for name in ["cornell", "room-42879", "gallery", "soup", "room-1m"] {
+        rays(&mut criterion, name, &scene(name));
+    }
+    pairs(&mut criterion, &scene("room-42879"));
     criterion.final_summary();
+}
+
+fn scene(name: &str) -> Scene {
+    builtin(name, &SceneOptions::default()).unwrap().unwrap()
 }
 
 fn point_in_ball(random: &mut Random) -> Vec3 {
@@ -115,7 +118,9 @@ fn polygons(criterion: &mut Criterion) {
     group.finish();
 }
 
-fn shadow_rays(criterion: &mut Criterion, scene: &Scene) {
+/// Between points of triangles that are each as likely, however small: what blocks a segment at all, and what a ray from
+/// its start meets first.
+fn rays(criterion: &mut Criterion, name: &str, scene: &Scene) {
     let rays = RayTree::new(scene);
     let mut random = Random::new(3, 0);
     let mut end = || {
@@ -127,7 +132,7 @@ fn shadow_rays(criterion: &mut Criterion, scene: &Scene) {
     let segments: Vec<_> = (0..CASES).map(|_| [end(), end()]).collect();
     let mut group = criterion.benchmark_group("rays");
     group.throughput(Throughput::Elements(CASES as u64));
-    group.bench_function("occluded", |bencher| {
+    group.bench_function(BenchmarkId::new("occluded", name), |bencher| {
         bencher.iter(|| {
             let segments = black_box(&segments).iter();
             let blocked = segments.filter(|[(from, first), (to, second)]| {
@@ -136,7 +141,7 @@ fn shadow_rays(criterion: &mut Criterion, scene: &Scene) {
             blocked.count()
         });
     });
-    group.bench_function("closest", |bencher| {
+    group.bench_function(BenchmarkId::new("closest", name), |bencher| {
         bencher.iter(|| -> f32 {
             let segments = black_box(&segments).iter();
             let hits = segments.filter_map(|[(from, first), (to, _)]| {

@@ -1,12 +1,10 @@
 //! State shared by all runs of a report: scenes, references, threads, limits, progress, and whether to stop.
 
 use std::{
-    panic::{AssertUnwindSafe, catch_unwind},
     path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
-        mpsc,
     },
     time::{Duration, Instant},
 };
@@ -16,7 +14,10 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::ReportArguments;
 use crate::{
-    cli::{Outcome, load, load::light, output::say, progress::Progress, report::core_count},
+    cli::{
+        Outcome, load, load::light, output::say, progress::Progress, report::core_count,
+        watched::watched,
+    },
     geometry::RayTree,
     metrics::{ErrorMeasures, MeshLookup, ReferenceFacts, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
@@ -27,9 +28,6 @@ use crate::{
 
 /// Time of a run where none is given: enough for 2 % on most scenes, and still minutes for a whole report.
 const USUAL_TIME_LIMIT: Duration = Duration::from_secs(60);
-
-/// How often an interruption is looked for.
-const POLL: Duration = Duration::from_millis(50);
 
 /// Where a scene comes from.
 pub(super) enum Source {
@@ -137,35 +135,12 @@ impl<'a> Session<'a> {
         &mut self,
         job: impl FnOnce(&Cancel) -> T + Send,
     ) -> Result<T, String> {
-        let (cancel, begin, limit) = (Cancel::default(), Instant::now(), self.time_limit());
-        let (done, outcome) = mpsc::sync_channel(1);
-        let job = {
-            let cancel = cancel.clone();
-            move || {
-                let outcome = catch_unwind(AssertUnwindSafe(|| job(&cancel)));
-                // The session listens until there is an outcome.
-                let _ = done.send(outcome);
-            }
-        };
-        let pool = self.pool.clone();
-        let outcome = pool.in_place_scope(|scope| {
-            scope.spawn(|_| job());
-            loop {
-                if let Ok(outcome) = outcome.recv_timeout(POLL) {
-                    return outcome;
-                }
-                self.tick();
-                if begin.elapsed() >= limit || self.is_interrupted() {
-                    cancel.cancel();
-                }
-            }
-        });
-        outcome.map_err(|panic| {
-            let message = panic
-                .downcast_ref::<String>()
-                .map(String::as_str)
-                .or_else(|| panic.downcast_ref::<&str>().copied());
-            format!("panic: {}", message.unwrap_or("of unknown cause"))
+        let (begin, limit) = (Instant::now(), self.time_limit());
+        let (pool, interrupted) = (self.pool.clone(), self.interrupted.clone());
+        let is_over = || begin.elapsed() >= limit || interrupted.load(Ordering::Relaxed);
+        watched(&pool, job, || {
+            self.tick();
+            is_over()
         })
     }
 

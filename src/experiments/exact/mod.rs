@@ -17,12 +17,12 @@ use std::{sync::Arc, time::Instant};
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::{claim::Claim, light::mean_where};
+use super::{claim::Claim, light::mean_where, lit::Lit};
 use crate::{
     metrics::MeshLookup,
     reference::ReferencePoint,
     scene::{BuildError, Environment, Scene, SceneBuilder, SceneOptions, Sides, Sky, TriangleId},
-    solver::{Cancel, Snapshot, SolveSettings, Solver},
+    solver::{Cancel, SolveSettings},
 };
 
 /// The origin of a case.
@@ -159,7 +159,7 @@ impl Case {
     }
 
     fn claims(&self, settings: &SolveSettings, cancel: &Cancel) -> Result<Vec<Claim>, Trouble> {
-        let lit = Lit::new(self.finished()?, settings, cancel)?;
+        let lit = Lit::new(self.finished()?, settings, None, cancel).ok_or(Trouble::Stopped)?;
         let values = self.expected.iter().map(|known| known.value);
         let largest = values.fold(0.0, f64::max);
         let claim = |known: &Expected| {
@@ -192,21 +192,7 @@ impl Case {
     }
 }
 
-/// A finished solve.
-struct Lit {
-    scene: Arc<Scene>,
-    snapshot: Snapshot,
-}
-
 impl Lit {
-    fn new(scene: Arc<Scene>, settings: &SolveSettings, cancel: &Cancel) -> Result<Self, Trouble> {
-        let solver = Solver::new(scene.clone(), settings.clone(), None, cancel);
-        let mut solver = solver.ok_or(Trouble::Stopped)?;
-        while !solver.step(cancel).ok_or(Trouble::Stopped)?.is_final {}
-        let snapshot = solver.snapshot();
-        Ok(Self { scene, snapshot })
-    }
-
     /// A figure (red); NaN where no surface is.
     fn value(&self, figure: &Figure) -> f64 {
         let light = &self.snapshot.light;
