@@ -47,7 +47,6 @@ fn snapshot(mesh: DisplayMesh) -> Snapshot {
         step: 1,
         light: Arc::new(VertexLight {
             direct: light.clone(),
-            uncertainty: vec![0.0; light.len()],
             irradiance: light,
         }),
         mesh: Arc::new(mesh),

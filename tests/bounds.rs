@@ -9,10 +9,10 @@ use common::solve;
 use glam::{DVec3, Vec3, Vec4};
 use vecrad::{
     geometry::{Random, RayTree, point_irradiance, triangle_point},
-    hierarchy::{Hierarchy, Kind, NodeId, Reading, Tables},
+    hierarchy::{ElementId, Hierarchy, Kind, NodeId, Reading, Tables},
     reference::{MatrixSettings, solve_matrix},
     scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
-    solver::{Direct, SolveSettings},
+    solver::{Direct, SolveSettings, Subject},
     transport::{Estimate, Judge, Judgement, Kernel, PairSampler, PatchSums, luminance},
 };
 
@@ -158,10 +158,19 @@ fn the_bound_of_a_receiver_holds_its_error_against_the_full_matrix() {
         max_steps: 2,
         ..SolveSettings::draft()
     };
-    let snapshot = solve(&scene, settings).0.snapshot();
+    let solver = solve(&scene, settings).0;
+    let (snapshot, hierarchy) = (solver.snapshot(), solver.hierarchy());
     // The bound is that of one bounce; what sources are wrong by is reflected on.
     let most = |values: &[f32]| values.iter().copied().fold(0.0, f32::max);
-    let bound = most(&snapshot.light.uncertainty) / (1.0 - LARGEST_REFLECTANCE);
+    let bound_of = |leaf: usize| {
+        let subject = Subject::Element {
+            node: hierarchy.element_node(ElementId(leaf as u32)),
+            point: hierarchy.mesh.elements[leaf].centroid,
+        };
+        solver.inspect(&subject).expect("it exists").error_bound
+    };
+    let bounds: Vec<f32> = hierarchy.mesh.active_leaves().map(bound_of).collect();
+    let bound = most(&bounds) / (1.0 - LARGEST_REFLECTANCE);
     let mut sums = vec![(0.0f32, 0.0f32); scene.triangles.len()];
     for (corners, &triangle) in snapshot.mesh.indices.iter().zip(&snapshot.mesh.triangle_of) {
         let [a, b, c] = corners.map(|vertex| snapshot.mesh.positions[vertex as usize]);

@@ -57,7 +57,6 @@ fn lit(scene: &Scene, irradiance: f32) -> Snapshot {
         light: Arc::new(VertexLight {
             direct: irradiance.clone(),
             irradiance,
-            uncertainty: vec![0.0; count],
         }),
         clusters: Arc::new(vec![ClusterBox {
             min: Vec3::new(-55.0, -55.0, -1.0),

@@ -73,7 +73,6 @@ fn squares(kinds: &[(Square, usize)]) -> (Arc<Scene>, Snapshot) {
         step: 1,
         light: Arc::new(VertexLight {
             direct: irradiance.clone(),
-            uncertainty: vec![0.0; irradiance.len()],
             irradiance,
         }),
         mesh: Arc::new(mesh),

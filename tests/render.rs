@@ -78,7 +78,6 @@ fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
         light: Arc::new(VertexLight {
             irradiance: vec![irradiance; count],
             direct: vec![irradiance * 0.5; count],
-            uncertainty: vec![0.25; count],
         }),
         clusters: Arc::new(vec![root]),
         omitted: Arc::default(),

@@ -96,7 +96,6 @@ pub(super) mod tests {
         let light = VertexLight {
             irradiance: vec![Vec3::splat(PI); 3],
             direct: vec![Vec3::ZERO; 3],
-            uncertainty: vec![0.0; 3],
         };
         Snapshot {
             step: 1,

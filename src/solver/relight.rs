@@ -68,13 +68,9 @@ impl Solver {
         let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
         // Store the present light before it changes. Light from outside stays as it is.
         let has_outside = self.direct.brightest_outside() != Vec4::ZERO;
-        let factor = self.relighting.keep_solved(
-            &appearances,
-            has_outside,
-            &self.hierarchy,
-            &self.linked,
-            &self.leaves,
-        );
+        let factor =
+            self.relighting
+                .keep_solved(&appearances, has_outside, &self.linked, &self.leaves);
         // Direct light, with new rays where they are needed.
         if let Some(field) = self.direct.emitters_mut() {
             let shooting = Shooting {

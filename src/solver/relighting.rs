@@ -20,7 +20,7 @@ use super::{
     vertices::LeafLight,
 };
 use crate::{
-    hierarchy::{Channels as _, Hierarchy, luminance},
+    hierarchy::{Channels as _, Hierarchy},
     scene::{Appearance, Scene},
 };
 
@@ -33,8 +33,6 @@ struct Solved {
     appearances: Vec<Appearance>,
     linked: Vec<Vec4>,
     leaves: Vec<LeafLight>,
-    /// Emitted power for these appearances, by colour.
-    emitted: DVec3,
 }
 
 /// State of relighting.
@@ -104,7 +102,6 @@ impl Relighting {
         &mut self,
         appearances: &[Appearance],
         has_outside: bool,
-        hierarchy: &Hierarchy,
         linked: &LinkedLight,
         leaves: &[LeafLight],
     ) -> Option<Vec3> {
@@ -113,7 +110,6 @@ impl Relighting {
                 appearances: self.appearances.clone(),
                 linked: linked.irradiance.clone(),
                 leaves: leaves.to_vec(),
-                emitted: emitted(hierarchy),
             });
         }
         factor_between(&self.solved.as_ref()?.appearances, appearances, has_outside)
@@ -185,15 +181,6 @@ impl Solved {
     /// This light times a factor.
     fn scaled(&self, factor: Vec3) -> (Vec<Vec4>, Vec<LeafLight>) {
         let factor_w = factor.extend(1.0);
-        let of_luminance = {
-            let scaled = |by: Vec3| luminance((self.emitted.as_vec3() * by).extend(0.0));
-            let before = scaled(Vec3::ONE);
-            if before > 0.0 {
-                scaled(factor) / before
-            } else {
-                1.0
-            }
-        };
         let linked = self.linked.par_iter().with_min_len(4096);
         let leaves = self.leaves.par_iter().with_min_len(4096);
         (
@@ -202,7 +189,6 @@ impl Solved {
                 .map(|leaf| LeafLight {
                     corners: leaf.corners.map(|light| light * factor_w),
                     centre: leaf.centre * factor_w,
-                    error: leaf.error * of_luminance,
                     ..*leaf
                 })
                 .collect(),

@@ -307,7 +307,6 @@ pub fn bindings() -> Vec<Binding> {
         Key::Num9,
         Key::Num0,
         Key::Minus,
-        Key::Equals,
     ];
     all.extend(
         ROW.into_iter()

@@ -67,7 +67,6 @@ fn value(snapshot: &Snapshot, mode: ViewMode, vertex: usize) -> f32 {
         ViewMode::FalseRadiance => {
             luminance(snapshot.mesh.emission[vertex]) + reflected(snapshot, vertex)
         }
-        ViewMode::Uncertainty => light.uncertainty.get(vertex).copied().unwrap_or(0.0),
         ViewMode::Radiance
         | ViewMode::LightOnly
         | ViewMode::DirectOnly

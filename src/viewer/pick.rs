@@ -32,8 +32,6 @@ pub struct Probe {
     pub direct: Vec3,
     /// Radiance that leaves, in W/(sr·m²).
     pub radiance: Vec3,
-    /// Bound of the error of the irradiance, in W/m².
-    pub uncertainty: f32,
     /// The estimated error, where there is one: emitters have none.
     pub estimated_error: Option<PooledError>,
 }
@@ -45,7 +43,6 @@ impl Probe {
             irradiance: self.irradiance * factor,
             direct: self.direct * factor,
             radiance: self.radiance * factor,
-            uncertainty: self.uncertainty * factor,
             ..self
         }
     }
@@ -136,9 +133,6 @@ pub fn probe(snapshot: &Snapshot, pick: &Pick) -> Option<Probe> {
         irradiance,
         direct: mix(&light.direct),
         radiance: emission + mix(&mesh.reflectance) * irradiance / std::f32::consts::PI,
-        uncertainty: (0..3)
-            .map(|corner| light.uncertainty[corners[corner]] * weights[corner])
-            .sum(),
         estimated_error: is_estimated.then(|| map.at(pick.point, mix(&mesh.normals))),
     })
 }

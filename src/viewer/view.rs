@@ -32,17 +32,15 @@ pub enum ViewMode {
     FalseIrradiance,
     /// Luminance of radiance, in false colour.
     FalseRadiance,
-    /// Estimated error of irradiance, in false colour.
-    Uncertainty,
-    /// Measured error of radiance against the reference, in false colour.
-    Error,
     /// Estimated error of the reflected radiance, pooled over the surfaces, in false colour with its sign.
     EstimatedError,
+    /// Measured error of radiance against the reference, in false colour.
+    Error,
 }
 
 impl ViewMode {
     /// All modes in the order of their keys.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 11] = [
         Self::Radiance,
         Self::LightOnly,
         Self::DirectOnly,
@@ -52,9 +50,8 @@ impl ViewMode {
         Self::FaceOrientation,
         Self::FalseIrradiance,
         Self::FalseRadiance,
-        Self::Uncertainty,
-        Self::Error,
         Self::EstimatedError,
+        Self::Error,
     ];
 
     /// The modes that can be shown, with or without a reference.
@@ -76,7 +73,6 @@ impl ViewMode {
             Self::FaceOrientation => "Face orientation",
             Self::FalseIrradiance => "False colour: irradiance",
             Self::FalseRadiance => "False colour: radiance",
-            Self::Uncertainty => "False colour: error bound",
             Self::Error => "Measured error",
             Self::EstimatedError => "Estimated error",
         }
@@ -94,9 +90,6 @@ impl ViewMode {
             Self::FaceOrientation => "Fronts are blue, backs are red.",
             Self::FalseIrradiance => "Luminance of the irradiance in W/m², as false colour.",
             Self::FalseRadiance => "Luminance of the radiance in W/(sr·m²), as false colour.",
-            Self::Uncertainty => {
-                "Bound of the error of the irradiance in W/m², as false colour; the real error is far below."
-            }
             Self::Error => {
                 "Difference of radiance from the path-traced reference, in per cent of its root mean square."
             }
@@ -118,7 +111,6 @@ impl ViewMode {
             Self::FaceOrientation => "orientation",
             Self::FalseIrradiance => "false-irradiance",
             Self::FalseRadiance => "false-radiance",
-            Self::Uncertainty => "uncertainty",
             Self::Error => "error",
             Self::EstimatedError => "estimated-error",
         }
@@ -137,7 +129,7 @@ impl ViewMode {
     /// Unit of the legend where the mode is a false-colour one.
     pub fn false_color_unit(self) -> Option<&'static str> {
         match self {
-            Self::FalseIrradiance | Self::Uncertainty => Some("W/m²"),
+            Self::FalseIrradiance => Some("W/m²"),
             Self::FalseRadiance => Some("W/(sr·m²)"),
             Self::Error | Self::EstimatedError => Some("% of RMS"),
             _ => None,
@@ -149,7 +141,6 @@ impl ViewMode {
         match self {
             Self::FalseIrradiance => "Irradiance",
             Self::FalseRadiance => "Radiance",
-            Self::Uncertainty => "Error bound",
             Self::Error => "Measured error",
             Self::EstimatedError => "Estimated error",
             _ => "",
@@ -260,9 +251,7 @@ impl ViewSettings {
     /// Factor on the quantity of a mode, before exposure.
     pub fn light_factor(&self) -> f32 {
         match self.mode {
-            ViewMode::FalseIrradiance | ViewMode::FalseRadiance | ViewMode::Uncertainty => {
-                self.emission_scale
-            }
+            ViewMode::FalseIrradiance | ViewMode::FalseRadiance => self.emission_scale,
             mode if mode.is_light() => self.emission_scale,
             _ => 1.0,
         }

@@ -150,10 +150,6 @@ impl Limits {
         if let Some(value) = all().find(|value| !is_light(value)) {
             return Some(format!("irradiance {value}"));
         }
-        let is_error = |value: &f32| value.is_finite() && *value >= 0.0;
-        if let Some(value) = light.uncertainty.iter().find(|value| !is_error(value)) {
-            return Some(format!("uncertainty {value}"));
-        }
         let exceeds = |value: &Vec3| value.as_dvec3().cmpgt(self.irradiance).any();
         if let Some(value) = light.irradiance.iter().find(|value| exceeds(value)) {
             return Some(format!(

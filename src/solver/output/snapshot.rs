@@ -44,8 +44,6 @@ pub struct VertexLight {
     pub irradiance: Vec<Vec3>,
     /// The direct part, from sampled emitters, W/m².
     pub direct: Vec<Vec3>,
-    /// Estimated error of the irradiance (luminance), W/m².
-    pub uncertainty: Vec<f32>,
 }
 
 /// One cluster, for display.
@@ -121,7 +119,6 @@ impl Snapshot {
             + size_of_val(mesh.repeated.as_slice())
             + size_of_val(light.irradiance.as_slice())
             + size_of_val(light.direct.as_slice())
-            + size_of_val(light.uncertainty.as_slice())
             + size_of_val(self.clusters.as_slice())
             + size_of_val(self.errors.as_slice())
     }

@@ -185,23 +185,17 @@ impl View<'_> {
         let mut light = VertexLight {
             irradiance: Vec::with_capacity(count),
             direct: Vec::with_capacity(count),
-            uncertainty: Vec::with_capacity(count),
         };
         let brightest = self.brightest();
-        for (vertex, (&linked, &error)) in means.irradiance.iter().zip(&means.error).enumerate() {
-            let (direct, noise) = direct.map_or((Vec4::ZERO, 0.0), |direct| direct[vertex]);
+        for (vertex, &linked) in means.irradiance.iter().enumerate() {
+            let direct = direct.map_or(Vec4::ZERO, |direct| direct[vertex].0);
             light
                 .irradiance
                 .push(displayable((linked + direct).min(brightest)));
             light.direct.push(displayable(direct));
-            let error = error + noise;
-            light
-                .uncertainty
-                .push(if error.is_finite() { error } else { f32::MAX });
         }
         repeat(&mut light.irradiance, count, &mesh.repeated);
         repeat(&mut light.direct, count, &mesh.repeated);
-        repeat(&mut light.uncertainty, count, &mesh.repeated);
         light
     }
 

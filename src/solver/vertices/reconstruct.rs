@@ -40,8 +40,6 @@ pub(crate) struct LeafLight {
     pub corners: [Vec4; 3],
     /// The same at its centroid.
     pub centre: Vec4,
-    /// Sum of the errors of its links (luminance).
-    pub error: f32,
 }
 
 /// Linked light of all leaves, in the order of the tree, at the places of their direct light; `None` when cancelled.
@@ -112,8 +110,6 @@ struct Chain<'a> {
     rest: Vec<TintedLink<'a>>,
     /// Links of the node if it is an element: they are evaluated at the corners of the leaves.
     own: TintedLinks<'a>,
-    /// Sum of the errors of the links of clusters.
-    error: f32,
 }
 
 impl<'a> Chain<'a> {
@@ -212,7 +208,6 @@ impl<'a> Walk<'a> {
         let far = SIGHT_DISTANCE * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
         self.links.tinted(NodeId(index as u32)).for_each(|link| {
-            chain.error += link.error;
             if link.source.index() == index {
                 chain.even += own_irradiance(self.kernel, index, link);
             } else {
@@ -262,7 +257,6 @@ impl<'a> Walk<'a> {
             ..LeafLight::default()
         };
         for chain in &self.path {
-            light.error += chain.error;
             light.centre += chain.known(centroid, normal);
         }
         for &link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
@@ -275,7 +269,6 @@ impl<'a> Walk<'a> {
             .places(&hierarchy.mesh.elements[index], corners);
         let points = Vectors4::new([centroid, a, b, c]);
         let mut add = |link: TintedLink<'_>| {
-            light.error += link.error;
             let transmission = transmission(kernel, link);
             let [centre, corners @ ..] = kernel.irradiances(link.source, &points, normal);
             light.centre += centre * transmission;
@@ -319,8 +312,6 @@ fn transmission(kernel: Kernel<'_>, link: TintedLink<'_>) -> Vec4 {
 pub(crate) struct VertexMeans {
     /// Linked irradiance.
     pub irradiance: Vec<Vec4>,
-    /// Sum of link errors.
-    pub error: Vec<f32>,
 }
 
 impl VertexMeans {
@@ -328,7 +319,7 @@ impl VertexMeans {
     /// they are empty. Vertices that only prevent cracks take the mean of the ends of their edge.
     pub(crate) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight], factors: &[Vec4]) -> Self {
         let count = hierarchy.mesh.vertices.len();
-        let (mut irradiance, mut error) = (vec![Vec4::ZERO; count], vec![0.0f32; count]);
+        let mut irradiance = vec![Vec4::ZERO; count];
         let mut weight = vec![0.0f32; count];
         // Sums over the leaves about each vertex.
         for leaf in leaves {
@@ -341,7 +332,6 @@ impl VertexMeans {
             let area = (element.area_vector.length() * trust).max(f32::MIN_POSITIVE);
             for (&vertex, &value) in element.vertices.iter().zip(&leaf.corners) {
                 irradiance[vertex as usize] += value * area;
-                error[vertex as usize] += leaf.error * area;
                 weight[vertex as usize] += area;
             }
         }
@@ -353,7 +343,6 @@ impl VertexMeans {
         }
         for index in (0..count).filter(|&index| weight[index] > 0.0) {
             irradiance[index] /= weight[index];
-            error[index] /= weight[index];
         }
         // Vertices of contact elements only, and the means of elements.
         carry_over(
@@ -374,10 +363,9 @@ impl VertexMeans {
             if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {
                 // Ends were made before the vertices between them.
                 irradiance[index] = (irradiance[a as usize] + irradiance[b as usize]) * 0.5;
-                error[index] = (error[a as usize] + error[b as usize]) * 0.5;
             }
         }
-        Self { irradiance, error }
+        Self { irradiance }
     }
 }
 

@@ -111,12 +111,6 @@ pub fn probe_ui(ui: &mut egui::Ui, state: &State, actions: &mut Vec<Action>) {
                 "Mean over the part of the surfaces around this place whose error is told from noise, of the light that is \
                  shown there: the view 'Estimated error' as a figure",
             );
-            row::figure(
-                ui,
-                "Error bound",
-                error_bound(probe.uncertainty, luminance(probe.irradiance)),
-                "Worst case of the irradiance here, relative to it; the real error is far below",
-            );
             inspection_rows(ui, state);
         }
     });
@@ -178,6 +172,13 @@ fn inspection_rows(ui: &mut egui::Ui, state: &State) {
         "From links",
         light(inspection.linked),
         "Irradiance over all links, at the element's centroid",
+    );
+    row::figure(
+        ui,
+        "Error bound",
+        error_bound(inspection.error_bound, luminance(inspection.linked)),
+        "Worst case of the light from links, relative to it, for what their sources send; the estimated error says how \
+         wrong the light is",
     );
     row::figure(
         ui,

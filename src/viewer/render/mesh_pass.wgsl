@@ -140,10 +140,10 @@ fn shown(surface: Surface) -> vec4<f32> {
         case 6u: { return vec4<f32>(vec3<f32>(0.05, 0.14, 0.6) * (0.3 + 0.7 * facing), 0.0); }
         case 7u: { return vec4<f32>(false_color(luminance(surface.light)), 0.0); }
         case 8u: { return vec4<f32>(false_color(luminance(surface.emission + surface.reflectance * surface.light / PI)), 0.0); }
-        // Uncertainty, and the measured error.
-        case 9u, 10u: { return vec4<f32>(false_color(surface.light.x), 0.0); }
         // The estimated error. Shaded, so that surfaces without an error are told from each other.
-        case 11u: { return vec4<f32>(false_color(surface.light.x) * (0.5 + 0.5 * facing), 0.0); }
+        case 9u: { return vec4<f32>(false_color(surface.light.x) * (0.5 + 0.5 * facing), 0.0); }
+        // The measured error.
+        case 10u: { return vec4<f32>(false_color(surface.light.x), 0.0); }
         // No light yet: the surfaces as a lamp beside the eye would show them.
         case 255u: { return vec4<f32>(reflectance * (0.15 + 0.6 * facing), 0.0); }
         default: { return exposed(radiance); }

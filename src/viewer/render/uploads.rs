@@ -111,14 +111,12 @@ impl Uploads {
 enum Channel {
     Irradiance,
     Direct,
-    Uncertainty,
 }
 
 impl Channel {
     fn of(mode: ViewMode) -> Self {
         match mode {
             ViewMode::DirectOnly => Self::Direct,
-            ViewMode::Uncertainty => Self::Uncertainty,
             _ => Self::Irradiance,
         }
     }
@@ -160,10 +158,6 @@ impl LightSource {
         let bytes: &[u8] = match self {
             Self::Light(light, Channel::Irradiance) => bytemuck::cast_slice(&light.irradiance),
             Self::Light(light, Channel::Direct) => bytemuck::cast_slice(&light.direct),
-            Self::Light(light, Channel::Uncertainty) => {
-                grays = gray(&light.uncertainty);
-                bytemuck::cast_slice(&grays)
-            }
             Self::Errors(errors) => {
                 grays = gray(errors);
                 bytemuck::cast_slice(&grays)
