@@ -129,10 +129,10 @@ fn light_outside_its_limit_ends_with_code_1_and_a_sentence() {
         "plates",
         "--preset",
         "draft",
-        "--epsilon",
-        "0.0005",
+        "--error",
+        "0.05%",
         "--max-steps",
-        "2",
+        "1",
         "-q",
     ];
     let output = check(folder.path(), &flags);
