@@ -423,7 +423,7 @@ mod tests {
         let error = Action::Mode(ViewMode::Error);
         assert_eq!(found(Key::Minus, Modifiers::ALT), Some(error));
         let estimated = Action::Mode(ViewMode::EstimatedError);
-        assert_eq!(found(Key::Equals, Modifiers::ALT), Some(estimated));
+        assert_eq!(found(Key::Num0, Modifiers::ALT), Some(estimated));
         assert_eq!(
             found(Key::F12, Modifiers::COMMAND),
             Some(Action::Screenshot)

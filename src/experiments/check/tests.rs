@@ -120,7 +120,7 @@ fn light_that_is_five_per_cent_too_bright_is_not_right() {
             panic!("{law}: {}", check_markdown(&closed));
         };
         assert!(
-            why.contains("off by 5.0") && why.contains("more than 1.0"),
+            why.contains("off by 5.0") && why.contains("more than 2.1"),
             "{why}"
         );
     }
