@@ -244,6 +244,21 @@ fn a_room_is_entered_where_its_wall_is() {
 }
 
 #[test]
+fn walls_that_face_the_room_are_no_obstacles_before_it() {
+    let scene = finished(room(|_| true, true, true), Sides::One);
+    let room = look(&scene).interior.unwrap();
+    let at = |x: f64, y: f64, z: f64| scene.frame.from_world(DVec3::new(x, y, z));
+    // The side walls and the floor, also a little before the box, but not their outsides.
+    assert!(room.is_wall(at(3.0, 1.5, 0.0), Vec3::Z));
+    assert!(!room.is_wall(at(3.0, 1.5, 0.0), Vec3::NEG_Z));
+    assert!(room.is_wall(at(-0.5, 0.0, 2.5), Vec3::Y));
+    assert!(room.is_wall(at(-0.5, 1.5, 0.0), Vec3::Z));
+    // A post before it, and the outside of the wall in front.
+    assert!(!room.is_wall(at(-0.5, 1.5, 2.0), Vec3::Z));
+    assert!(!room.is_wall(at(-0.5, 1.5, 2.0), Vec3::NEG_X));
+}
+
+#[test]
 fn a_room_is_looked_into_from_outside_only() {
     let scene = finished(room(|_| true, true, true), Sides::Two);
     let look = look(&scene);

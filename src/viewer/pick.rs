@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::{camera::Camera, loader::LoadedScene, view::ViewSettings};
 use crate::{
-    geometry::barycentric_in_plane,
+    geometry::{Hit, barycentric_in_plane},
     metrics::{ErrorMap, PooledError},
     scene::{TriangleId, luminance},
     solver::Snapshot,
@@ -76,8 +76,20 @@ pub fn pick(
     let (mut origin, direction) = camera.ray(ndc, aspect);
     let room = loaded.interior;
     let room = room.filter(|room| room.is_looked_into(camera, view));
-    if let Some(entered) = room.and_then(|room| room.entered(origin, direction)) {
-        origin += direction * entered;
+    if let Some((room, entered)) =
+        room.and_then(|room| Some((room, room.entered(origin, direction)?)))
+    {
+        // What stands before the room is looked through, but for its walls.
+        let is_shown = |hit: &Hit| {
+            let surface = loaded.scene.surfaces[hit.triangle.index()];
+            let normal = surface.area_vector.normalize_or_zero();
+            let point = origin + direction * hit.distance;
+            normal.dot(direction) < 0.0 && room.is_wall(point, normal)
+        };
+        let nearest = loaded.rays.closest_shown(origin, direction, None);
+        if !nearest.as_ref().is_some_and(is_shown) {
+            origin += direction * entered;
+        }
     }
     let mut from = None;
     for _ in 0..MOST_LAYERS {

@@ -68,9 +68,24 @@ fn is_before_room(position: vec3<f32>) -> bool {
     return view.room_min.w > 0.5 && entered >= 1.0 && entered <= left;
 }
 
-fn cut(position: vec3<f32>) {
+// Share of the way from the middle of the room to its sides, from which on a surface that faces it is one of its walls:
+// see `Interior::is_wall`.
+const WALL: f32 = 0.9;
+
+// Whether a surface with this normal towards the viewer is a wall of the room, seen from the side of the room.
+fn is_wall(position: vec3<f32>, normal: vec3<f32>) -> bool {
+    let middle = 0.5 * (view.room_min.xyz + view.room_max.xyz);
+    let half = 0.5 * (view.room_max.xyz - view.room_min.xyz);
+    return dot(normal, middle - position) > WALL * dot(abs(normal), half);
+}
+
+// Discard what stands before the room; `normal` points to either side.
+fn cut(position: vec3<f32>, normal: vec3<f32>) {
     if (CUTS && is_before_room(position)) {
-        discard;
+        let towards = select(-normal, normal, dot(normal, towards_viewer(position)) > 0.0);
+        if (!is_wall(position, towards)) {
+            discard;
+        }
     }
 }
 // Largest value of a half float, a little less.
@@ -99,11 +114,15 @@ fn false_color(value: f32) -> vec3<f32> {
     return mix(view.ramp[below].rgb, view.ramp[below + 1u].rgb, at - f32(below));
 }
 
-fn to_viewer(surface: Surface) -> vec3<f32> {
+fn towards_viewer(position: vec3<f32>) -> vec3<f32> {
     if (view.eye.w > 0.5) {
         return view.backward.xyz;
     }
-    return normalize(view.eye.xyz - surface.position);
+    return normalize(view.eye.xyz - position);
+}
+
+fn to_viewer(surface: Surface) -> vec3<f32> {
+    return towards_viewer(surface.position);
 }
 
 fn exposed(radiance: vec3<f32>) -> vec4<f32> {
@@ -128,7 +147,7 @@ fn shown_emission(surface: Surface) -> vec3<f32> {
 }
 
 fn shown(surface: Surface) -> vec4<f32> {
-    cut(surface.position);
+    cut(surface.position, surface.normal);
     let reflectance = shown_reflectance(surface);
     let radiance = shown_emission(surface) + reflectance * surface.light / PI;
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
@@ -180,7 +199,7 @@ fn fs_cut_out(surface: Surface) -> @location(0) vec4<f32> {
 // What a pane lets pass.
 @fragment
 fn fs_filter(surface: Surface) -> @location(0) vec4<f32> {
-    cut(surface.position);
+    cut(surface.position, surface.normal);
     if (coverage(surface) < 0.5) {
         discard;
     }
@@ -209,7 +228,7 @@ fn fs_meter_cut_out(surface: Surface) -> @location(0) vec4<u32> {
 // Bits of the luminance that a light mode shows, before emission scale and exposure: with the sign set where most of it
 // is emitted, 0 where there is none. Read by `Meter`.
 fn metered(surface: Surface) -> vec4<u32> {
-    cut(surface.position);
+    cut(surface.position, surface.normal);
     let reflectance = shown_reflectance(surface);
     var emitted = luminance(shown_emission(surface));
     var reflected = luminance(reflectance * surface.light / PI);
@@ -228,14 +247,14 @@ fn fs_meter(surface: Surface) -> @location(0) vec4<u32> {
 
 @fragment
 fn fs_meter_back(surface: Surface) -> @location(0) vec4<u32> {
-    cut(surface.position);
+    cut(surface.position, surface.normal);
     return vec4<u32>(0u);
 }
 
 // The back of a face.
 @fragment
 fn fs_back(surface: Surface) -> @location(0) vec4<f32> {
-    cut(surface.position);
+    cut(surface.position, surface.normal);
     let facing = abs(dot(normalize(surface.normal), to_viewer(surface)));
     if (u32(view.display.x) == 6u) {
         return vec4<f32>(vec3<f32>(0.6, 0.05, 0.04) * (0.3 + 0.7 * facing), 0.0);
@@ -247,6 +266,7 @@ struct Edge {
     @builtin(position) clip: vec4<f32>,
     @location(0) facing: f32,
     @location(1) position: vec3<f32>,
+    @location(2) normal: vec3<f32>,
 };
 
 @vertex
@@ -259,13 +279,14 @@ fn vs_edge(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> 
     out.clip = lifted(view.clip_from_frame * vec4<f32>(position, 1.0));
     out.facing = dot(normal, to_eye);
     out.position = position;
+    out.normal = normal;
     return out;
 }
 
 // Edges of faces that are looked through are not drawn, else they would hide what is behind.
 @fragment
 fn fs_edge(edge: Edge) -> @location(0) vec4<f32> {
-    cut(edge.position);
+    cut(edge.position, edge.normal);
     if (edge.facing < 0.0 && view.backward.w < 0.5) {
         discard;
     }
