@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scene::TriangleId;
+use crate::scene::{Scene, TriangleId};
 
 /// A point of a lit side of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,4 +21,23 @@ pub struct SurfacePoint {
     pub reflectance: Vec3,
     /// Emitted radiance there, W·sr⁻¹·m⁻².
     pub emission: Vec3,
+}
+
+impl SurfacePoint {
+    /// The point of a side of a triangle at a place in it.
+    pub fn at(scene: &Scene, triangle: TriangleId, is_back: bool, barycentric: Vec3) -> Self {
+        let [a, b, c] = scene.corners(triangle);
+        let front = scene.surfaces[triangle.index()]
+            .area_vector
+            .normalize_or_zero();
+        Self {
+            triangle,
+            is_back,
+            barycentric,
+            position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
+            normal: if is_back { -front } else { front },
+            reflectance: scene.reflectance_at(triangle, barycentric),
+            emission: scene.emission_at(triangle, barycentric),
+        }
+    }
 }

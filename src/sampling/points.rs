@@ -233,19 +233,7 @@ fn point_of(scene: &Scene, piece: &Piece, square: Vec2) -> SurfacePoint {
         (u * x + v * y + w * z).as_vec3()
     };
     let Side { triangle, is_back } = piece.side;
-    let [a, b, c] = scene.corners(triangle);
-    let front = scene.surfaces[triangle.index()]
-        .area_vector
-        .normalize_or_zero();
-    SurfacePoint {
-        triangle,
-        is_back,
-        barycentric,
-        position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
-        normal: if is_back { -front } else { front },
-        reflectance: scene.reflectance_at(triangle, barycentric),
-        emission: scene.emission_at(triangle, barycentric),
-    }
+    SurfacePoint::at(scene, triangle, is_back, barycentric)
 }
 
 /// A connected piece of surface.

@@ -2,9 +2,13 @@
 
 use std::sync::Arc;
 
-use super::{Inspection, Snapshot, SolveSettings, Solver, Subject, shown::Inspector};
+use super::{
+    Inspection, Snapshot, SolveSettings, Solver, Subject,
+    shown::{Bounding, Inspector},
+    sums,
+};
 use crate::{
-    hierarchy::Hierarchy,
+    hierarchy::{Hierarchy, luminance},
     scene::{Appearance, Scene},
     transport::LinkStore,
 };
@@ -15,14 +19,31 @@ impl Solver {
         let inspector = Inspector {
             surfaces: self.surfaces(),
             linked: &self.linked,
-            reading: self.settings.method.reading(),
-            is_clear: self.plan.is_clear,
+            bounding: self.bounding(),
             coverage: &self.coverage,
             leaves: &self.leaves,
             boxes: &self.snapshot.clusters,
             step: self.step,
         };
         inspector.inspect(subject)
+    }
+
+    /// What bounds of the light over links follow from.
+    pub(super) fn bounding(&self) -> Bounding<'_> {
+        let reading = self.settings.method.reading();
+        Bounding {
+            kernel: self.linked.kernel(&self.hierarchy, reading),
+            links: &self.linked.links,
+            is_clear: self.plan.is_clear,
+        }
+    }
+
+    /// Bound of the error of the light over links, root mean square relative to the mean irradiance.
+    pub(super) fn error_bound(&self) -> f32 {
+        let (surfaces, linked) = (self.surfaces(), &self.linked);
+        let mean = sums::mean(&self.hierarchy, |leaf| linked.total(surfaces, leaf));
+        self.bounding()
+            .relative_error(&self.leaves, luminance(mean))
     }
 
     /// The snapshot of the last whole step. Cheap: its parts are shared.

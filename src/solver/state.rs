@@ -17,7 +17,7 @@ use super::{
     refine::Refining,
     relighting::Relighting,
     schedule::{is_coarse, threshold_scale},
-    shown::{self, Bounding, View},
+    shown::{self, View},
     textures::Painted,
     vertices::{self, LeafLight},
 };
@@ -222,6 +222,7 @@ impl Solver {
         }
         // Figures and picture.
         self.fill(&mut report);
+        report.error_bound = self.error_bound();
         let estimated = match estimated {
             Some(estimated) => estimated,
             None => {
@@ -412,14 +413,7 @@ impl Solver {
     /// Fill in the figures of the present state.
     pub(super) fn fill(&self, report: &mut StepReport) {
         let (surfaces, budget) = (self.surfaces(), self.budget());
-        let bounding = Bounding {
-            kernel: self
-                .linked
-                .kernel(&self.hierarchy, self.settings.method.reading()),
-            links: &self.linked.links,
-            is_clear: self.plan.is_clear,
-        };
-        shown::fill(report, surfaces, &self.linked, &self.leaves, bounding);
+        shown::fill(report, surfaces, &self.linked, &self.leaves);
         report.shadow_rays = self.ray_count;
         report.memory_bytes = budget.used_bytes(surfaces, &self.linked);
         if self.is_full || budget.is_exceeded(surfaces, &self.linked) {

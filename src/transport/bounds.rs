@@ -39,15 +39,6 @@ impl Interval {
     }
 }
 
-/// A point of a surface, with its unit normal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Face {
-    /// The point, frame units.
-    pub point: Vec3,
-    /// The unit normal.
-    pub normal: Vec3,
-}
-
 /// A node that may be replaced by its children.
 struct Open {
     /// Width of its interval, times the weight of its source.
@@ -80,15 +71,22 @@ impl PartialEq for Open {
 impl Eq for Open {}
 
 impl Kernel<'_> {
-    /// Bounds of the unoccluded irradiance of a face from each of some sources, for the radiosities of the tables.
+    /// Bounds of the unoccluded irradiance of a face with this unit normal at a point from each of some sources, for the
+    /// radiosities of the tables.
     /// The sum of their widths, each times the weight of its source, is below the tolerance (W/m²), unless too many
     /// nodes are needed.
-    pub fn bounds(&self, face: Face, sources: &[(NodeId, f32)], tolerance: f32) -> Vec<Interval> {
+    pub fn bounds(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        sources: &[(NodeId, f32)],
+        tolerance: f32,
+    ) -> Vec<Interval> {
         let mut closed = vec![Interval::default(); sources.len()];
         let mut open = BinaryHeap::new();
         let mut total = 0.0f64;
         let mut add = |source: usize, node: NodeId, open: &mut BinaryHeap<Open>| {
-            let interval = self.bounds_of(face, node);
+            let interval = self.bounds_of(point, normal, node);
             let width = interval.width() * sources[source].1;
             if width > 0.0 && !self.hierarchy.children(node).is_empty() {
                 open.push(Open {
@@ -126,45 +124,45 @@ impl Kernel<'_> {
     }
 
     /// Bounds from one node as a whole.
-    fn bounds_of(&self, face: Face, node: NodeId) -> Interval {
+    fn bounds_of(&self, point: Vec3, normal: Vec3, node: NodeId) -> Interval {
         match self.hierarchy.kind(node) {
             Kind::Element(index) => {
-                let irradiance = self.exact(face, index);
+                let irradiance = self.exact(point, normal, index);
                 Interval {
                     low: irradiance,
                     high: irradiance,
                 }
             }
-            Kind::Cluster(index) => self.bounds_of_cluster(face, index),
+            Kind::Cluster(index) => self.bounds_of_cluster(point, normal, index),
         }
     }
 
     /// Irradiance from an element in closed form; 0 where face or element lies in the plane of the other.
-    fn exact(&self, face: Face, index: usize) -> f32 {
+    fn exact(&self, point: Vec3, normal: Vec3, index: usize) -> f32 {
         let element = &self.hierarchy.mesh.elements[index];
-        let separation = element.centroid - face.point;
+        let separation = element.centroid - point;
         let least = IN_PLANE * (element.radius + separation.length());
         let corners = self.hierarchy.mesh.corners(index);
-        let above = |corner: &Vec3| (*corner - face.point).dot(face.normal) > least;
-        let normal = self.hierarchy.patch_of(index).normal;
-        if -separation.dot(normal) <= least || !corners.iter().any(above) {
+        let above = |corner: &Vec3| (*corner - point).dot(normal) > least;
+        let facing = self.hierarchy.patch_of(index).normal;
+        if -separation.dot(facing) <= least || !corners.iter().any(above) {
             return 0.0;
         }
         let radiosity = luminance(self.tables.elements[index]);
-        radiosity * point_irradiance(face.point, face.normal, corners)
+        radiosity * point_irradiance(point, normal, corners)
     }
 
     /// With D and R the distance and radius of the sphere about a cluster, all light comes along directions within
     /// α = asin(R/D) of that from its centre, from distances between those to the box. A projected power changes by at
     /// most its total times the length of the difference of two directions.
-    fn bounds_of_cluster(&self, face: Face, index: usize) -> Interval {
+    fn bounds_of_cluster(&self, point: Vec3, normal: Vec3, index: usize) -> Interval {
         let cluster = &self.hierarchy.clusters[index];
-        let towards = |corner: Vec3| corner - face.point;
+        let towards = |corner: Vec3| corner - point;
         let (least, most) = (towards(cluster.min), towards(cluster.max));
         // Heights of the corners of the box above the face, and distances to it.
         let middle = (least + most) * 0.5;
         let half = (most - least) * 0.5;
-        let (height, reach) = (middle.dot(face.normal), half.dot(face.normal.abs()));
+        let (height, reach) = (middle.dot(normal), half.dot(normal.abs()));
         let radius = cluster.radius;
         if height + reach <= IN_PLANE * (radius + middle.length()) {
             return Interval::default();
@@ -191,7 +189,7 @@ impl Kernel<'_> {
         let turn = (2.0 - 2.0 * cosine).max(0.0).sqrt();
         let unit = centre / distance;
         // Cosine at the face: by the cone, and by the heights of the box.
-        let at_centre = unit.dot(face.normal).clamp(-1.0, 1.0);
+        let at_centre = unit.dot(normal).clamp(-1.0, 1.0);
         let beside = (1.0 - at_centre * at_centre).max(0.0).sqrt();
         let largest = if at_centre >= cosine {
             1.0
@@ -240,43 +238,47 @@ mod tests {
         (hierarchy, tables)
     }
 
-    fn face(hierarchy: &Hierarchy, random: &mut Random) -> Face {
+    /// A point of a surface by chance, and its normal.
+    fn place(hierarchy: &Hierarchy, random: &mut Random) -> (Vec3, Vec3) {
         let patch = random.below(hierarchy.patches.len() as u32) as usize;
         let place = triangle_point(random.uniform_2d());
         let [a, b, c] = hierarchy.mesh.corners(patch);
-        Face {
-            point: a * place.x + b * place.y + c * place.z,
-            normal: hierarchy.patches[patch].normal,
+        let point = a * place.x + b * place.y + c * place.z;
+        (point, hierarchy.patches[patch].normal)
+    }
+
+    fn kernel<'a>((hierarchy, tables): &'a (Hierarchy, Tables)) -> Kernel<'a> {
+        Kernel {
+            hierarchy,
+            tables,
+            reading: Some(Reading::Bounded),
         }
     }
 
-    fn sum(hierarchy: &Hierarchy, kernel: Kernel<'_>, face: Face, node: NodeId) -> f64 {
-        let range = match hierarchy.kind(node) {
-            Kind::Cluster(index) => hierarchy.clusters[index].patches(),
+    fn sum(kernel: Kernel<'_>, (point, normal): (Vec3, Vec3), node: NodeId) -> f64 {
+        let range = match kernel.hierarchy.kind(node) {
+            Kind::Cluster(index) => kernel.hierarchy.clusters[index].patches(),
             Kind::Element(index) => index..index + 1,
         };
         range
-            .map(|patch| f64::from(kernel.exact(face, patch)))
+            .map(|patch| f64::from(kernel.exact(point, normal, patch)))
             .sum()
     }
 
     #[test]
     fn bounds_hold_the_sum_over_the_patches_at_any_tolerance() {
-        let (hierarchy, tables) = room();
-        let kernel = Kernel {
-            hierarchy: &hierarchy,
-            tables: &tables,
-            reading: Some(Reading::Bounded),
-        };
+        let room = room();
+        let kernel = kernel(&room);
+        let hierarchy = kernel.hierarchy;
         let mut random = Random::new(5, 0);
         let mut told = 0;
         for _ in 0..6000 {
-            let face = face(&hierarchy, &mut random);
+            let (point, normal) = place(hierarchy, &mut random);
             let node = NodeId(random.below(hierarchy.node_count() as u32));
-            let truth = sum(&hierarchy, kernel, face, node);
+            let truth = sum(kernel, (point, normal), node);
             let slack = 1e-4 * truth + 1e-6;
             for tolerance in [f32::INFINITY, 0.1 * truth as f32, 0.0] {
-                let found = kernel.bounds(face, &[(node, 1.0)], tolerance)[0];
+                let found = kernel.bounds(point, normal, &[(node, 1.0)], tolerance)[0];
                 let (low, high) = (f64::from(found.low), f64::from(found.high));
                 assert!(
                     low <= truth + slack && truth <= high + slack,
@@ -293,22 +295,19 @@ mod tests {
 
     #[test]
     fn the_widest_source_is_narrowed_first() {
-        let (hierarchy, tables) = room();
-        let kernel = Kernel {
-            hierarchy: &hierarchy,
-            tables: &tables,
-            reading: Some(Reading::Bounded),
-        };
+        let room = room();
+        let kernel = kernel(&room);
+        let hierarchy = kernel.hierarchy;
         let mut random = Random::new(7, 0);
         let children: Vec<(NodeId, f32)> = hierarchy
             .children(Hierarchy::ROOT)
             .map(|child| (NodeId(child), 1.0))
             .collect();
         for _ in 0..50 {
-            let face = face(&hierarchy, &mut random);
-            let truth = sum(&hierarchy, kernel, face, Hierarchy::ROOT) as f32;
+            let (point, normal) = place(hierarchy, &mut random);
+            let truth = sum(kernel, (point, normal), Hierarchy::ROOT) as f32;
             let tolerance = 0.05 * truth;
-            let found = kernel.bounds(face, &children, tolerance);
+            let found = kernel.bounds(point, normal, &children, tolerance);
             let widths: f32 = found.iter().map(|interval| interval.width()).sum();
             assert!(widths <= tolerance * 1.001, "{widths} above {tolerance}");
         }

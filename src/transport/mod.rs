@@ -14,7 +14,7 @@ mod tint;
 mod validate;
 mod visibility;
 
-pub use bounds::{Face, Interval};
+pub use bounds::Interval;
 pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};
 pub use link::{Link, LinkStore, TintedLink, TintedLinks};
 pub(crate) use oracle::self_irradiance;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::{
     geometry::{Hit, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     reference::ReferencePoint,
+    sampling::SurfacePoint,
     scene::{Scene, TriangleId},
     solver::Cancel,
 };
@@ -213,27 +214,12 @@ pub(super) fn arrival(
     hit: Hit,
 ) -> Option<ReferencePoint> {
     let Hit { triangle, distance } = hit;
-    let front = scene.surfaces[triangle.index()]
-        .area_vector
-        .normalize_or_zero();
-    let is_back = front.dot(direction) > 0.0;
+    let is_back = scene.surfaces[triangle.index()].area_vector.dot(direction) > 0.0;
     if is_back && !scene.triangles[triangle.index()].two_sided {
         return None;
     }
-    let corners = scene.corners(triangle);
     // Put back on the triangle: along the ray it is off by the rounding of the distance.
-    let barycentric = barycentric(origin + direction * distance, corners);
-    let [a, b, c] = corners;
-    Some(ReferencePoint {
-        triangle,
-        is_back,
-        barycentric,
-        position: a * barycentric.x + b * barycentric.y + c * barycentric.z,
-        normal: if is_back { -front } else { front },
-        reflectance: scene.reflectance_at(triangle, barycentric),
-        emission: scene.emission_at(triangle, barycentric),
-        irradiance: Vec3::ZERO,
-        irradiance_error: 0.0,
-        standard_error: 0.0,
-    })
+    let barycentric = barycentric(origin + direction * distance, scene.corners(triangle));
+    let point = SurfacePoint::at(scene, triangle, is_back, barycentric);
+    Some(ReferencePoint::from(point))
 }

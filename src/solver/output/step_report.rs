@@ -43,7 +43,7 @@ pub struct StepReport {
     /// Largest sum of form factors of an element.
     pub row_sum_max: f32,
     /// Bound of the error of the light over links, root mean square over the area, relative to the mean irradiance: see
-    /// [`Inspection::error_bound`](super::Inspection::error_bound).
+    /// [`Inspection::error_bound`](super::Inspection::error_bound). That of the step; other appearances do not renew it.
     pub error_bound: f32,
     /// Estimated error of the light shown; `None` where it was not estimated.
     pub estimated_error: Option<EstimatedError>,

@@ -13,7 +13,7 @@ use crate::{
         Cancel, ClusterBox, DisplayMesh, Omitted, Snapshot, VertexLight,
         direct::Surfaces,
         iteration::LinkedLight,
-        vertices::{LeafLight, VertexMeans},
+        vertices::{LeafLight, vertex_means},
     },
     transport::luminance,
 };
@@ -71,7 +71,7 @@ impl View<'_> {
                         Some(triangles) => self.display_mesh(triangles, cancel).map(Arc::new),
                         None => Some(before.mesh.clone()),
                     },
-                    || VertexMeans::new(hierarchy, self.leaves, self.factors),
+                    || vertex_means(hierarchy, self.leaves, self.factors),
                 )
             },
             || self.surfaces.direct.shown(hierarchy),
@@ -177,18 +177,18 @@ impl View<'_> {
     /// Light at the vertices: from links as means of the leaves about them, and straight from emitters.
     fn vertex_light(
         &self,
-        means: &VertexMeans,
-        direct: Option<&[(Vec4, f32)]>,
+        means: &[Vec4],
+        direct: Option<&[Vec4]>,
         mesh: &DisplayMesh,
     ) -> VertexLight {
-        let count = means.irradiance.len();
+        let count = means.len();
         let mut light = VertexLight {
             irradiance: Vec::with_capacity(count),
             direct: Vec::with_capacity(count),
         };
         let brightest = self.brightest();
-        for (vertex, &linked) in means.irradiance.iter().enumerate() {
-            let direct = direct.map_or(Vec4::ZERO, |direct| direct[vertex].0);
+        for (vertex, &linked) in means.iter().enumerate() {
+            let direct = direct.map_or(Vec4::ZERO, |direct| direct[vertex]);
             light
                 .irradiance
                 .push(displayable((linked + direct).min(brightest)));

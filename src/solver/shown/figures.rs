@@ -2,14 +2,10 @@
 
 use std::f32::consts::PI;
 
-use super::leaf_bounds::Bounding;
 use crate::{
-    hierarchy::{Channels as _, Hierarchy, luminance},
+    hierarchy::{Channels as _, Hierarchy},
     solver::{
-        Note, StepReport,
-        direct::Surfaces,
-        iteration::LinkedLight,
-        sums::{area_total, mean},
+        Note, StepReport, direct::Surfaces, iteration::LinkedLight, sums::area_total,
         vertices::LeafLight,
     },
 };
@@ -20,7 +16,6 @@ pub(crate) fn fill(
     surfaces: Surfaces<'_>,
     linked: &LinkedLight,
     leaves: &[LeafLight],
-    bounding: Bounding<'_>,
 ) {
     let hierarchy = surfaces.hierarchy;
     report.links = linked.links.len() as u64;
@@ -28,8 +23,6 @@ pub(crate) fn fill(
     report.elements = leaves.len() as u64;
     report.vertices = hierarchy.mesh.vertices.len() as u64;
     report.energy_balance = energy_balance(surfaces, linked);
-    let mean = mean(hierarchy, |leaf| linked.total(surfaces, leaf));
-    report.error_bound = bounding.relative_error(leaves, luminance(mean));
     fill_row_sums(report, hierarchy, linked);
 }
 

@@ -7,7 +7,7 @@ use super::path::path_to;
 use crate::{
     hierarchy::{ElementId, Hierarchy, NodeId, luminance},
     solver::vertices::{LeafLight, link_irradiance, own_irradiance},
-    transport::{Face, Interval, Kernel, LinkStore, TintedLink, is_too_near_for_tables},
+    transport::{Interval, Kernel, LinkStore, TintedLink, is_too_near_for_tables},
 };
 
 /// Sum of the widths of the bounds of the kernel, relative to the linked irradiance of a leaf. Smaller costs time;
@@ -38,38 +38,37 @@ impl<'a> Bounding<'a> {
             is_clear,
         } = self;
         let hierarchy = kernel.hierarchy;
-        let face = Face {
-            point: hierarchy.mesh.elements[leaf].centroid,
-            normal: hierarchy.patch_of(leaf).normal,
-        };
+        let point = hierarchy.mesh.elements[leaf].centroid;
+        let normal = hierarchy.patch_of(leaf).normal;
         // What the links give.
-        let mut links = Vec::new();
+        let mut given = Vec::new();
         for &receiver in path {
             store.tinted(receiver).for_each(|link| {
-                let irradiance = if link.source == receiver {
+                let is_own = link.source == receiver;
+                let irradiance = if is_own {
                     own_irradiance(kernel, receiver.index(), link)
                 } else {
-                    link_irradiance(kernel, link, face.point, face.normal)
+                    link_irradiance(kernel, link, point, normal)
                 };
-                links.push((link, receiver, irradiance));
+                let is_by_rays = is_own || is_too_near_for_tables(hierarchy, link.source, receiver);
+                given.push(Given {
+                    link,
+                    receiver,
+                    irradiance,
+                    is_by_rays,
+                });
             });
         }
         // What they should give.
-        let is_near = |link: TintedLink<'_>, receiver: NodeId| {
-            link.source == receiver || is_too_near_for_tables(hierarchy, link.source, receiver)
-        };
-        let weight = |&(link, receiver, _): &(TintedLink<'_>, NodeId, Vec4)| {
-            let near = is_near(link, receiver);
-            (link.source, if near { 1.0 } else { link.light_factor() })
-        };
-        let sources: Vec<(NodeId, f32)> = links.iter().map(weight).collect();
-        let total: f32 = links.iter().map(|(_, _, light)| luminance(*light)).sum();
-        let bounds = kernel.bounds(face, &sources, TOLERANCE * total);
-        let bounded = |((link, receiver, irradiance), unoccluded): (_, Interval)| {
-            bounded_link(hierarchy, link, receiver, irradiance, unoccluded, is_clear)
-        };
+        let source = |given: &Given<'_>| (given.link.source, given.weight());
+        let sources: Vec<(NodeId, f32)> = given.iter().map(source).collect();
+        let total: f32 = given.iter().map(|given| luminance(given.irradiance)).sum();
+        let bounds = kernel.bounds(point, normal, &sources, TOLERANCE * total);
+        let links = given.into_iter().zip(bounds);
         LeafBounds {
-            links: links.into_iter().zip(bounds).map(bounded).collect(),
+            links: links
+                .map(|(given, unoccluded)| given.bounded(unoccluded, is_clear))
+                .collect(),
         }
     }
 
@@ -165,34 +164,43 @@ impl BoundedLink<'_> {
     }
 }
 
-fn bounded_link<'a>(
-    hierarchy: &Hierarchy,
+/// What a leaf gets over a link.
+struct Given<'a> {
     link: TintedLink<'a>,
     receiver: NodeId,
     irradiance: Vec4,
-    unoccluded: Interval,
-    is_clear: bool,
-) -> BoundedLink<'a> {
-    let Interval { low, high } = unoccluded;
-    let is_by_rays =
-        link.source == receiver || is_too_near_for_tables(hierarchy, link.source, receiver);
-    let visibility = link.light_factor();
-    let (kernel, variance) = if is_by_rays {
-        (Interval { low: 0.0, high }, 0.0)
-    } else {
-        let within = visibility.min(1.0);
-        let share = link.visibility_variance() + within * (1.0 - within);
-        let kernel = Interval {
-            low: visibility * low,
-            high: visibility * high,
+    /// Whether rays found how much of it arrives, since tables say nothing of the pair.
+    is_by_rays: bool,
+}
+
+impl<'a> Given<'a> {
+    /// Factor of the unoccluded irradiance in its bounds.
+    fn weight(&self) -> f32 {
+        if self.is_by_rays {
+            1.0
+        } else {
+            self.link.light_factor()
+        }
+    }
+
+    fn bounded(self, unoccluded: Interval, is_clear: bool) -> BoundedLink<'a> {
+        let Interval { low, high } = unoccluded;
+        let weight = self.weight();
+        let within = self.link.light_factor().min(1.0);
+        let share = if self.is_by_rays || is_clear {
+            0.0
+        } else {
+            self.link.visibility_variance() + within * (1.0 - within)
         };
-        (kernel, if is_clear { 0.0 } else { share * high * high })
-    };
-    BoundedLink {
-        link,
-        receiver,
-        irradiance,
-        kernel,
-        variance,
+        BoundedLink {
+            link: self.link,
+            receiver: self.receiver,
+            irradiance: self.irradiance,
+            kernel: Interval {
+                low: if self.is_by_rays { 0.0 } else { weight * low },
+                high: weight * high,
+            },
+            variance: share * high * high,
+        }
     }
 }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::{
     gather_estimate::{GatherEstimate, factors},
-    reconstruct::{LeafLight, VertexMeans},
+    reconstruct::{LeafLight, vertex_means},
 };
 use crate::{
     geometry::{Hit, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
@@ -162,11 +162,9 @@ impl FinalGather<'_> {
         }
         let hierarchy = self.surfaces.hierarchy;
         // Light at vertices from links and from shadow rays.
-        let linked = VertexMeans::new(hierarchy, self.leaves, &[]).irradiance;
-        let direct: Vec<Vec4> = match self.surfaces.direct.shown(hierarchy) {
-            Some(shown) => shown.into_iter().map(|(light, _)| light).collect(),
-            None => vec![Vec4::ZERO; linked.len()],
-        };
+        let linked = vertex_means(hierarchy, self.leaves, &[]);
+        let direct = self.surfaces.direct.shown(hierarchy);
+        let direct = direct.unwrap_or_else(|| vec![Vec4::ZERO; linked.len()]);
         let received: Vec<Vec4> = linked.iter().zip(&direct).map(|(a, b)| a + b).collect();
         // A few rays from each vertex.
         let mut probes = self.probes(&linked);
@@ -241,7 +239,7 @@ impl FinalGather<'_> {
         let mesh = &hierarchy.mesh;
         let weights = vertex_share_roots(hierarchy);
         let emitted = emitted_as_irradiance(hierarchy);
-        let squares = VertexMeans::new(hierarchy, self.squares, &[]).irradiance;
+        let squares = vertex_means(hierarchy, self.squares, &[]);
         let probe = |(vertex, place): (u32, Receiver)| {
             let linked = linked[vertex as usize];
             let all = luminance(linked + direct.corner(vertex));

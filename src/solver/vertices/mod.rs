@@ -5,5 +5,5 @@ mod gather_estimate;
 mod reconstruct;
 
 pub(crate) use final_gather::{FinalGather, converged_change};
-pub(crate) use reconstruct::{LeafLight, VertexMeans, link_irradiance, own_irradiance};
+pub(crate) use reconstruct::{LeafLight, link_irradiance, own_irradiance, vertex_means};
 pub(crate) use reconstruct::{divide_by_interpolation_error, gather_leaves};

@@ -308,65 +308,61 @@ fn transmission(kernel: Kernel<'_>, link: TintedLink<'_>) -> Vec4 {
     }
 }
 
-/// Area-weighted means of the leaves about each vertex.
-pub(crate) struct VertexMeans {
-    /// Linked irradiance.
-    pub irradiance: Vec<Vec4>,
-}
-
-impl VertexMeans {
-    /// Average the light of leaves over the vertices that they share. Irradiance is multiplied by `factors`, or by 1 if
-    /// they are empty. Vertices that only prevent cracks take the mean of the ends of their edge.
-    pub(crate) fn new(hierarchy: &Hierarchy, leaves: &[LeafLight], factors: &[Vec4]) -> Self {
-        let count = hierarchy.mesh.vertices.len();
-        let mut irradiance = vec![Vec4::ZERO; count];
-        let mut weight = vec![0.0f32; count];
-        // Sums over the leaves about each vertex.
-        for leaf in leaves {
-            let element = &hierarchy.mesh.elements[leaf.element as usize];
-            let trust = if element.is_outside_solids() {
-                1.0
-            } else {
-                CONTACT_TRUST
-            };
-            let area = (element.area_vector.length() * trust).max(f32::MIN_POSITIVE);
-            for (&vertex, &value) in element.vertices.iter().zip(&leaf.corners) {
-                irradiance[vertex as usize] += value * area;
-                weight[vertex as usize] += area;
-            }
+/// Linked irradiance at each vertex: the area-weighted mean of the leaves about it. It is multiplied by `factors`, or by 1 if
+/// they are empty. Vertices that only prevent cracks take the mean of the ends of their edge.
+pub(crate) fn vertex_means(
+    hierarchy: &Hierarchy,
+    leaves: &[LeafLight],
+    factors: &[Vec4],
+) -> Vec<Vec4> {
+    let count = hierarchy.mesh.vertices.len();
+    let mut irradiance = vec![Vec4::ZERO; count];
+    let mut weight = vec![0.0f32; count];
+    // Sums over the leaves about each vertex.
+    for leaf in leaves {
+        let element = &hierarchy.mesh.elements[leaf.element as usize];
+        let trust = if element.is_outside_solids() {
+            1.0
+        } else {
+            CONTACT_TRUST
+        };
+        let area = (element.area_vector.length() * trust).max(f32::MIN_POSITIVE);
+        for (&vertex, &value) in element.vertices.iter().zip(&leaf.corners) {
+            irradiance[vertex as usize] += value * area;
+            weight[vertex as usize] += area;
         }
-        // Patches that no light reaches receive nothing.
-        for patch in hierarchy.active_patches().end..hierarchy.patches.len() {
-            for &vertex in &hierarchy.mesh.elements[patch].vertices {
-                weight[vertex as usize] += hierarchy.patches[patch].area;
-            }
-        }
-        for index in (0..count).filter(|&index| weight[index] > 0.0) {
-            irradiance[index] /= weight[index];
-        }
-        // Vertices of contact elements only, and the means of elements.
-        carry_over(
-            &hierarchy.mesh,
-            |element, _| element.is_outside_solids(),
-            &mut irradiance,
-        );
-        let centres = leaves
-            .iter()
-            .map(|leaf| (leaf.element as usize, leaf.centre))
-            .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
-        project(hierarchy, &mut irradiance, centres);
-        // The factors of the final gather.
-        for (value, factor) in irradiance.iter_mut().zip(factors) {
-            *value *= *factor;
-        }
-        for index in (0..count).filter(|&index| weight[index] <= 0.0) {
-            if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {
-                // Ends were made before the vertices between them.
-                irradiance[index] = (irradiance[a as usize] + irradiance[b as usize]) * 0.5;
-            }
-        }
-        Self { irradiance }
     }
+    // Patches that no light reaches receive nothing.
+    for patch in hierarchy.active_patches().end..hierarchy.patches.len() {
+        for &vertex in &hierarchy.mesh.elements[patch].vertices {
+            weight[vertex as usize] += hierarchy.patches[patch].area;
+        }
+    }
+    for index in (0..count).filter(|&index| weight[index] > 0.0) {
+        irradiance[index] /= weight[index];
+    }
+    // Vertices of contact elements only, and the means of elements.
+    carry_over(
+        &hierarchy.mesh,
+        |element, _| element.is_outside_solids(),
+        &mut irradiance,
+    );
+    let centres = leaves
+        .iter()
+        .map(|leaf| (leaf.element as usize, leaf.centre))
+        .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
+    project(hierarchy, &mut irradiance, centres);
+    // The factors of the final gather.
+    for (value, factor) in irradiance.iter_mut().zip(factors) {
+        *value *= *factor;
+    }
+    for index in (0..count).filter(|&index| weight[index] <= 0.0) {
+        if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {
+            // Ends were made before the vertices between them.
+            irradiance[index] = (irradiance[a as usize] + irradiance[b as usize]) * 0.5;
+        }
+    }
+    irradiance
 }
 
 /// Divide leaves whose linked light has an interpolation error above the tolerance. Returns whether memory allowed it;

@@ -34,10 +34,8 @@ pub(crate) struct Inspector<'a> {
     pub surfaces: Surfaces<'a>,
     /// Light over links.
     pub linked: &'a LinkedLight,
-    /// How tables are read.
-    pub reading: Option<Reading>,
-    /// Whether nothing is ever hidden.
-    pub is_clear: bool,
+    /// Bounds of the light over links, and the kernel that it follows from.
+    pub bounding: Bounding<'a>,
     /// Coverage to which form factors are scaled.
     pub coverage: &'a CoverageMap,
     /// Linked light of the leaves when they gathered last.
@@ -94,7 +92,7 @@ impl<'a> Inspector<'a> {
     }
 
     fn kernel(&self) -> Kernel<'a> {
-        self.linked.kernel(self.hierarchy(), self.reading)
+        self.bounding.kernel
     }
 
     /// The leaf of an element that contains a point.
@@ -119,12 +117,7 @@ impl<'a> Inspector<'a> {
         };
         match self.hierarchy().kind(node) {
             Kind::Element(leaf) => {
-                let bounding = Bounding {
-                    kernel,
-                    links: store,
-                    is_clear: self.is_clear,
-                };
-                let bounds = bounding.leaf(path, leaf);
+                let bounds = self.bounding.leaf(path, leaf);
                 let of = |bound: &BoundedLink<'_>| {
                     inspected(bound.link, bound.receiver, bound.irradiance, bound.error())
                 };
