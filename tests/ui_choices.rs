@@ -169,7 +169,7 @@ fn a_scene_shows_only_what_it_can_use() {
     // The table of views does not offer errors without a reference either.
     harness.get_by_label("View mode").click();
     harness.run_steps(3);
-    harness.get_by_label("False colour: error bound");
+    harness.get_by_label("Estimated error");
     // Only the panel of that name.
     assert_eq!(harness.query_all_by_label("Measured error").count(), 1);
 }

@@ -28,13 +28,15 @@ const LEAST_SHARE: f32 = 0.75;
 /// Share of the rays on each side of an axis that go through windows and doors. Less, and what lies behind a window
 /// belongs to the room; more, and its own ends do not.
 const OUTSIDE: f32 = 0.02;
-/// Share of the way from the middle of the box to its sides, from which on a surface that faces it is a wall of the room.
-/// Smaller, and things that stand before the room are drawn; larger, and slanted walls of an open side have slits.
-const WALL: f32 = 0.9;
 /// The box ends this far before the walls, in frame units, so that these lie outside.
 const MARGIN: f32 = 0.2;
 
 impl Interior {
+    /// Share of the way from the middle of the box to its sides, from which on a surface that faces it is a wall of the
+    /// room. Smaller, and things that stand before the room are drawn; larger, and slanted walls of an open side have
+    /// slits.
+    pub const WALL: f32 = 0.9;
+
     /// The room about some places in it; `None` where most rays from there meet nothing.
     pub(super) fn about(rays: &RayTree, places: &[Vec3]) -> Option<Self> {
         let ends: Vec<Vec3> = places
@@ -77,7 +79,7 @@ impl Interior {
     /// before the box. `normal` points towards the viewer.
     pub fn is_wall(&self, point: Vec3, normal: Vec3) -> bool {
         let (middle, half) = ((self.min + self.max) * 0.5, (self.max - self.min) * 0.5);
-        normal.dot(middle - point) > WALL * normal.abs().dot(half)
+        normal.dot(middle - point) > Self::WALL * normal.abs().dot(half)
     }
 
     /// How far along a ray of unit direction it is entered: 0 from inside; `None` where it is passed by.

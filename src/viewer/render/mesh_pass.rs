@@ -10,7 +10,10 @@ use super::{
     meter::METER_FORMAT,
     uploads::Uploads,
 };
-use crate::viewer::view::{ViewMode, ViewSettings};
+use crate::viewer::{
+    first_look::Interior,
+    view::{ViewMode, ViewSettings},
+};
 
 /// Pipelines of the surfaces.
 pub(super) struct MeshPass {
@@ -331,7 +334,10 @@ fn pipeline(
                 module,
                 entry_point: Some(fragment),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &[("CUTS", f64::from(u8::from(cuts)))],
+                    constants: &[
+                        ("CUTS", f64::from(u8::from(cuts))),
+                        ("WALL", f64::from(Interior::WALL)),
+                    ],
                     ..Default::default()
                 },
                 targets: &[Some(wgpu::ColorTargetState {

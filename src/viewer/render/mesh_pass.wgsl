@@ -70,7 +70,7 @@ fn is_before_room(position: vec3<f32>) -> bool {
 
 // Share of the way from the middle of the room to its sides, from which on a surface that faces it is one of its walls:
 // see `Interior::is_wall`.
-const WALL: f32 = 0.9;
+override WALL: f32;
 
 // Whether a surface with this normal towards the viewer is a wall of the room, seen from the side of the room.
 fn is_wall(position: vec3<f32>, normal: vec3<f32>) -> bool {
