@@ -6,11 +6,13 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::palette::{plain, textured};
 use super::pictures;
-use super::shapes::{Facing, Mesh, Side, cuboid, geodesic_sphere, lathe, lattice_box};
+use super::shapes::{
+    Facing, Mesh, Side, cuboid, geodesic_sphere, lathe, lattice_box, windowed_shell,
+};
 use crate::scene::{Environment, Material, MaterialId, SceneBuilder, Sky, Sun, UpAxis};
 
 /// A sky and a sun in it that stands at a place in degrees.
-fn day(sky: [f32; 3], [azimuth, elevation]: [f32; 2], sun: [f32; 3]) -> Environment {
+pub(super) fn day(sky: [f32; 3], [azimuth, elevation]: [f32; 2], sun: [f32; 3]) -> Environment {
     Environment {
         sky: Sky::Uniform(Vec3::from_array(sky)),
         sun: Some(Sun {
@@ -123,41 +125,20 @@ pub(super) fn glazed_room() -> SceneBuilder {
     });
 
     block([-6.0, -0.6, -6.0], [11.0, -0.25, 13.0], earth).add_to(&mut builder, "ground");
-    // The window: a hole in the inner and in the outer shell, joined by its reveal.
     let (xs, ys) = ([1.0, 4.0], [0.9, 2.4]);
-    let is_window = |side: Side, centre: DVec3| {
-        let within = |[low, high]: [f64; 2], at: f64| (low..high).contains(&at);
-        side == Side::Far && within(xs, centre.x) && within(ys, centre.y)
-    };
-    let mut shell = lattice_box(
-        [
-            &[0.0, xs[0], xs[1], 5.0],
-            &[0.0, ys[0], ys[1], 2.8],
-            &[0.0, 2.0, 4.0],
-        ],
-        Facing::Inward,
-        |side, centre| match side {
-            _ if is_window(side, centre) => None,
-            Side::Bottom => Some(boards),
-            Side::Left | Side::Right => Some(side_wall),
-            _ => Some(wall),
+    windowed_shell(
+        [0.0, xs[0], xs[1], 5.0],
+        [0.0, ys[0], ys[1], 2.8],
+        &[0.0, 2.0, 4.0],
+        0.3,
+        |side| match side {
+            Side::Bottom => boards,
+            Side::Left | Side::Right => side_wall,
+            _ => wall,
         },
-    );
-    shell.append(lattice_box(
-        [
-            &[-0.3, xs[0], xs[1], 5.3],
-            &[-0.3, ys[0], ys[1], 3.1],
-            &[-0.3, 4.3],
-        ],
-        Facing::Outward,
-        |side, centre| (!is_window(side, centre)).then_some(facade),
-    ));
-    shell.append(lattice_box(
-        [&xs, &ys, &[4.0, 4.3]],
-        Facing::Inward,
-        |side, _| (side != Side::Near && side != Side::Far).then_some(frame),
-    ));
-    shell.welded().add_to(&mut builder, "room");
+        [facade, frame],
+    )
+    .add_to(&mut builder, "room");
     block([2.46, 0.88, 4.1], [2.54, 2.42, 4.2], frame).add_to(&mut builder, "mullion");
     let mut panes = Mesh::default();
     for [left, right] in [[xs[0], 2.5], [2.5, xs[1]]] {

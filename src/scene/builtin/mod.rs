@@ -8,6 +8,7 @@ mod courtyard;
 pub mod exact;
 mod furnace;
 mod gallery;
+mod interiors;
 mod palette;
 mod pictures;
 mod plates;
@@ -97,7 +98,7 @@ const fn view(position: [f64; 3], target: [f64; 3]) -> Viewpoint {
     }
 }
 
-static BUILTINS: [Builtin; 13] = [
+static BUILTINS: [Builtin; 16] = [
     Builtin {
         name: "gallery",
         summary: "a hall with columns, a staircase, furniture and pictures, lit by windows and warm spots",
@@ -160,6 +161,27 @@ static BUILTINS: [Builtin; 13] = [
         viewpoint: view([0.5, 1.6, 0.4], [3.0, 1.1, 4.0]),
         faces: courtyard::glazed_room,
         environment: Some(courtyard::morning),
+    },
+    Builtin {
+        name: "living-room",
+        summary: "a living room with cushions, books, curtains and plants, lit by lamps and low sun through a window",
+        viewpoint: view([3.9, 1.65, 0.2], [2.7, 0.95, 4.0]),
+        faces: interiors::living_room,
+        environment: Some(interiors::late_afternoon),
+    },
+    Builtin {
+        name: "office",
+        summary: "an open-plan office of 24 desks under 64 ceiling lamps, with a meeting room behind glass",
+        viewpoint: view([0.5, 1.75, 0.5], [8.0, 0.7, 6.5]),
+        faces: interiors::office,
+        environment: None,
+    },
+    Builtin {
+        name: "carriage",
+        summary: "a subway carriage with poles, rails, straps and benches, lit by two strips of many small lamps",
+        viewpoint: view([0.25, 1.65, 0.4], [0.0, 1.2, 8.0]),
+        faces: interiors::carriage,
+        environment: None,
     },
     Builtin {
         name: "soup",

@@ -50,6 +50,40 @@ pub(super) fn stone_tiles(name: &str, light: Vec3, dark: Vec3) -> Texture {
     })
 }
 
+/// Floorboards along v, eight side by side, each of two lengths.
+pub(super) fn planks(name: &str) -> Texture {
+    painted(name, [128, 128], |at| {
+        let board = (at.x * 8.0).floor();
+        let along = at.y + 0.37 * speckle(Vec2::new(board, 3.0));
+        let cell = Vec2::new(board, (along * 2.0).floor().rem_euclid(2.0));
+        let joint = (at.x * 8.0)
+            .fract()
+            .min((along * 2.0).rem_euclid(1.0) * 4.0);
+        let grain = (40.0 * at.x + 3.0 * (5.0 * at.y + 7.0 * speckle(cell)).sin()).sin();
+        let wood = Vec3::new(0.68, 0.52, 0.36) * (0.85 + 0.25 * speckle(cell) + 0.03 * grain);
+        if joint < 0.05 { wood * 0.6 } else { wood }
+    })
+}
+
+/// Wallpaper: broad stripes with a small figure on every other one.
+pub(super) fn wallpaper(name: &str) -> Texture {
+    let (ground, stripe, figure) = (
+        Vec3::new(0.78, 0.8, 0.74),
+        Vec3::new(0.68, 0.74, 0.68),
+        Vec3::new(0.52, 0.62, 0.54),
+    );
+    painted(name, [96, 96], |at| {
+        let column = (at.x * 6.0).floor() as i32;
+        let inside = Vec2::new((at.x * 6.0).fract(), (at.y * 6.0).fract()) - Vec2::splat(0.5);
+        let petals = 0.24 + 0.1 * (5.0 * inside.y.atan2(inside.x)).cos();
+        match column % 2 {
+            0 => ground,
+            _ if inside.length() < petals => figure,
+            _ => stripe,
+        }
+    })
+}
+
 /// A woven rug: a border around diamonds.
 pub(super) fn rug(name: &str) -> Texture {
     let (ground, thread, border) = (

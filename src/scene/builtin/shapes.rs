@@ -243,6 +243,40 @@ pub(super) fn painted_cuboid(
     )
 }
 
+/// A room with one window in its far wall, closed: walls that face inward, a facade around them that faces outward, and the
+/// reveal that joins both. The window takes the middle of `xs` and of `ys`; `paint` is for the walls by their sides, the
+/// other materials are those of facade and reveal.
+pub(super) fn windowed_shell(
+    xs: [f64; 4],
+    ys: [f64; 4],
+    zs: &[f64],
+    thickness: f64,
+    paint: impl Fn(Side) -> MaterialId,
+    [facade, reveal]: [MaterialId; 2],
+) -> Mesh {
+    let is_window = |side: Side, centre: DVec3| {
+        let within = |lines: [f64; 4], at: f64| (lines[1]..lines[2]).contains(&at);
+        side == Side::Far && within(xs, centre.x) && within(ys, centre.y)
+    };
+    let (near, far) = (zs[0], zs[zs.len() - 1]);
+    let outer =
+        |[low, first, last, high]: [f64; 4]| [low - thickness, first, last, high + thickness];
+    let mut shell = lattice_box([&xs, &ys, zs], Facing::Inward, |side, centre| {
+        (!is_window(side, centre)).then(|| paint(side))
+    });
+    shell.append(lattice_box(
+        [&outer(xs), &outer(ys), &[near - thickness, far + thickness]],
+        Facing::Outward,
+        |side, centre| (!is_window(side, centre)).then_some(facade),
+    ));
+    shell.append(lattice_box(
+        [&xs[1..3], &ys[1..3], &[far, far + thickness]],
+        Facing::Inward,
+        |side, _| (side != Side::Near && side != Side::Far).then_some(reveal),
+    ));
+    shell.welded()
+}
+
 /// Lines through all `breaks`, ascending, with equal cells of about `cell` between them.
 pub(super) fn lines_through(breaks: &[f64], cell: f64) -> Vec<f64> {
     let mut lines = vec![breaks[0]];
