@@ -14,7 +14,8 @@ use vecrad::{
     reference::{PathSettings, PathTraced, PathTracer},
     scene::{Scene, SceneBuilder, SceneOptions, Sides, builtin},
     solver::{
-        Cancel, Direct, Method, Note, Oracle, Push, Snapshot, SolveSettings, Solver, StepReport,
+        Cancel, Direct, Method, Note, Oracle, Phase, Push, Snapshot, SolveSettings, Solver,
+        StepReport,
     },
 };
 
@@ -411,4 +412,29 @@ fn a_cancelled_step_leaves_the_last_light() {
     cancel.cancel();
     assert!(solver.step(&cancel).is_none());
     assert_eq!(before.light, solver.snapshot().light);
+}
+
+#[test]
+fn a_step_tells_its_phases_in_order_with_the_rays_shot_so_far() {
+    let cancel = Cancel::default();
+    let mut solver = prepare(&scene("cornell"), SolveSettings::draft());
+    let mut rays_before = 0;
+    loop {
+        let mut phases = Vec::new();
+        let report = solver.step_in_phases(&cancel, &mut |phase, rays| {
+            assert!(rays >= rays_before, "{phase:?}: {rays}");
+            rays_before = rays;
+            phases.push(phase);
+        });
+        let report = report.unwrap();
+        assert_eq!(report.shadow_rays, rays_before);
+        // Figures and mesh are one phase.
+        phases.dedup();
+        let mut expected = Phase::ALL.to_vec();
+        expected.retain(|&phase| report.is_final || phase != Phase::FinalGather);
+        assert_eq!(phases, expected);
+        if report.is_final {
+            break;
+        }
+    }
 }

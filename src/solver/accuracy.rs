@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    Cancel, EstimatedError, Note, Obstacle, Solver, StepReport,
+    Cancel, EstimatedError, Note, Obstacle, Phase, PhaseObserver, Solver, StepReport,
     direct::Surfaces,
     estimate::{self, ErrorEstimator},
     settings::FINEST_THRESHOLD,
@@ -39,6 +39,19 @@ impl Solver {
             .notes
             .push(Note::ErrorNotReached { wanted, obstacle });
         true
+    }
+
+    /// Renew the snapshot, and estimate the error of its light.
+    pub(super) fn show_and_estimate(
+        &mut self,
+        step: u32,
+        cancel: &Cancel,
+        begin: PhaseObserver<'_>,
+    ) -> Option<EstimatedError> {
+        begin(Phase::Display, self.ray_count);
+        self.show(step, cancel)?;
+        begin(Phase::Estimate, self.ray_count);
+        self.estimate_error(cancel)
     }
 
     /// Estimate the error of the light shown; the snapshot gets it by point.

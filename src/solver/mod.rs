@@ -32,7 +32,8 @@ pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
     ClusterBox, DisplayMesh, ErrorPoint, EstimatedError, InspectedLink, Inspection, Note, Obstacle,
-    Omitted, PathNode, Place, Relit, Snapshot, StepReport, Subject, VertexLight,
+    Omitted, PathNode, Phase, PhaseObserver, PhaseTimes, Place, Relit, Snapshot, StepReport,
+    Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

@@ -11,9 +11,9 @@ use super::{
     relighting,
     schedule::threshold_scale,
     shown,
-    vertices::{self, FinalGather},
+    vertices::{self, FinalGather, LeafLight},
 };
-use crate::scene::Appearance;
+use crate::{hierarchy::Tables, scene::Appearance, transport::Kernel};
 
 impl Solver {
     /// Run the final gather on the existing links, as the last step does: for when no further step can end in time. The
@@ -30,6 +30,23 @@ impl Solver {
         }
         report.estimated_error = self.estimate_error(cancel);
         Some(report)
+    }
+
+    /// Gather once more for each leaf, at its own corners.
+    pub(super) fn gather_for_leaves(&mut self, cancel: &Cancel) -> Option<()> {
+        self.leaves = self.gathered(&self.linked.power, cancel)?;
+        Some(())
+    }
+
+    /// Light of the leaves, gathered over the links from these source tables.
+    pub(super) fn gathered(&self, tables: &Tables, cancel: &Cancel) -> Option<Vec<LeafLight>> {
+        let kernel = Kernel {
+            hierarchy: &self.hierarchy,
+            tables,
+            reading: self.settings.method.reading(),
+        };
+        let (surfaces, links) = (self.surfaces(), &self.linked.links);
+        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, cancel)
     }
 
     /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Snapshot, SolveSettings, StepReport,
+    Cancel, Phase, PhaseObserver, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, CoverageMap},
     direct::{self, DirectFields, Surfaces},
@@ -23,9 +23,8 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    hierarchy::{Hierarchy, SheetSides, Tables},
+    hierarchy::{Hierarchy, SheetSides},
     scene::{ActiveMaterials, Appearance, Scene},
-    transport::Kernel,
 };
 
 /// A solve in progress.
@@ -176,6 +175,15 @@ impl Solver {
     /// One progressive step: lower the threshold, refine, gather, push and pull.
     /// Returns `None` when cancelled; the snapshot is then that of the last whole step.
     pub fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        self.step_in_phases(cancel, &mut |_, _| ())
+    }
+
+    /// As [`Self::step`], and tell as each phase begins.
+    pub fn step_in_phases(
+        &mut self,
+        cancel: &Cancel,
+        begin: PhaseObserver<'_>,
+    ) -> Option<StepReport> {
         let step_count = self.settings.step_count();
         let mut report = StepReport {
             step: self.step + 1,
@@ -185,12 +193,15 @@ impl Solver {
         let is_coarse = is_coarse(threshold_scale);
         self.is_full = false;
         self.relighting.begin_step();
+        begin(Phase::Coverage, self.ray_count);
         // Coverage of the hemisphere of each cell of the first mesh by lit surfaces.
         self.probe_coverage(is_coarse, cancel)?;
+        begin(Phase::Direct, self.ray_count);
         // Divide elements where interpolation errs: of the linked light of the last step, and of direct light.
         self.adapt_to_linked(threshold_scale);
         self.adapt_to_direct(threshold_scale, cancel)?;
         cancel.proceed()?;
+        begin(Phase::Refine, self.ray_count);
         // Source tables of the present light, and the mean that errors are relative to.
         self.pull();
         cancel.proceed()?;
@@ -198,11 +209,13 @@ impl Solver {
         // Links whose errors are below the threshold.
         report.epsilon = self.refine(threshold_scale, cancel)?;
         self.probe_contacts(cancel)?;
+        begin(Phase::Iterate, self.ray_count);
         // Factors of the senders, so that sent light adds up as received light does.
         self.balance(cancel)?;
         // Exchange light over the links until it converges; coarse links need a coarse tolerance only.
         let tolerance = self.settings.tolerance * threshold_scale;
         self.iterate(tolerance, &mut report, cancel)?;
+        begin(Phase::Gather, self.ray_count);
         // Light at the corners of each leaf, from its links.
         self.gather_for_leaves(cancel)?;
         cancel.proceed()?;
@@ -211,24 +224,22 @@ impl Solver {
         let mut is_last = self.is_full || report.step >= step_count;
         let mut estimated = None;
         if self.settings.error.is_some() && !is_last {
-            self.show(report.step, cancel)?;
-            let coarse = self.estimate_error(cancel)?;
+            let coarse = self.show_and_estimate(report.step, cancel, begin)?;
             is_last = self.is_error_reached(coarse);
             estimated = Some(coarse).filter(|_| !is_last);
         }
         // In the last step, factors of the linked light from rays at the vertices.
         if is_last {
+            begin(Phase::FinalGather, self.ray_count);
             self.vertex_factors = self.final_gather(threshold_scale.min(1.0), cancel)?;
         }
         // Figures and picture.
+        begin(Phase::Display, self.ray_count);
         self.fill(&mut report);
         report.error_bound = self.error_bound();
         let estimated = match estimated {
             Some(estimated) => estimated,
-            None => {
-                self.show(report.step, cancel)?;
-                self.estimate_error(cancel)?
-            }
+            None => self.show_and_estimate(report.step, cancel, begin)?,
         };
         report.estimated_error = Some(estimated);
         self.step = report.step;
@@ -391,23 +402,6 @@ impl Solver {
         report.contraction = report.contraction.max(convergence.contraction);
         report.notes.extend(convergence.notes);
         Some(())
-    }
-
-    /// Gather once more for each leaf, at its own corners.
-    pub(super) fn gather_for_leaves(&mut self, cancel: &Cancel) -> Option<()> {
-        self.leaves = self.gathered(&self.linked.power, cancel)?;
-        Some(())
-    }
-
-    /// Light of the leaves, gathered over the links from these source tables.
-    pub(super) fn gathered(&self, tables: &Tables, cancel: &Cancel) -> Option<Vec<LeafLight>> {
-        let kernel = Kernel {
-            hierarchy: &self.hierarchy,
-            tables,
-            reading: self.settings.method.reading(),
-        };
-        let (surfaces, links) = (self.surfaces(), &self.linked.links);
-        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, cancel)
     }
 
     /// Fill in the figures of the present state.

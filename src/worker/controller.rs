@@ -143,7 +143,7 @@ impl Controller {
             match self.wait() {
                 Some(Message::Command(Command::Shutdown)) => break,
                 Some(Message::Command(command)) => self.carry_out(command),
-                Some(Message::Returned(returned)) => self.accept(returned),
+                Some(Message::Returned(returned)) => self.accept(*returned),
                 None => self.check_deadlines(),
             }
         }
@@ -239,7 +239,7 @@ impl Controller {
                 returned.result = Ok(None);
             }
             // Nobody waits once the worker has ended.
-            let _ = inbox.send(Message::Returned(returned));
+            let _ = inbox.send(Message::Returned(Box::new(returned)));
         });
     }
 

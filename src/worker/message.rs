@@ -157,5 +157,5 @@ pub(super) enum Message {
     /// A command.
     Command(Command),
     /// The pool returns the solve.
-    Returned(Returned),
+    Returned(Box<Returned>),
 }

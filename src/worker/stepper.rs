@@ -1,11 +1,13 @@
 //! The solver as the worker runs it, so that tests can substitute it.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
 use crate::{
     geometry::RayTree,
     scene::{Appearance, Scene},
-    solver::{Cancel, Inspection, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject},
+    solver::{
+        Cancel, Inspection, Phase, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject,
+    },
 };
 
 /// A solve that advances step by step.
@@ -66,7 +68,16 @@ pub type MakeStepper = Arc<dyn Fn(Job, &Cancel) -> Option<Box<dyn Stepper>> + Se
 
 impl Stepper for Solver {
     fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        Self::step(self, cancel)
+        let mut begun: Vec<(Phase, Instant)> = Vec::new();
+        let mut report = self.step_in_phases(cancel, &mut |phase, _| {
+            begun.push((phase, Instant::now()));
+        })?;
+        let ends = begun.iter().skip(1).map(|(_, at)| *at);
+        let ends = ends.chain([Instant::now()]);
+        for (&(phase, begin), end) in begun.iter().zip(ends) {
+            *report.phases.of_mut(phase) += end.duration_since(begin).as_secs_f64();
+        }
+        Some(report)
     }
 
     fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{estimated_error::EstimatedError, note::Note};
+use super::{estimated_error::EstimatedError, note::Note, phases::PhaseTimes};
 
 /// Figures of one step. Quantities in world units.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -13,6 +13,8 @@ pub struct StepReport {
     pub elapsed_s: f64,
     /// Seconds spent in solver steps; filled in by the caller that owns a clock.
     pub solve_s: f64,
+    /// Seconds spent in each phase of this step; filled in by the caller that owns a clock.
+    pub phases: PhaseTimes,
     /// Link threshold of this step.
     pub epsilon: f32,
     /// Number of links.
