@@ -304,6 +304,7 @@ impl Solver {
         // Cells that rays found inside solids.
         let within = &probed.within;
         self.ray_count += places::probe_within(scene, &mut self.hierarchy, rays, within, cancel)?;
+        self.coverage.exclude_inside_solids(&self.hierarchy, within);
         Some(())
     }
 

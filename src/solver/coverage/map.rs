@@ -82,6 +82,15 @@ impl CoverageMap {
         !self.of.is_empty() && (is_coarse || !self.is_rough)
     }
 
+    /// Those of some cells that lie inside solids get no light.
+    pub(crate) fn exclude_inside_solids(&mut self, hierarchy: &Hierarchy, cells: &[usize]) {
+        for &cell in cells {
+            if hierarchy.mesh.elements[cell].is_inside_solid() {
+                self.of[cell] = HemisphereCoverage::INSIDE_SOLID;
+            }
+        }
+    }
+
     /// Mean radiosity of the neighbourhood of a patch.
     pub(crate) fn nearby(&self, tables: &Tables, patch: usize) -> Vec3 {
         // A scene without active patches has no cluster.

@@ -103,3 +103,40 @@ fn a_single_face_sees_nothing() {
     let (means, _) = probed(&one_sided(builder));
     assert!(means[1] < 1e-2, "{means:?}");
 }
+
+#[test]
+fn small_elements_under_a_box_count_as_inside_it_once_their_rays_tell_so() {
+    const SIDE: usize = 24;
+    let (mut faces, wall, lamp) = builder();
+    let width = 4.0 / SIDE as f64;
+    for cell in 0..SIDE * SIDE {
+        let corner = DVec3::new((cell % SIDE) as f64, 0.0, (cell / SIDE) as f64) * width;
+        rectangle(
+            &mut faces,
+            corner,
+            [DVec3::Z * width, DVec3::X * width],
+            wall,
+        );
+    }
+    let ends = [DVec3::new(1.05, 0.0, 1.05), DVec3::new(2.55, 1.0, 2.55)];
+    cuboid(&mut faces, ends, false, |_| true, wall);
+    let edges = [DVec3::X, DVec3::Z];
+    rectangle(&mut faces, DVec3::new(1.5, 3.0, 1.5), edges, lamp);
+    let scene = Arc::new(one_sided(faces));
+    let cancel = Cancel::default();
+    let mut solver = Solver::new(scene.clone(), SolveSettings::draft(), None, &cancel).unwrap();
+    solver.probe_coverage(false, &cancel).unwrap();
+    let mut inside = 0;
+    for leaf in solver.hierarchy.mesh.active_leaves() {
+        let at = scene
+            .frame
+            .to_world(solver.hierarchy.mesh.elements[leaf].centroid);
+        let is_under = at.y < 1e-3 && [at.x, at.z].iter().all(|at| (1.25..2.35).contains(at));
+        if is_under {
+            inside += 1;
+            let coverage = solver.coverage.of(&solver.hierarchy, leaf);
+            assert_eq!(coverage, HemisphereCoverage::INSIDE_SOLID, "{at}");
+        }
+    }
+    assert!(inside > 30, "{inside}");
+}
