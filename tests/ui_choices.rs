@@ -166,10 +166,14 @@ fn a_scene_shows_only_what_it_can_use() {
             "{label}"
         );
     }
-    // The table of views does not offer errors without a reference either.
+    // The table of views offers the estimated error beside the figure of that name, and no errors without a reference.
+    let told = harness.query_all_by_label("Estimated error").count();
     harness.get_by_label("View mode").click();
     harness.run_steps(3);
-    harness.get_by_label("Estimated error");
+    assert_eq!(
+        harness.query_all_by_label("Estimated error").count(),
+        told + 1
+    );
     // Only the panel of that name.
     assert_eq!(harness.query_all_by_label("Measured error").count(), 1);
 }
