@@ -4,12 +4,12 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::palette::{plain, textured};
+use super::palette::{glass, plain, textured};
 use super::pictures;
 use super::shapes::{
     Facing, Mesh, Side, cuboid, geodesic_sphere, lathe, lattice_box, windowed_shell,
 };
-use crate::scene::{Environment, Material, MaterialId, SceneBuilder, Sky, Sun, UpAxis};
+use crate::scene::{Environment, MaterialId, SceneBuilder, Sky, Sun, UpAxis};
 
 /// A sky and a sun in it that stands at a place in degrees.
 pub(super) fn day(sky: [f32; 3], [azimuth, elevation]: [f32; 2], sun: [f32; 3]) -> Environment {
@@ -119,10 +119,7 @@ pub(super) fn glazed_room() -> SceneBuilder {
     let frame = plain(&mut builder, "frame", [0.8, 0.8, 0.78]);
     let wood = plain(&mut builder, "wood", [0.4, 0.24, 0.12]);
     let glaze = plain(&mut builder, "glaze", [0.15, 0.32, 0.45]);
-    let glass = builder.push_material(Material {
-        opacity: 0.12,
-        ..Material::plain("glass", Vec3::splat(0.6), Vec3::ZERO)
-    });
+    let glass = glass(&mut builder, 0.12, 0.6);
 
     block([-6.0, -0.6, -6.0], [11.0, -0.25, 13.0], earth).add_to(&mut builder, "ground");
     let (xs, ys) = ([1.0, 4.0], [0.9, 2.4]);

@@ -36,3 +36,23 @@ pub(super) fn glowing(builder: &mut SceneBuilder, name: &str, emission: [f32; 3]
         Vec3::from_array(emission),
     ))
 }
+
+/// Glass that lets light through but for the part `opacity`, of which it reflects the part `reflectance`.
+pub(super) fn glass(builder: &mut SceneBuilder, opacity: f32, reflectance: f32) -> MaterialId {
+    builder.push_material(Material {
+        opacity,
+        ..Material::plain("glass", Vec3::splat(reflectance), Vec3::ZERO)
+    })
+}
+
+/// Materials of one kind in several colours, numbered.
+pub(super) fn in_colours(
+    builder: &mut SceneBuilder,
+    name: &str,
+    reflectances: &[[f32; 3]],
+) -> Vec<MaterialId> {
+    let numbered = reflectances.iter().enumerate();
+    numbered
+        .map(|(number, &reflectance)| plain(builder, &format!("{name} {number}"), reflectance))
+        .collect()
+}

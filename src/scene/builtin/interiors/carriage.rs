@@ -1,11 +1,11 @@
 //! A subway carriage along z: benches under the windows, poles, rails and straps of long thin triangles, and two light
 //! strips of many small ones.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use super::super::palette::{glowing, plain, textured};
+use super::super::palette::{glass, glowing, plain, textured};
 use super::super::pictures;
 use super::super::shapes::{
     Facing, Mesh, Side, bar, lathe, lattice_box, lines_through, painted_cuboid, picture_frame,
@@ -13,8 +13,8 @@ use super::super::shapes::{
 };
 use super::SUNK;
 use super::furniture::block;
-use super::parts::{bars, curve, cushion, placed, tube};
-use crate::scene::{Material, MaterialId, SceneBuilder};
+use super::parts::{bars, curve, cushion, placed, ring, tube};
+use crate::scene::{MaterialId, SceneBuilder};
 
 const LENGTH: f64 = 18.0;
 /// Half the width inside.
@@ -72,10 +72,7 @@ pub(in super::super) fn carriage() -> SceneBuilder {
 }
 
 fn paints(builder: &mut SceneBuilder) -> Paints {
-    let glass = builder.push_material(Material {
-        opacity: 0.15,
-        ..Material::plain("glass", Vec3::splat(0.5), Vec3::ZERO)
-    });
+    let glass = glass(builder, 0.15, 0.5);
     let floor = pictures::stone_tiles(
         "floor.png",
         Vec3::new(0.44, 0.45, 0.48),
@@ -387,11 +384,8 @@ fn rails_and_straps(builder: &mut SceneBuilder, paints: &Paints) {
                 [0.0015, -0.01, 0.014],
                 paints.strap,
             );
-            let ring = curve(17, |t| {
-                let (sine, cosine) = (TAU * t).sin_cos();
-                DVec3::new(0.0, -0.255 + 0.06 * cosine, 0.06 * sine)
-            });
-            strap.append(tube(&ring[..16], true, 0.007, 6, paints.strap));
+            let centre = DVec3::new(0.0, -0.255, 0.0);
+            strap.append(ring(centre, 0.06, 16, 0.007, 6, paints.strap));
             let turn = glam::DQuat::from_rotation_x(swing);
             straps.append(strap.moved(|p| turn * p + DVec3::new(x, RAIL_Y, z)));
         }

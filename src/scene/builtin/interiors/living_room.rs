@@ -1,17 +1,17 @@
 //! A living room: a sofa and an armchair around a table, a dining table, shelves of books, curtains before a window.
 
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2};
 
 use super::super::courtyard::day;
-use super::super::palette::{glowing, plain, textured};
+use super::super::palette::{glass, glowing, in_colours, plain, textured};
 use super::super::pictures;
 use super::super::shapes::{
     Mesh, Numbers, Side, bar, geodesic_sphere, lathe, painted_cuboid, picture_frame, windowed_shell,
 };
 use super::SUNK;
 use super::furniture::{block, bookcase, chair, round_table, sofa};
-use super::parts::{Books, ShadedLamp, curtain, curve, moulding, placed, plant, tube};
-use crate::scene::{Environment, Material, MaterialId, SceneBuilder};
+use super::parts::{Books, ShadedLamp, curtain, curve, moulding, placed, plant, ring, tube};
+use crate::scene::{Environment, MaterialId, SceneBuilder};
 
 /// Width, height and depth.
 const ROOM: [f64; 3] = [6.4, 2.7, 5.2];
@@ -73,10 +73,7 @@ fn paints(builder: &mut SceneBuilder) -> Paints {
         [0.5, 0.36, 0.1],
         [0.12, 0.12, 0.13],
     ];
-    let glass = builder.push_material(Material {
-        opacity: 0.12,
-        ..Material::plain("glass", Vec3::splat(0.6), Vec3::ZERO)
-    });
+    let glass = glass(builder, 0.12, 0.6);
     Paints {
         plaster: plain(builder, "plaster", [0.78, 0.76, 0.72]),
         paper: textured(builder, "wallpaper", pictures::wallpaper("wallpaper.png")),
@@ -102,11 +99,7 @@ fn paints(builder: &mut SceneBuilder) -> Paints {
         earth: plain(builder, "earth", [0.12, 0.1, 0.1]),
         leaf: plain(builder, "leaf", [0.13, 0.34, 0.1]),
         glaze: plain(builder, "glaze", [0.2, 0.42, 0.55]),
-        covers: covers
-            .iter()
-            .enumerate()
-            .map(|(number, &colour)| plain(builder, &format!("cover {number}"), colour))
-            .collect(),
+        covers: in_colours(builder, "cover", &covers),
         canvases: [
             textured(builder, "landscape", pictures::landscape("landscape.png")),
             textured(builder, "rings", pictures::rings("rings.png")),
@@ -181,11 +174,8 @@ fn window(builder: &mut SceneBuilder, paints: &Paints) {
             .add_to(builder, "curtain");
         for number in 0..10 {
             let x = start + width * f64::from(number) / 9.0;
-            let around = curve(25, |t| {
-                let (sine, cosine) = (std::f64::consts::TAU * t).sin_cos();
-                DVec3::new(x, 2.445 + 0.03 * cosine, from.z + 0.03 * sine)
-            });
-            rings.append(tube(&around[..24], true, 0.003, 8, paints.brass));
+            let centre = DVec3::new(x, 2.445, from.z);
+            rings.append(ring(centre, 0.03, 24, 0.003, 8, paints.brass));
         }
     }
     rings.add_to(builder, "curtain rings");

@@ -3,13 +3,13 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::super::palette::{glowing, plain, textured};
+use super::super::palette::{glass, glowing, in_colours, plain, textured};
 use super::super::pictures;
 use super::super::shapes::{Facing, Mesh, Numbers, Side, lattice_box, lines_through};
 use super::SUNK;
 use super::furniture::{DeskPaints, block, bookcase, desk, round_table, swivel_chair};
 use super::parts::{Books, bars, cushion, moulding, placed, plant};
-use crate::scene::{Material, MaterialId, SceneBuilder};
+use crate::scene::{MaterialId, SceneBuilder};
 
 /// Side of a ceiling panel.
 const PANEL: f64 = 0.6;
@@ -53,10 +53,7 @@ fn paints(builder: &mut SceneBuilder) -> Paints {
         Vec3::new(0.46, 0.48, 0.52),
         Vec3::new(0.4, 0.42, 0.47),
     );
-    let glass = builder.push_material(Material {
-        opacity: 0.12,
-        ..Material::plain("glass", Vec3::splat(0.6), Vec3::ZERO)
-    });
+    let glass = glass(builder, 0.12, 0.6);
     let binders = [
         [0.14, 0.15, 0.17],
         [0.12, 0.22, 0.44],
@@ -83,11 +80,7 @@ fn paints(builder: &mut SceneBuilder) -> Paints {
             plain(builder, "earth", [0.12, 0.1, 0.1]),
             plain(builder, "leaf", [0.12, 0.34, 0.1]),
         ],
-        binders: binders
-            .iter()
-            .enumerate()
-            .map(|(number, &colour)| plain(builder, &format!("binder {number}"), colour))
-            .collect(),
+        binders: in_colours(builder, "binder", &binders),
         desk: DeskPaints {
             board: plain(builder, "desk board", [0.7, 0.66, 0.58]),
             metal: plain(builder, "metal", [0.5, 0.51, 0.52]),

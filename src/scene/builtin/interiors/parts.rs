@@ -112,6 +112,26 @@ pub(super) fn curve(count: u32, at: impl Fn(f64) -> DVec3) -> Vec<DVec3> {
     (0..count).map(|step| at(f64::from(step) / last)).collect()
 }
 
+/// A ring of round wire about a line along x, of so many pieces.
+pub(super) fn ring(
+    centre: DVec3,
+    radius: f64,
+    pieces: u32,
+    thickness: f64,
+    sides: u32,
+    material: MaterialId,
+) -> Mesh {
+    let around = curve(pieces + 1, |t| {
+        let (sine, cosine) = (TAU * t).sin_cos();
+        DVec3::new(
+            centre.x,
+            centre.y + radius * cosine,
+            centre.z + radius * sine,
+        )
+    });
+    tube(&around[..pieces as usize], true, thickness, sides, material)
+}
+
 /// An open sheet of columns and rows of cells, placed by coordinates in 0…1.
 pub(super) fn sheet(
     [columns, rows]: [u32; 2],
