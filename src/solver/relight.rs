@@ -32,12 +32,6 @@ impl Solver {
         Some(report)
     }
 
-    /// Gather once more for each leaf, at its own corners.
-    pub(super) fn gather_for_leaves(&mut self, cancel: &Cancel) -> Option<()> {
-        self.leaves = self.gathered(&self.linked.power, cancel)?;
-        Some(())
-    }
-
     /// Light of the leaves, gathered over the links from these source tables.
     pub(super) fn gathered(&self, tables: &Tables, cancel: &Cancel) -> Option<Vec<LeafLight>> {
         let kernel = Kernel {
@@ -151,7 +145,7 @@ impl Solver {
     }
 
     fn gather_relit(&mut self, cancel: &Cancel) -> Option<()> {
-        self.gather_for_leaves(cancel)?;
+        self.leaves = self.gathered(&self.linked.power, cancel)?;
         self.relighting.forget_solved();
         Some(())
     }

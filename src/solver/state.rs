@@ -217,7 +217,7 @@ impl Solver {
         self.iterate(tolerance, &mut report, cancel)?;
         begin(Phase::Gather, self.ray_count);
         // Light at the corners of each leaf, from its links.
-        self.gather_for_leaves(cancel)?;
+        self.leaves = self.gathered(&self.linked.power, cancel)?;
         cancel.proceed()?;
         // Where the error is small enough, this step is the last.
         self.vertex_factors.clear();

@@ -74,21 +74,18 @@ impl DirectField {
         }
     }
 
-    /// Direct irradiance at each vertex for display, smoothed, and its standard error (luminance). A vertex that only
-    /// prevents cracks takes the mean of the ends of its edge.
-    pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Vec<(Vec4, f32)> {
+    /// Direct irradiance at each vertex for display, smoothed. A vertex that only prevents cracks takes the mean of the
+    /// ends of its edge.
+    pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Vec<Vec4> {
         let smoothed = self.smoothed(hierarchy);
-        let mut shown: Vec<(Vec4, f32)> = Vec::with_capacity(hierarchy.mesh.vertices.len());
+        let mut shown: Vec<Vec4> = Vec::with_capacity(hierarchy.mesh.vertices.len());
         for (index, vertex) in hierarchy.mesh.vertices.iter().enumerate() {
             let sampled = self.vertices.get(index).copied().flatten();
             shown.push(match (sampled, vertex.ends) {
-                (Some(light), _) => (smoothed[index], light.error()),
+                (Some(_), _) => smoothed[index],
                 // Ends were made before the vertices between them.
-                (None, Some([a, b])) => {
-                    let ((a, a_error), (b, b_error)) = (shown[a as usize], shown[b as usize]);
-                    ((a + b) * 0.5, (a_error + b_error) * 0.5)
-                }
-                (None, None) => (Vec4::ZERO, 0.0),
+                (None, Some([a, b])) => (shown[a as usize] + shown[b as usize]) * 0.5,
+                (None, None) => Vec4::ZERO,
             });
         }
         shown
@@ -115,7 +112,7 @@ impl DirectField {
         let shown = self.shown(hierarchy);
         let vertices = shown.iter().zip(&doubts);
         let vertices = vertices
-            .map(|((light, _), &doubt)| share(*light, doubt))
+            .map(|(&light, &doubt)| share(light, doubt))
             .collect();
         let of_element = |index: usize| {
             let corners = mesh.elements[index]

@@ -110,11 +110,8 @@ impl DirectFields {
 
     /// Direct irradiance at each vertex for display, as [`DirectField::shown`]; `None` if nothing is sampled.
     pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Option<Vec<Vec4>> {
-        let of = |field: &DirectField| -> Vec<Vec4> {
-            let shown = field.shown(hierarchy).into_iter();
-            shown.map(|(light, _)| light).collect()
-        };
-        self.fields.iter().map(of).reduce(|mut sum, other| {
+        let all = self.fields.iter().map(|field| field.shown(hierarchy));
+        all.reduce(|mut sum, other| {
             for (sum, light) in sum.iter_mut().zip(other) {
                 *sum += light;
             }
