@@ -11,12 +11,13 @@ pub(super) const CONTRAST_TOLERANCE: f32 = 4.0;
 /// smaller costs rays, as one over its square.
 const NOISE_SHARE: f32 = 0.5;
 
-/// Power of the threshold with which the tolerance of the mesh falls in steps beyond the settings, as it does from preset
-/// to preset. Smaller, and the mesh cannot follow the links; larger, and the mesh grows for an error that links make
-/// (1 % on `cornell` and `room-1022`: 1.7 and 2.0 times the time with 1).
+/// Power of the threshold with which the tolerance of the mesh falls in steps beyond the settings: a solve towards an
+/// error then has the mesh tolerance of the finest preset at its threshold. Smaller, and the mesh cannot follow the links;
+/// larger, and the mesh grows for an error that links make (1 % on `cornell`, `room-1022` and `room-8621`: 1.9, 1.4 and
+/// 4.7 times the processor time with 1).
 const MESH_EXPONENT: f32 = 2.0 / 3.0;
 
-/// The same of the smallest area of elements. Smaller, and the mesh cannot follow the links; larger, and elements become
+/// The same of the smallest area of elements, which falls as the tolerance to the power of 1.5. Smaller, and the mesh cannot follow the links; larger, and elements become
 /// tiny.
 const AREA_EXPONENT: f32 = 1.0;
 
@@ -88,5 +89,33 @@ pub(super) fn shadow_samples(settings: &SolveSettings, is_coarse: bool) -> u32 {
     match is_coarse {
         true => settings.shadow_samples.div_ceil(2),
         false => settings.shadow_samples,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{SceneOptions, builtin};
+
+    #[test]
+    fn a_solve_towards_an_error_has_the_mesh_tolerance_of_the_finest_preset_at_its_threshold() {
+        let scene = builtin::plates(1.0)
+            .finish(&SceneOptions::default())
+            .unwrap();
+        let hierarchy = Hierarchy::new(&scene, 30.0);
+        let limits = |settings: &SolveSettings, scale| Limits::new(settings, &hierarchy, scale, 0);
+        let (settings, finest) = (SolveSettings::towards(0.01), SolveSettings::finest());
+        let (own, wanted) = (limits(&settings, 1.0), limits(&finest, 1.0));
+        assert_eq!(own.tolerance, settings.mesh_tolerance);
+        let beyond = limits(&settings, finest.epsilon / settings.epsilon);
+        let ratio = beyond.tolerance / wanted.tolerance;
+        assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+        assert_eq!(beyond.tolerance, beyond.finest_tolerance);
+        assert!(beyond.min_area < own.min_area);
+        // Steps before the last have coarser meshes, with elements no smaller than those of the last.
+        let coarse = limits(&settings, 4.0);
+        assert_eq!(coarse.tolerance, 4.0 * own.tolerance);
+        assert_eq!(coarse.finest_tolerance, own.tolerance);
+        assert_eq!(coarse.min_area, own.min_area);
     }
 }
