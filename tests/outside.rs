@@ -422,6 +422,54 @@ fn radiance_is_the_same_everywhere_where_surfaces_complete_the_sky() {
     }
 }
 
+/// A dark room of 4 × 4 × 4 m, closed but for a square window of this side, in a wall.
+fn room_with_a_window(side: f64) -> SceneBuilder {
+    let mut builder = SceneBuilder::default();
+    let dark = material(&mut builder, 0.001, 0.0);
+    let [u, v, w] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 4.0);
+    let end = u + v + w;
+    for (origin, edges) in [
+        (DVec3::ZERO, [u, v]),
+        (DVec3::ZERO, [v, w]),
+        (DVec3::ZERO, [w, u]),
+        (end, [-v, -u]),
+        (end, [-u, -w]),
+    ] {
+        plate(&mut builder, dark, 4, origin, edges);
+    }
+    // The wall about the window.
+    let places = [0.0, 2.0 - 0.5 * side, 2.0 + 0.5 * side, 4.0];
+    for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+        if (i, j) != (1, 1) {
+            let origin = DVec3::new(4.0, places[i], places[j]);
+            let across = DVec3::Z * (places[j + 1] - places[j]);
+            let up = DVec3::Y * (places[i + 1] - places[i]);
+            plate(&mut builder, dark, 1, origin, [across, up]);
+        }
+    }
+    builder
+}
+
+#[test]
+fn all_light_through_a_window_arrives_however_small_it_is() {
+    // A sky of radiance L sends π L A through a window of the area A, onto walls that reflect nothing.
+    for (side, most) in [(2.0, 0.02), (1.0, 0.02), (0.32, 0.03), (0.1, 0.1)] {
+        let scene = under(room_with_a_window(side), Sides::One, uniform(1.0));
+        let (solver, _) = solve(&scene, SolveSettings::draft());
+        let snapshot = solver.snapshot();
+        let mesh = &snapshot.mesh;
+        let power = mesh.indices.iter().map(|corners| {
+            let [a, b, c] = corners.map(|vertex| mesh.positions[vertex as usize]);
+            let area = (b - a).cross(c - a).length() * 0.5;
+            let light = corners.map(|vertex| snapshot.light.irradiance[vertex as usize].x);
+            f64::from(area * light.iter().sum::<f32>() / 3.0)
+        });
+        let found = scene.frame.area_to_world(power.sum());
+        let expected = f64::from(PI) * side * side;
+        assert_close(found, expected, most, format!("window of {side} m"));
+    }
+}
+
 #[test]
 fn a_closed_room_shoots_no_ray_to_the_sky() {
     let mut builder = SceneBuilder::default();

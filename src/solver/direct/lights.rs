@@ -16,6 +16,7 @@ use super::{
     panel::panels,
     samples::{Bundle, DirectLight, Outcomes},
     sky::{OutsideRay, SkyTree},
+    sky_guide::{Lobe, Mixture, SkyGuide},
     sun::SunDisc,
 };
 use crate::{
@@ -31,15 +32,24 @@ use crate::{
 const PLACES: f32 = 16_384.0;
 
 /// What gives the light.
-enum Source {
+pub(super) enum Source {
     Emitters(LightTree),
-    Sky(SkyTree),
+    Sky(SkyTree, Guidance),
     Sun(SunDisc),
+}
+
+/// Where places that see little of the sky see it.
+pub(super) enum Guidance {
+    /// Nothing was learnt yet.
+    Unknown,
+    /// No place needs a guide, or none is known.
+    None,
+    Known(SkyGuide),
 }
 
 /// The light of one kind that is sampled: that of all emitters, of the sky, or of the sun.
 pub(crate) struct Lights {
-    source: Source,
+    pub(super) source: Source,
     /// Largest radiosity by channel, or largest irradiance from outside: no irradiance can be larger.
     brightest: Vec4,
     /// Patches whose emission is sampled; empty for light from outside.
@@ -80,7 +90,7 @@ impl Lights {
         let tree = SkyTree::new(sky, reading)?;
         Some(Self {
             brightest: tree.brightest(),
-            source: Source::Sky(tree),
+            source: Source::Sky(tree, Guidance::Unknown),
             is_sampled: Vec::new(),
         })
     }
@@ -103,7 +113,7 @@ impl Lights {
     /// As [`SkyTree::even_radiosity`]; `None` for other light.
     pub(super) fn even_radiosity(&self) -> Option<f32> {
         match &self.source {
-            Source::Sky(sky) => sky.even_radiosity(),
+            Source::Sky(sky, _) => sky.even_radiosity(),
             Source::Emitters(_) | Source::Sun(_) => None,
         }
     }
@@ -112,7 +122,7 @@ impl Lights {
     fn emitters(&self) -> &[Emitter] {
         match &self.source {
             Source::Emitters(tree) => &tree.emitters,
-            Source::Sky(_) | Source::Sun(_) => &[],
+            Source::Sky(..) | Source::Sun(_) => &[],
         }
     }
 
@@ -159,7 +169,7 @@ impl Lights {
     pub(super) fn mean_power(&self, hierarchy: &Hierarchy) -> f32 {
         let tree = match &self.source {
             Source::Emitters(tree) => tree,
-            Source::Sky(sky) => return luminance(sky.mean_irradiance()),
+            Source::Sky(sky, _) => return luminance(sky.mean_irradiance()),
             Source::Sun(sun) => return luminance(sun.mean_irradiance()),
         };
         let power = |emitter: &Emitter| f64::from(luminance(emitter.radiosity) * emitter.area);
@@ -206,23 +216,37 @@ impl Lights {
     }
 
     /// Shoot a range of the shadow rays of one point with a known cut.
-    fn shoot_at(
+    pub(super) fn shoot_at(
         &self,
         rays: &RayTree,
         receiver: &Receiver,
         samples: Range<u32>,
         seed: u64,
-        Shot { cut, strata }: &mut Shot,
+        Shot {
+            cut,
+            strata,
+            lobes,
+            seen,
+        }: &mut Shot,
         light: &mut DirectLight,
     ) {
         if rays.is_clear() {
             light.arrive_whole();
             return;
         }
-        let total = cut.last().map_or(0.0, |last| last.until);
-        if total <= 0.0 {
+        let light_of_cut = cut.last().map_or(0.0, |last| last.until);
+        if light_of_cut <= 0.0 {
             return;
         }
+        let own = cut.len();
+        let mixture = match &self.source {
+            Source::Sky(sky, Guidance::Known(guide)) => {
+                guide.mix(sky, receiver.point, receiver.normal, cut, lobes)
+            }
+            _ => None,
+        };
+        light.expect_weight(mixture.as_ref().map_or(1.0, |mixture| mixture.weight));
+        let total = cut.last().map_or(0.0, |last| last.until);
         // The random stream depends on the rounded position, not on the order of points.
         let [x, y, z] = (receiver.point * PLACES)
             .round()
@@ -245,28 +269,34 @@ impl Lights {
             Ray {
                 part: chosen,
                 target: cut[chosen].target,
-                share,
+                irradiance: chosen
+                    .checked_sub(own)
+                    .map_or(share, |lobe| lobes[lobe].irradiance),
                 place: (at - before) / share,
                 square: low_discrepancy_2d(sample, shift),
             }
         });
         match &self.source {
             Source::Emitters(tree) => shoot_at_emitters(tree, rays, receiver, shots, light),
-            Source::Sky(sky) => {
+            Source::Sky(sky, _) => {
                 let aim = |ray: Ray| match ray.target {
                     Target::Node(node) => {
                         let (index, normal) = (node as usize, receiver.normal);
-                        sky.aim(index, ray.share, normal, ray.place, ray.square)
+                        sky.aim(index, ray.irradiance, normal, ray.place, ray.square)
                     }
                     Target::Emitter(_) => None,
                 };
-                shoot_outside(rays, receiver, shots.map(aim), light);
+                seen.clear();
+                let shots = shots.map(aim);
+                let mixture = mixture.as_ref().map(|mixture| (mixture, &**lobes));
+                shoot_outside(rays, receiver, shots, mixture, light, seen);
             }
             Source::Sun(sun) => {
                 let aim = |ray: Ray| sun.aim(receiver.normal, ray.square);
-                shoot_outside(rays, receiver, shots.map(aim), light);
+                shoot_outside(rays, receiver, shots.map(aim), None, light, seen);
             }
         }
+        cut.truncate(own);
     }
 
     /// Unoccluded irradiance at a receiver, W/m²; the other arguments as in [`LightTree::unoccluded`].
@@ -278,7 +308,7 @@ impl Lights {
     ) -> Vec4 {
         match &self.source {
             Source::Emitters(tree) => tree.unoccluded(receiver, scale, cut),
-            Source::Sky(sky) => sky.unoccluded(receiver.normal, cut),
+            Source::Sky(sky, _) => sky.unoccluded(receiver.normal, cut),
             Source::Sun(sun) => sun.unoccluded(receiver.normal, cut),
         }
     }
@@ -289,7 +319,7 @@ struct Ray {
     /// The part of the cut, its target and the luminance of its irradiance.
     part: usize,
     target: Target,
-    share: f32,
+    irradiance: f32,
     /// Place in the part, 0…1.
     place: f32,
     square: Vec2,
@@ -322,7 +352,7 @@ fn shoot_at_emitters(
         let color = emitter.radiosity / luminance(emitter.radiosity);
         let passing = rays.transmittance(receiver.point, point, ends);
         outcomes.count(passing != Vec3::ZERO);
-        bundle.count(weight, color, passing);
+        bundle.count(weight, 1.0, color, passing);
     }
     light.count(&bundle);
     light.changes += outcomes.changes();
@@ -340,12 +370,14 @@ fn bundle_towards(tree: &LightTree, receiver: &Receiver, target: Target) -> Bund
     Bundle::towards(seen)
 }
 
-/// Shoot shadow rays from a receiver out of the scene.
+/// Shoot shadow rays from a receiver out of the scene, and add what they see.
 fn shoot_outside(
     rays: &RayTree,
     receiver: &Receiver,
     shots: impl Iterator<Item = Option<OutsideRay>>,
+    mixture: Option<(&Mixture, &[Lobe])>,
     light: &mut DirectLight,
+    seen: &mut Vec<(OutsideRay, f32)>,
 ) {
     let (mut bundle, mut outcomes) = (Bundle::default(), Outcomes::default());
     for ray in shots {
@@ -353,8 +385,13 @@ fn shoot_outside(
         let Some(ray) = ray else { continue };
         let start = Some(receiver.triangle);
         let passing = rays.transmittance_outward(receiver.point, ray.direction, start);
-        outcomes.count(passing != Vec3::ZERO);
-        bundle.count(ray.weight, ray.color, passing);
+        let is_visible = passing != Vec3::ZERO;
+        outcomes.count(is_visible);
+        let worth = mixture.map_or(1.0, |(mixture, lobes)| mixture.weight(lobes, ray.leaf));
+        bundle.count(ray.weight, worth, ray.color, passing);
+        if is_visible {
+            seen.push((ray, ray.weight * worth));
+        }
     }
     light.count(&bundle);
     light.changes += outcomes.changes();
@@ -362,10 +399,14 @@ fn shoot_outside(
 
 /// Scratch space for the shadow rays of one point.
 #[derive(Default)]
-struct Shot {
-    cut: Vec<Arriving>,
+pub(super) struct Shot {
+    pub(super) cut: Vec<Arriving>,
     /// Positions of rays in the light of the cut, 0…1, and their numbers.
     strata: Vec<(f32, u32)>,
+    /// Leaves of the sky to which rays are guided.
+    lobes: Vec<Lobe>,
+    /// Rays that reached the sky, with their weights relative to rays that follow the unoccluded light.
+    pub(super) seen: Vec<(OutsideRay, f32)>,
 }
 
 /// Largest radiosity by channel.

@@ -14,6 +14,8 @@ pub(super) struct Bundle {
     pub(crate) rays: u32,
     shot: u32,
     visible: u32,
+    /// As [`DirectLight::worth`], of its rays.
+    worth: f32,
     /// Weights of the rays shot.
     weight: f32,
     /// The same by colour, for colours of luminance 1.
@@ -31,14 +33,16 @@ impl Bundle {
         }
     }
 
-    /// Count a ray; `passing` is what passes along it, by channel, 0…1.
-    pub(super) fn count(&mut self, weight: f32, color: Vec4, passing: Vec3) {
+    /// Count a ray; `passing` is what passes along it, by channel, 0…1. `worth` is its weight relative to a ray that follows
+    /// the unoccluded light, of weight `weight`.
+    pub(super) fn count(&mut self, weight: f32, worth: f32, color: Vec4, passing: Vec3) {
         self.weight += weight;
         self.sent += color * weight;
         self.shot += 1;
         if passing != Vec3::ZERO {
-            self.arrived += color * weight * passing.extend(1.0);
+            self.arrived += color * (weight * worth) * passing.extend(1.0);
             self.visible += 1;
+            self.worth += worth;
         }
     }
 }
@@ -68,12 +72,14 @@ impl Outcomes {
 }
 
 /// Counts of the shadow rays of one or several points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Tally {
     pub shot: u32,
     pub visible: u32,
     /// Pairs of rays to neighbouring strata with different outcomes; there are as many pairs as rays.
     pub changes: u32,
+    /// Mean weight of a visible ray at each point relative to rays that follow the unoccluded light, summed over the rays.
+    worth: f32,
 }
 
 /// Difference of a point's rays from those of its neighbours that chance explains, in standard errors. Smaller takes
@@ -86,9 +92,18 @@ impl Tally {
         self.visible > 0 && self.visible < self.shot
     }
 
+    /// Mean weight of a visible ray relative to rays that follow the unoccluded light: 1 unless rays are guided.
+    fn scale(self) -> f32 {
+        if self.shot > 0 {
+            self.worth / self.shot as f32
+        } else {
+            1.0
+        }
+    }
+
     /// The visible fraction; 0 without rays.
-    fn fraction(self) -> f32 {
-        self.visible as f32 / self.shot.max(1) as f32
+    pub(super) fn fraction(self) -> f32 {
+        self.scale() * self.visible as f32 / self.shot.max(1) as f32
     }
 
     /// Variance of a ray within its stratum, 0…¼: half the mean square of the differences between neighbouring strata
@@ -99,15 +114,16 @@ impl Tally {
         let shot = (self.shot as f32 + more).max(1.0);
         let fraction = (self.visible as f32 + 0.5 * more) / shot;
         let within = 0.5 * (self.changes as f32 + more) / shot;
-        within.min(fraction * (1.0 - fraction))
+        within.min(fraction * (1.0 - fraction)) * self.scale().powi(2)
     }
 
     /// Whether chance explains the difference of these rays from others, given the visible fraction of the others, with
     /// half a hit and half a miss added.
     pub(super) fn is_like(self, others: Self) -> bool {
         let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
-        let expected = (others.visible as f32 + 0.5) / count;
-        let variance = expected * (1.0 - expected) * (1.0 / own + 1.0 / count);
+        let expected = others.scale() * (others.visible as f32 + 0.5) / count;
+        let variance = |scale: f32, rays: f32| expected * (scale - expected).max(0.0) / rays;
+        let variance = variance(self.scale(), own) + variance(others.scale(), count);
         let gap = self.fraction() - expected;
         self.shot == 0 || gap * gap <= LIKELY_DEVIATIONS * LIKELY_DEVIATIONS * variance
     }
@@ -118,6 +134,7 @@ impl std::ops::AddAssign for Tally {
         self.shot += other.shot;
         self.visible += other.visible;
         self.changes += other.changes;
+        self.worth += other.worth;
     }
 }
 
@@ -138,6 +155,8 @@ pub(super) struct DirectLight {
     visible: u32,
     /// As [`Tally::changes`].
     pub(super) changes: u32,
+    /// Weights of the visible rays relative to rays that follow the unoccluded light, and the expected one of one more.
+    worth: f32,
 }
 
 impl DirectLight {
@@ -150,10 +169,26 @@ impl DirectLight {
         }
     }
 
+    /// Expect a weight of visible rays relative to rays that follow the unoccluded light.
+    pub(super) fn expect_weight(&mut self, weight: f32) {
+        if self.worth == 0.0 {
+            self.worth = weight;
+        }
+    }
+
+    /// Mean weight of visible rays relative to rays that follow the unoccluded light: 1 unless rays are guided.
+    fn scale(&self) -> f32 {
+        match self.worth {
+            0.0 => 1.0,
+            worth => worth / (self.visible + 1) as f32,
+        }
+    }
+
     /// Add a bundle of rays.
     pub(super) fn count(&mut self, bundle: &Bundle) {
         self.shot += bundle.shot;
         self.visible += bundle.visible;
+        self.worth += bundle.worth;
         if bundle.weight > 0.0 {
             let by_ray = bundle.rays as f32 / bundle.weight;
             self.sent += bundle.sent * by_ray;
@@ -227,6 +262,7 @@ impl DirectLight {
             shot: self.shot,
             visible: self.visible,
             changes: self.changes,
+            worth: self.scale() * self.shot as f32,
         }
     }
 
@@ -279,6 +315,7 @@ mod tests {
             changes.count(is_visible);
         }
         tally.changes = changes.changes();
+        tally.worth = tally.shot as f32;
         tally
     }
 

@@ -6,7 +6,9 @@
 //! one radiance. Where a node lies above the horizon of a surface as a whole, its irradiance is the product of its
 //! vector irradiance with the normal; only leaves across the horizon are clipped (Lambert's formula).
 
-use std::{cmp::Ordering, collections::BinaryHeap, f32::consts::PI, ops::Range};
+mod growth;
+
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec4};
 
@@ -14,24 +16,20 @@ use super::light_tree::{Arriving, Target};
 use crate::{
     geometry::{irradiance_vector, point_irradiance, triangle_point},
     hierarchy::{Moments, Reading},
-    scene::{Sky, SkySample},
+    scene::Sky,
     transport::luminance,
 };
-
-/// Halvings of each octant at least: 512 leaves of 11°. Fewer, and rays are stratified less; more, and horizons have
-/// more leaves.
-const LEAST_HALVINGS: u32 = 6;
-
-/// Power that a leaf of one radiance may misplace, as a share of the sky's. Smaller makes more leaves; larger blurs the
-/// shadows of bright spots.
-const MISPLACED_SHARE: f32 = 5e-5;
-
-/// Most leaves. More take time at every horizon; fewer blur the shadows of rich skies.
-const MOST_LEAVES: usize = 16_384;
 
 /// Fewest samples of a picture by which its radiance is distributed over leaves. Fewer make even skies uneven; more
 /// take time before the first picture.
 const LEAST_SAMPLES: usize = 1 << 18;
+
+/// Smallest cosine at which what a ray sees is told to others. Smaller, and a ray along the horizon counts too much;
+/// larger, and places see less than they should by it.
+const LEAST_COSINE: f32 = 0.1;
+
+/// Step across an edge to the leaf behind it, as a share of the height on the edge.
+const STEP_ACROSS: f32 = 0.1;
 
 /// A node: a spherical triangle.
 #[derive(Clone, Debug)]
@@ -44,6 +42,8 @@ struct Node {
     first_child: u32,
     /// Radiosity of a surface of the radiance of a leaf, W/m².
     radiosity: Vec4,
+    /// Normal of the plane between its children, towards the first.
+    halving: Vec3,
 }
 
 /// The sky as an emitter.
@@ -51,6 +51,8 @@ struct Node {
 pub(crate) struct SkyTree {
     /// The octants, then pairs of children.
     nodes: Vec<Node>,
+    /// By node, the leaves across the edges of a leaf.
+    neighbours: Vec<[u32; 3]>,
     /// If its light is to be that of a link: its moments as those of a cluster around the scene whose surfaces face
     /// inwards, and how they are read.
     table: Option<(Moments<Vec4>, Reading)>,
@@ -65,15 +67,8 @@ pub(super) struct OutsideRay {
     pub weight: f32,
     /// Colour of luminance 1.
     pub color: Vec4,
-}
-
-/// A leaf that may be halved.
-struct Candidate {
-    node: usize,
-    samples: Range<usize>,
-    halvings: u32,
-    /// Power that it misplaces; infinite where it is too large.
-    misplaced: f32,
+    /// The leaf of the sky's tree; 0 for the sun.
+    pub leaf: u32,
 }
 
 impl Node {
@@ -84,6 +79,7 @@ impl Node {
             vector: vector.to_array().map(|component| radiosity * component),
             first_child: 0,
             radiosity,
+            halving: Vec3::ZERO,
         }
     }
 
@@ -130,86 +126,9 @@ impl SkyTree {
             }
         };
         tree.carry_up();
+        tree.find_neighbours();
         tree.table = reading.map(|reading| (tree.moments(), reading));
         Some(tree)
-    }
-
-    /// Halve the octants until each leaf is small enough and its samples are alike. `radiosity` gives that of a leaf
-    /// with some samples.
-    fn grown(
-        samples: &mut [SkySample],
-        radiosity: impl Fn([Vec3; 3], &[SkySample]) -> Vec4,
-    ) -> Self {
-        let power =
-            |sample: &SkySample| luminance(sample.radiance.extend(0.0)) * sample.solid_angle;
-        let tolerated = MISPLACED_SHARE * samples.iter().map(power).sum::<f32>();
-        let mut tree = Self {
-            nodes: Vec::new(),
-            table: None,
-        };
-        let mut pending = BinaryHeap::new();
-        let candidate = |node: usize, samples: &[SkySample], from: Range<usize>, halvings: u32| {
-            let solid_angle: f32 = samples.iter().map(|sample| sample.solid_angle).sum();
-            let mean = samples.iter().map(power).sum::<f32>() / solid_angle.max(f32::MIN_POSITIVE);
-            let misplaced = samples
-                .iter()
-                .map(|sample| (power(sample) - mean * sample.solid_angle).abs())
-                .sum();
-            let is_large = halvings < LEAST_HALVINGS;
-            Candidate {
-                node,
-                samples: from,
-                halvings,
-                misplaced: if is_large { f32::INFINITY } else { misplaced },
-            }
-        };
-        // The octants, along the curve around one pole and then around the other.
-        let mut start = 0;
-        for octant in octants() {
-            let count = part(&mut samples[start..], |sample| {
-                octant
-                    .iter()
-                    .all(|corner| corner.dot(sample.direction) >= 0.0)
-            });
-            let range = start..start + count;
-            start = range.end;
-            let own = &samples[range.clone()];
-            pending.push(candidate(tree.nodes.len(), own, range, 0));
-            tree.nodes.push(Node::leaf(octant, radiosity(octant, own)));
-        }
-        // Halves, the worst leaf first.
-        while let Some(Candidate {
-            node,
-            samples: range,
-            halvings,
-            misplaced,
-        }) = pending.pop()
-        {
-            if misplaced <= tolerated || tree.nodes.len() >= 2 * MOST_LEAVES {
-                break;
-            }
-            let [left, apex, right] = tree.nodes[node].path;
-            let middle = (left + right).normalize_or(apex);
-            let plane = apex.cross(middle);
-            let is_left = plane.dot(left) >= 0.0;
-            let own = &mut samples[range.clone()];
-            let count = part(own, |sample| {
-                (plane.dot(sample.direction) >= 0.0) == is_left
-            });
-            let first = tree.nodes.len();
-            tree.nodes[node].first_child = first as u32;
-            let (one, other) = (
-                range.start..range.start + count,
-                range.start + count..range.end,
-            );
-            for (path, range) in [([left, middle, apex], one), ([apex, middle, right], other)] {
-                let own = &samples[range.clone()];
-                let child = candidate(tree.nodes.len(), own, range, halvings + 1);
-                tree.nodes.push(Node::leaf(path, radiosity(path, own)));
-                pending.push(child);
-            }
-        }
-        tree
     }
 
     /// Compute the vector irradiances of parents, children before parents.
@@ -224,6 +143,24 @@ impl SkyTree {
                 self.nodes[index].vector.copy_from_slice(&sums);
             }
         }
+    }
+
+    /// Find the leaves across the edges of each leaf.
+    fn find_neighbours(&mut self) {
+        let across = |node: &Node| {
+            let [a, b, c] = node.path;
+            let beyond = |a: Vec3, b: Vec3, c: Vec3| {
+                let middle = (a + b) * 0.5;
+                self.leaf_towards(middle + (middle - c) * STEP_ACROSS)
+            };
+            [beyond(a, b, c), beyond(b, c, a), beyond(c, a, b)]
+        };
+        self.neighbours = self.nodes.iter().map(across).collect();
+    }
+
+    /// The leaves across the edges of a leaf.
+    pub(super) fn neighbours(&self, leaf: u32) -> [u32; 3] {
+        self.neighbours[leaf as usize]
     }
 
     fn children(&self, node: usize) -> Option<[usize; 2]> {
@@ -307,9 +244,7 @@ impl SkyTree {
                 }
                 return;
             }
-            (None, None) => {
-                node.radiosity * point_irradiance(Vec3::ZERO, normal, facing(node.path))
-            }
+            (None, None) => self.leaf_irradiance(index, normal),
         };
         sums.0 += irradiance;
         sums.1 += luminance(irradiance);
@@ -318,6 +253,37 @@ impl SkyTree {
             until: sums.1,
             target,
         });
+    }
+
+    /// The leaf in a direction, which need not be a unit vector.
+    pub(super) fn leaf_towards(&self, direction: Vec3) -> u32 {
+        let holds = |&octant: &usize| {
+            let corners = self.nodes[octant].path;
+            corners.iter().all(|corner| corner.dot(direction) >= 0.0)
+        };
+        let mut index = (0..OCTANTS).find(holds).unwrap_or(0);
+        while let Some([first, second]) = self.children(index) {
+            let is_first = self.nodes[index].halving.dot(direction) >= 0.0;
+            index = if is_first { first } else { second };
+        }
+        index as u32
+    }
+
+    /// Irradiance of a leaf, W/m², without its part below the horizon.
+    pub(super) fn leaf_irradiance(&self, leaf: usize, normal: Vec3) -> Vec4 {
+        let node = &self.nodes[leaf];
+        match node.side_of(normal) {
+            Some(false) => Vec4::ZERO,
+            Some(true) => node.whole(normal),
+            None => node.radiosity * point_irradiance(Vec3::ZERO, normal, facing(node.path)),
+        }
+    }
+
+    /// Luminance of the irradiance of a leaf, W/m², as at a height above the horizon of about [`LEAST_COSINE`] or more.
+    pub(super) fn least_irradiance(&self, leaf: u32, normal: Vec3) -> f32 {
+        let node = &self.nodes[leaf as usize];
+        let most = Vec3::from_array(node.vector.map(luminance)).length();
+        luminance(self.leaf_irradiance(leaf as usize, normal)).max(LEAST_COSINE * most)
     }
 
     /// A ray into a node of a cut, for a uniform number `place` in 0…1 and a point of the unit square; `share` is the
@@ -359,6 +325,7 @@ impl SkyTree {
             direction: point / squared.sqrt(),
             weight,
             color: node.radiosity / brightness,
+            leaf: index as u32,
         })
     }
 }
@@ -371,18 +338,6 @@ fn octants() -> impl Iterator<Item = [Vec3; 3]> {
     [Vec3::Y, Vec3::NEG_Y]
         .into_iter()
         .flat_map(|pole| (0..4).map(move |side| [AROUND[side], pole, AROUND[(side + 1) % 4]]))
-}
-
-/// Move the samples for which a condition holds to the front. Returns their number.
-fn part(samples: &mut [SkySample], is_first: impl Fn(&SkySample) -> bool) -> usize {
-    let mut count = 0;
-    for index in 0..samples.len() {
-        if is_first(&samples[index]) {
-            samples.swap(index, count);
-            count += 1;
-        }
-    }
-    count
 }
 
 /// The same triangle, wound so that its front faces the centre of the sphere.
@@ -398,27 +353,6 @@ fn facing([a, b, c]: [Vec3; 3]) -> [Vec3; 3] {
 fn solid_angle([a, b, c]: [Vec3; 3]) -> f32 {
     let volume = a.dot(b.cross(c)).abs();
     2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let by_power = self.misplaced.total_cmp(&other.misplaced);
-        by_power.then(other.node.cmp(&self.node))
-    }
 }
 
 #[cfg(test)]

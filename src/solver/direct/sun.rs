@@ -95,6 +95,7 @@ impl SunDisc {
             direction,
             weight,
             color: self.irradiance / luminance(self.irradiance),
+            leaf: 0,
         })
     }
 }

@@ -8,6 +8,7 @@ use glam::Vec4;
 use super::{
     field::DirectField,
     samples::{DirectLight, Tally},
+    sky_guide::SELDOM,
 };
 use crate::{
     geometry::RayTree,
@@ -95,6 +96,15 @@ impl DirectField {
         // A share of the rays, and the others where these disagree.
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
         self.shoot(rays, &receivers, probing, seed, cancel);
+        let mut explored = 0;
+        if self.lights.is_unexplored() {
+            explored = self.explore(rays, hierarchy, &receivers, seed, cancel)?;
+            let guided = |(_, receiver): &&(u32, Receiver)| self.lights.is_guided(receiver);
+            let guided: Vec<(u32, Receiver)> = receivers.iter().filter(guided).copied().collect();
+            explored += self.shot(&guided);
+            self.restart(&guided);
+            self.shoot(rays, &guided, probing, seed, cancel);
+        }
         let disputed = self.disputed(&self.neighbours(hierarchy, elements.clone()));
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
@@ -112,7 +122,29 @@ impl DirectField {
         // All vertices are sampled.
         self.sampled_elements = elements.end;
         self.samples = self.samples.max(samples);
-        Some(self.shot(&receivers) - before)
+        Some(explored + self.shot(&receivers) - before)
+    }
+
+    /// Learn where the sky is seen from those of some vertices that see little of it, by their rays and those of their
+    /// neighbours. Returns the rays shot; `None` when cancelled.
+    fn explore(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        receivers: &[(u32, Receiver)],
+        seed: u64,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let elements = 0..hierarchy.mesh.elements.len();
+        let mut tallies = self.neighbours(hierarchy, elements);
+        let sees_little = |&&(vertex, _): &&(u32, Receiver)| {
+            let tally = &mut tallies[vertex as usize];
+            *tally += self.tally(vertex);
+            tally.shot > 0 && tally.fraction() < SELDOM
+        };
+        let seldom = receivers.iter().filter(sees_little);
+        let seldom: Vec<Receiver> = seldom.map(|&(_, receiver)| receiver).collect();
+        self.lights.explore(rays, &seldom, seed, cancel)
     }
 
     /// Double the rays of vertices whose noise exceeds its tolerance. Returns the rays shot; `None` when cancelled.
@@ -191,6 +223,15 @@ impl DirectField {
     fn learn(&mut self, receivers: &[(u32, Receiver)], known: Vec<DirectLight>) {
         for (&(vertex, _), light) in receivers.iter().zip(known) {
             self.vertices[vertex as usize] = Some(light);
+        }
+    }
+
+    /// Discard the rays of some vertices.
+    fn restart(&mut self, receivers: &[(u32, Receiver)]) {
+        for &(vertex, _) in receivers {
+            if let Some(light) = &mut self.vertices[vertex as usize] {
+                *light = DirectLight::expected(light.exact);
+            }
         }
     }
 

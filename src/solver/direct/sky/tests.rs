@@ -3,7 +3,7 @@ use std::sync::Arc;
 use super::*;
 use crate::{
     geometry::{Random, cosine_direction},
-    scene::{SkyPicture, Texture, UpAxis},
+    scene::{SkyPicture, SkySample, Texture, UpAxis},
 };
 
 fn random_normal(random: &mut Random) -> Vec3 {
@@ -146,5 +146,24 @@ fn a_table_reads_a_uniform_sky_as_a_cluster_around_the_scene() {
         assert!((read(Reading::Bounded) - 1.0).abs() < 7e-3);
         let exact = SkyTree::new(&sky, None).unwrap();
         assert!((exact.unoccluded(normal, &mut cut).x / PI - 1.0).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn each_leaf_holds_its_directions_and_has_three_neighbours() {
+    for sky in [Sky::Uniform(Vec3::ONE), picture()] {
+        let tree = SkyTree::new(&sky, None).unwrap();
+        for (index, node) in tree.nodes.iter().enumerate() {
+            if node.first_child != 0 {
+                continue;
+            }
+            let leaf = index as u32;
+            let [a, b, c] = node.path;
+            assert_eq!(tree.leaf_towards((a + b + c) * 7.0), leaf);
+            assert_eq!(tree.leaf_towards(a * 0.8 + b * 0.1 + c * 0.1), leaf);
+            let around = tree.neighbours(leaf);
+            assert!(!around.contains(&leaf));
+            assert!(around[0] != around[1] && around[1] != around[2] && around[2] != around[0]);
+        }
     }
 }
