@@ -16,13 +16,14 @@ use crate::{
 };
 
 /// Most rounds. Fewer, and the guide is coarse where it began with a few hits; more take time.
-const ROUNDS: u64 = 4;
+const MOST_ROUNDS: u64 = 4;
 
 /// Most rays of a round, and most from a point. Fewer, and small openings are not found; more take time.
 const MOST_RAYS: usize = 1 << 16;
 const MOST_RAYS_FROM_POINT: u32 = 64;
 
-/// Hits of a round after which there is no other. Fewer, and cells are few; more take time.
+/// Hits of a round from which the guide is not learnt anew. Fewer, and cells are few; more take time, and places found by
+/// guided rays have uneven weights.
 const ENOUGH_HITS: usize = 512;
 
 /// Fewest rays from a point. Fewer, and a point tells little about its light; more leave points out.
@@ -53,28 +54,34 @@ impl Lights {
         seed: u64,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let mut shot = 0;
-        for round in 1..=ROUNDS {
+        let (mut shot, mut hits_so_far) = (0, 0);
+        for round in 1..=MOST_ROUNDS {
             let seed = seed.wrapping_add(round.wrapping_mul(SEED_STEP));
-            let Source::Sky(sky, _) = &self.source else {
+            let Source::Sky(sky, guidance) = &self.source else {
                 break;
             };
             let (points, hits, tried) = self.explored(sky, rays, receivers, seed, cancel);
             cancel.proceed()?;
             shot += tried;
-            let guide = SkyGuide::new(with_openings(points, &hits));
-            let is_last = guide.is_none() || hits.len() >= ENOUGH_HITS;
+            // The last round tells where the guide pays.
+            let is_last = hits_so_far >= ENOUGH_HITS || round == MOST_ROUNDS;
+            let guide = match guidance {
+                Guidance::Known(guide) if is_last => guide.clone().proven(&points),
+                _ => SkyGuide::new(with_openings(points, &hits)),
+            };
+            hits_so_far = hits.len();
+            let is_known = guide.is_some();
             if let Source::Sky(_, guidance) = &mut self.source {
                 *guidance = guide.map_or(Guidance::None, Guidance::Known);
             }
-            if is_last {
+            if is_last || !is_known {
                 break;
             }
         }
         Some(shot)
     }
 
-    /// Rays from some of the receivers: these with their visible fractions, the rays that reached the sky with the index
+    /// Rays from some of the receivers: these with the moments of their light, the rays that reached the sky with the index
     /// of their point, and the number of rays tried.
     fn explored(
         &self,
@@ -102,21 +109,27 @@ impl Lights {
                 visible: weight * whole / sky.least_irradiance(ray.leaf, receiver.normal),
             });
             let hits: Vec<SkyHit> = hits.collect();
-            let fraction = luminance(light.irradiance()) / whole.max(f32::MIN_POSITIVE);
-            (fraction, hits)
+            let moment = |power: i32| {
+                let weights = shot.seen.iter().map(|(_, weight)| weight.powi(power));
+                weights.sum::<f32>() / count as f32
+            };
+            (moment(1), moment(2), hits)
         };
-        let found: Vec<(f32, Vec<SkyHit>)> = points
+        let found: Vec<(f32, f32, Vec<SkyHit>)> = points
             .par_iter()
             .with_min_len(16)
             .map_init(Shot::default, |shot, receiver| explore(shot, receiver))
             .collect();
         let tried = found.len() as u64 * u64::from(count);
         let (mut explored, mut all) = (Vec::new(), Vec::new());
-        for (index, (receiver, (fraction, hits))) in points.into_iter().zip(found).enumerate() {
+        for (index, (receiver, (fraction, square, hits))) in
+            points.into_iter().zip(found).enumerate()
+        {
             explored.push(Explored {
                 point: receiver.point,
                 openings: Vec::new(),
                 fraction,
+                square,
             });
             all.extend(hits.into_iter().map(|hit| (index, hit)));
         }

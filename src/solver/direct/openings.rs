@@ -17,7 +17,7 @@ const FARTHEST: f32 = 2.0;
 const RATIO: f32 = 0.8;
 const DISTANCES: usize = 32;
 
-/// Cosine of the angle within which a ray passes a place (11°, about a leaf of the sky's tree). Larger blurs the place;
+/// Cosine of the angle within which a ray passes a place (11°, about two leaves of the sky's tree). Larger blurs the place;
 /// smaller finds no votes.
 const NEAR_COSINE: f32 = 0.98;
 

@@ -22,6 +22,10 @@ use crate::transport::luminance;
 /// uneven; smaller leaves noise.
 pub(super) const SELDOM: f32 = 0.06;
 
+/// Largest second moment of the weights of guided rays relative to that of unguided ones. Larger guides rays where light
+/// comes through many small gaps, and makes it noisier; smaller leaves rooms without a guide.
+const MOST_SQUARE: f32 = 0.6;
+
 /// Share of rays that go everywhere. Smaller, and light that the guide does not know comes in few bright samples; larger
 /// shoots fewer rays into openings.
 const EVERYWHERE: f32 = 0.5;
@@ -29,9 +33,10 @@ const EVERYWHERE: f32 = 0.5;
 /// Fewest hits of a cell. Fewer, and a cell does not know all of its openings; more, and cells reach into several rooms.
 const LEAST_HITS: usize = 64;
 
-/// Share of a leaf's visible part that each of its three neighbours gets. Smaller, and light at the rim of an opening comes
-/// in few bright samples; larger aims beside it.
+/// Share of a leaf's visible part that each of its three neighbours gets, and how often: an opening is known by a few
+/// places. Smaller, and light at its rim comes in few bright samples; larger aims beside it.
 const SPREAD: f32 = 0.5;
+const SPREADS: usize = 2;
 
 /// A point from which rays were shot, and what they saw.
 #[derive(Clone, Debug)]
@@ -39,8 +44,10 @@ pub(super) struct Explored {
     pub point: Vec3,
     /// By hit.
     pub openings: Vec<Opening>,
-    /// The visible fraction of the point's light.
+    /// The visible fraction of the point's light: the sum of the weights of visible rays over the number of rays.
     pub fraction: f32,
+    /// The same of the squares of the weights.
+    pub square: f32,
 }
 
 /// A cell of space.
@@ -99,7 +106,7 @@ impl SkyGuide {
         {
             let middle = points.partition_point(|point| point.point[axis] < place);
             let (below, above) = points.split_at_mut(middle);
-            let halves = [self.grow(below), self.grow(above)];
+            let halves = [below, above].map(|half| self.grow(half));
             self.cells[index].halves = Some((axis, place, halves));
             return index as u32;
         }
@@ -113,13 +120,34 @@ impl SkyGuide {
         index as u32
     }
 
+    /// Guide only cells in which this made the light of points less noisy; `None` if there are none.
+    pub(super) fn proven(mut self, points: &[Explored]) -> Option<Self> {
+        let mut sums = vec![(0.0, 0.0); self.cells.len()];
+        for point in points {
+            let (fraction, square) = &mut sums[self.cell_at(point.point)];
+            *fraction += point.fraction;
+            *square += point.square;
+        }
+        for (cell, (fraction, square)) in self.cells.iter_mut().zip(sums) {
+            if square >= MOST_SQUARE * fraction {
+                cell.openings = 0..0;
+            }
+        }
+        let guides = self.cells.iter().any(|cell| !cell.openings.is_empty());
+        guides.then_some(self)
+    }
+
+    fn cell_at(&self, point: Vec3) -> usize {
+        let mut cell = 0;
+        while let Some((axis, place, halves)) = self.cells[cell].halves {
+            cell = halves[usize::from(point[axis] >= place)] as usize;
+        }
+        cell
+    }
+
     /// The openings seen from a point; none if it is not guided.
     fn openings_at(&self, point: Vec3) -> &[Opening] {
-        let mut cell = &self.cells[0];
-        while let Some((axis, place, halves)) = cell.halves {
-            cell = &self.cells[halves[usize::from(point[axis] >= place)] as usize];
-        }
-        &self.openings[cell.openings.clone()]
+        &self.openings[self.cells[self.cell_at(point)].openings.clone()]
     }
 
     /// Whether rays from a point are guided.
@@ -127,7 +155,7 @@ impl SkyGuide {
         !self.openings_at(point).is_empty()
     }
 
-    /// Add to the cut of a point the leaves that are seen from it, with the `lobes` of each. `None` if the point is not
+    /// Add to the cut of a point the leaves that are seen from it, which `lobes` describe. `None` if the point is not
     /// guided.
     pub(super) fn mix(
         &self,
@@ -146,15 +174,17 @@ impl SkyGuide {
         };
         lobes.extend(self.openings_at(point).iter().map(to_lobe));
         merge(lobes);
-        for index in 0..lobes.len() {
-            let Lobe { leaf, visible, .. } = lobes[index];
-            lobes.extend(tree.neighbours(leaf).map(|leaf| Lobe {
-                leaf,
-                visible: SPREAD * visible,
-                irradiance: 0.0,
-            }));
+        for _ in 0..SPREADS {
+            for index in 0..lobes.len() {
+                let Lobe { leaf, visible, .. } = lobes[index];
+                lobes.extend(tree.neighbours(leaf).map(|leaf| Lobe {
+                    leaf,
+                    visible: SPREAD * visible,
+                    irradiance: 0.0,
+                }));
+            }
+            merge(lobes);
         }
-        merge(lobes);
         for lobe in lobes.iter_mut() {
             lobe.irradiance = luminance(tree.leaf_irradiance(lobe.leaf as usize, normal));
         }
@@ -163,7 +193,7 @@ impl SkyGuide {
             .iter()
             .map(|lobe| lobe.visible * lobe.irradiance)
             .sum();
-        if sum <= 0.0 {
+        if !(sum > 0.0 && sum.is_finite()) {
             return None;
         }
         let guided = (1.0 - EVERYWHERE) / EVERYWHERE * light;
@@ -257,6 +287,7 @@ mod tests {
                 point: Vec3::Y * f32::from(index) * 0.01,
                 openings,
                 fraction: if is_dark { 0.0 } else { 0.01 },
+                square: 0.001,
             }
         };
         SkyGuide::new((0..200).map(explored).collect()).unwrap()
@@ -271,9 +302,23 @@ mod tests {
             point: Vec3::ZERO,
             openings: Vec::new(),
             fraction: 0.0,
+            square: 0.0,
         };
         assert!(SkyGuide::new(vec![point; 10]).is_none());
         assert!(SkyGuide::new(Vec::new()).is_none());
+    }
+
+    #[test]
+    fn cells_whose_light_did_not_become_less_noisy_are_not_guided() {
+        let point = |fraction, square| Explored {
+            point: Vec3::Y * 0.1,
+            openings: Vec::new(),
+            fraction,
+            square,
+        };
+        assert!(guide().proven(&[point(0.01, 0.001)]).is_some());
+        assert!(guide().proven(&[point(0.01, 0.01)]).is_none());
+        assert!(guide().proven(&[]).is_none());
     }
 
     #[test]

@@ -7,9 +7,9 @@ use glam::{Vec3, Vec4};
 use super::{Node, SkyTree, octants};
 use crate::{scene::SkySample, transport::luminance};
 
-/// Halvings of each octant at least: 512 leaves of 11°. Fewer, and rays are stratified less; more, and horizons have
-/// more leaves.
-const LEAST_HALVINGS: u32 = 6;
+/// Halvings of each octant at least: 2,048 leaves of 5°. Fewer, and rays are stratified less and guided beside small
+/// openings; more, and horizons have more leaves.
+const LEAST_HALVINGS: u32 = 8;
 
 /// Power that a leaf of one radiance may misplace, as a share of the sky's. Smaller makes more leaves; larger blurs the
 /// shadows of bright spots.
