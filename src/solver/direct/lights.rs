@@ -245,7 +245,7 @@ impl Lights {
             }
             _ => None,
         };
-        light.expect_weight(mixture.as_ref().map_or(1.0, |mixture| mixture.weight));
+        light.expect_square(mixture.as_ref().map_or(1.0, |mixture| mixture.square));
         let total = cut.last().map_or(0.0, |last| last.until);
         // The random stream depends on the rounded position, not on the order of points.
         let [x, y, z] = (receiver.point * PLACES)

@@ -106,7 +106,7 @@ mod tests {
                 let through = windows[index / 7 % 2] + jitter(2.0);
                 SkyHit {
                     from,
-                    direction: (through - from).normalize(),
+                    direction: (through - from).normalize_or_zero(),
                     visible: 1.0,
                 }
             })

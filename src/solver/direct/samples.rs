@@ -42,7 +42,7 @@ impl Bundle {
         if passing != Vec3::ZERO {
             self.arrived += color * (weight * worth) * passing.extend(1.0);
             self.visible += 1;
-            self.worth += worth;
+            self.worth += worth * worth;
         }
     }
 }
@@ -78,7 +78,8 @@ pub(super) struct Tally {
     pub visible: u32,
     /// Pairs of rays to neighbouring strata with different outcomes; there are as many pairs as rays.
     pub changes: u32,
-    /// Mean weight of a visible ray at each point relative to rays that follow the unoccluded light, summed over the rays.
+    /// Root mean square weight of a visible ray at each point relative to rays that follow the unoccluded light, summed over
+    /// the rays.
     worth: f32,
 }
 
@@ -92,7 +93,7 @@ impl Tally {
         self.visible > 0 && self.visible < self.shot
     }
 
-    /// Mean weight of a visible ray relative to rays that follow the unoccluded light: 1 unless rays are guided.
+    /// Root mean square weight of a visible ray relative to rays that follow the unoccluded light: 1 unless rays are guided.
     fn scale(self) -> f32 {
         if self.shot > 0 {
             self.worth / self.shot as f32
@@ -101,7 +102,7 @@ impl Tally {
         }
     }
 
-    /// The visible fraction; 0 without rays.
+    /// The visible fraction, 0 without rays; of guided rays an upper bound.
     pub(super) fn fraction(self) -> f32 {
         self.scale() * self.visible as f32 / self.shot.max(1) as f32
     }
@@ -155,7 +156,8 @@ pub(super) struct DirectLight {
     visible: u32,
     /// As [`Tally::changes`].
     pub(super) changes: u32,
-    /// Weights of the visible rays relative to rays that follow the unoccluded light, and the expected one of one more.
+    /// Squares of the weights of the visible rays relative to rays that follow the unoccluded light, and the expected one of
+    /// one more: weights differ where rays are guided, and noise grows with their second moment.
     worth: f32,
 }
 
@@ -169,18 +171,18 @@ impl DirectLight {
         }
     }
 
-    /// Expect a weight of visible rays relative to rays that follow the unoccluded light.
-    pub(super) fn expect_weight(&mut self, weight: f32) {
+    /// Expect a square of the weights of visible rays relative to rays that follow the unoccluded light.
+    pub(super) fn expect_square(&mut self, square: f32) {
         if self.worth == 0.0 {
-            self.worth = weight;
+            self.worth = square;
         }
     }
 
-    /// Mean weight of visible rays relative to rays that follow the unoccluded light: 1 unless rays are guided.
+    /// Root mean square weight of visible rays relative to rays that follow the unoccluded light: 1 unless rays are guided.
     fn scale(&self) -> f32 {
         match self.worth {
             0.0 => 1.0,
-            worth => worth / (self.visible + 1) as f32,
+            worth => (worth / (self.visible + 1) as f32).sqrt(),
         }
     }
 

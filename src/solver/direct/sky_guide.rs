@@ -81,8 +81,8 @@ pub(super) struct Lobe {
 pub(super) struct Mixture {
     /// Probability of a leaf by the guide over that by its light, for a visible part of 1.
     per_visible: f32,
-    /// Expected weight of a visible ray.
-    pub weight: f32,
+    /// Expected square of the weight of a visible ray.
+    pub square: f32,
 }
 
 impl SkyGuide {
@@ -200,12 +200,12 @@ impl SkyGuide {
         let mut until = 0.0;
         let mut mixture = Mixture {
             per_visible: (1.0 - EVERYWHERE) * light / sum,
-            weight: 0.0,
+            square: 0.0,
         };
         for lobe in lobes.iter() {
             let share = lobe.visible * lobe.irradiance / sum;
             until += share;
-            mixture.weight += share * mixture.weight_of(lobe.visible);
+            mixture.square += share * mixture.weight_of(lobe.visible).powi(2);
             cut.push(Arriving {
                 until: light + guided * until,
                 target: Target::Node(lobe.leaf),
@@ -334,7 +334,7 @@ mod tests {
             .unwrap();
         let total = cut.last().unwrap().until;
         assert!((total * EVERYWHERE / light - 1.0).abs() < 1e-4);
-        let towards = (Vec3::new(5.0, 20.0, -3.0) - point).normalize();
+        let towards = (Vec3::new(5.0, 20.0, -3.0) - point).normalize_or_zero();
         // Sums of weights: within a cone about the opening, and beyond it; and the rays within.
         let (mut within, mut beyond, mut rays, count) = (0.0, 0.0, 0, 40_000);
         for ray in 0..count {
