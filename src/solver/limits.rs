@@ -17,8 +17,8 @@ const NOISE_SHARE: f32 = 0.5;
 /// 4.7 times the processor time with 1).
 const MESH_EXPONENT: f32 = 2.0 / 3.0;
 
-/// The same of the smallest area of elements, which falls as the tolerance to the power of 1.5. Smaller, and the mesh cannot follow the links; larger, and elements become
-/// tiny.
+/// The same of the smallest area of elements, which falls as the tolerance to the power of 1.5. Smaller, and the mesh
+/// cannot follow the links; larger, and elements become tiny.
 const AREA_EXPONENT: f32 = 1.0;
 
 /// Tolerances and limits of a step.

@@ -97,7 +97,6 @@ impl Lights {
         let count = count.min(MOST_RAYS_FROM_POINT);
         let explore = |shot: &mut Shot, receiver: &Receiver| {
             let mut light = DirectLight::default();
-            shot.seen.clear();
             if !cancel.is_cancelled() {
                 light.exact = self.unoccluded(receiver, None, &mut shot.cut);
                 self.shoot_at(rays, receiver, 0..count, seed, shot, &mut light);

@@ -230,6 +230,7 @@ impl Lights {
         }: &mut Shot,
         light: &mut DirectLight,
     ) {
+        seen.clear();
         if rays.is_clear() {
             light.arrive_whole();
             return;
@@ -262,17 +263,14 @@ impl Lights {
         // Shoot them, each into its part of the cut.
         let shots = strata.iter().map(|&(at, sample)| {
             let at = at * total;
-            let chosen = cut.partition_point(|part| part.until <= at);
-            let chosen = chosen.min(cut.len() - 1);
-            let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
-            let share = cut[chosen].until - before;
+            let (chosen, share, place) = Arriving::choose(cut, at);
             Ray {
                 part: chosen,
                 target: cut[chosen].target,
                 irradiance: chosen
                     .checked_sub(own)
                     .map_or(share, |lobe| lobes[lobe].irradiance),
-                place: (at - before) / share,
+                place,
                 square: low_discrepancy_2d(sample, shift),
             }
         });
@@ -286,7 +284,6 @@ impl Lights {
                     }
                     Target::Emitter(_) => None,
                 };
-                seen.clear();
                 let shots = shots.map(aim);
                 let mixture = mixture.as_ref().map(|mixture| (mixture, &**lobes));
                 shoot_outside(rays, receiver, shots, mixture, light, seen);
@@ -405,7 +402,7 @@ pub(super) struct Shot {
     strata: Vec<(f32, u32)>,
     /// Leaves of the sky to which rays are guided.
     lobes: Vec<Lobe>,
-    /// Rays that reached the sky, with their weights relative to rays that follow the unoccluded light.
+    /// Rays of the last point that reached the sky or the sun, with their weights relative to rays that follow the unoccluded light.
     pub(super) seen: Vec<(OutsideRay, f32)>,
 }
 

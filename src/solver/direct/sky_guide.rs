@@ -339,18 +339,14 @@ mod tests {
         let (mut within, mut beyond, mut rays, count) = (0.0, 0.0, 0, 40_000);
         for ray in 0..count {
             let at = (ray as f32 + random.uniform()) / count as f32 * total;
-            let chosen = cut
-                .partition_point(|part| part.until <= at)
-                .min(cut.len() - 1);
-            let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
-            let share = cut[chosen].until - before;
+            let (chosen, share, place) = Arriving::choose(&cut, at);
             let irradiance = chosen
                 .checked_sub(own)
                 .map_or(share, |lobe| lobes[lobe].irradiance);
             let Target::Node(node) = cut[chosen].target else {
                 unreachable!()
             };
-            let (place, square) = ((at - before) / share, random.uniform_2d());
+            let square = random.uniform_2d();
             let Some(ray) = tree.aim(node as usize, irradiance, normal, place, square) else {
                 continue;
             };

@@ -74,6 +74,18 @@ pub(crate) struct Arriving {
     pub(crate) target: Target,
 }
 
+impl Arriving {
+    /// The part of a cut at a sum of luminances: its index, its own luminance, and the place in it, 0…1. The cut must have
+    /// a part.
+    pub(crate) fn choose(cut: &[Self], at: f32) -> (usize, f32, f32) {
+        let chosen = cut.partition_point(|part| part.until <= at);
+        let chosen = chosen.min(cut.len() - 1);
+        let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
+        let share = cut[chosen].until - before;
+        (chosen, share, (at - before) / share)
+    }
+}
+
 /// The emitter or the node of a part of a cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Target {

@@ -92,15 +92,10 @@ fn rays_are_distributed_by_radiance_and_have_even_weights() {
         let (mut sum, mut squares, mut part, count) = (0.0, 0.0, 0.0, 4000);
         for ray in 0..count {
             let at = (ray as f32 + random.uniform()) / count as f32 * total;
-            let chosen = cut
-                .partition_point(|part| part.until <= at)
-                .min(cut.len() - 1);
-            let before = chosen.checked_sub(1).map_or(0.0, |last| cut[last].until);
-            let share = cut[chosen].until - before;
+            let (chosen, share, place) = Arriving::choose(&cut, at);
             let Target::Node(node) = cut[chosen].target else {
                 unreachable!()
             };
-            let place = (at - before) / share;
             let square = random.uniform_2d();
             let Some(ray) = tree.aim(node as usize, share, normal, place, square) else {
                 continue;
