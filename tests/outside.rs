@@ -470,6 +470,61 @@ fn all_light_through_a_window_arrives_however_small_it_is() {
     }
 }
 
+/// The irradiance of a floor below a room's window of this side in the sky of radiance 1, by summing over its area, W/m².
+fn through_window(place: DVec3, side: f64) -> f64 {
+    let count = 64;
+    let step = side / f64::from(count);
+    let at = |index: i32| 2.0 - 0.5 * side + (f64::from(index) + 0.5) * step;
+    let all = (0..count).flat_map(|i| (0..count).map(move |j| (i, j)));
+    all.map(|(i, j)| {
+        let ray = DVec3::new(4.0, at(i), at(j)) - place;
+        ray.y * ray.x / ray.length_squared().powi(2) * step * step
+    })
+    .sum()
+}
+
+#[test]
+fn a_dark_room_is_as_precise_within_walls_that_the_sky_lights() {
+    let mut builder = room_with_a_window(1.0);
+    let walls = material(&mut builder, 0.5, 0.0);
+    let [u, v, w] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 4.02);
+    let corner = DVec3::splat(-0.01);
+    let end = DVec3::splat(4.01);
+    for (origin, edges) in [
+        (corner, [v, u]),
+        (corner, [w, v]),
+        (corner, [u, w]),
+        (end, [-u, -v]),
+        (end, [-w, -u]),
+    ] {
+        plate(&mut builder, walls, 1, origin, edges);
+    }
+    let strips = [
+        (DVec3::new(4.01, -0.01, -0.01), DVec3::Y * 1.51, w),
+        (DVec3::new(4.01, 2.5, -0.01), DVec3::Y * 1.51, w),
+        (DVec3::new(4.01, 1.5, -0.01), DVec3::Y, DVec3::Z * 1.51),
+        (DVec3::new(4.01, 1.5, 2.5), DVec3::Y, DVec3::Z * 1.51),
+    ];
+    for (origin, up, across) in strips {
+        plate(&mut builder, walls, 1, origin, [up, across]);
+    }
+    let scene = under(builder, Sides::One, uniform(1.0));
+    let (solver, _) = solve(&scene, SolveSettings::normal());
+    let at = |index: i32| 0.2 + 0.4 * f64::from(index);
+    let places = (0..10).flat_map(|i| (0..10).map(move |j| DVec3::new(at(i), 0.0, at(j))));
+    let places: Vec<DVec3> = places.collect();
+    let found = irradiance_at(&scene, &solver, &places, Vec3::Y);
+    let pairs = found.iter().zip(&places);
+    let (mut squares, mut expected) = (0.0, 0.0);
+    for (found, &place) in pairs {
+        let exact = through_window(place, 1.0);
+        squares += (f64::from(found.x) - exact).powi(2);
+        expected += exact.powi(2);
+    }
+    let error = (squares / expected).sqrt();
+    assert!(error < 0.06, "{error}");
+}
+
 #[test]
 fn a_closed_room_shoots_no_ray_to_the_sky() {
     let mut builder = SceneBuilder::default();

@@ -8,7 +8,7 @@ use super::{
     Cancel, Phase, PhaseObserver, Snapshot, SolveSettings, StepReport,
     budget::Budget,
     coverage::{self, CoverageMap},
-    direct::{self, DirectFields, Surfaces},
+    direct::{self, DirectFields, Surfaces, Surroundings},
     estimate::ErrorEstimator,
     iteration::{self, Iteration, LinkedLight},
     limits::{Limits, shadow_samples},
@@ -197,6 +197,8 @@ impl Solver {
         // Coverage of the hemisphere of each cell of the first mesh by lit surfaces.
         self.probe_coverage(is_coarse, cancel)?;
         begin(Phase::Direct, self.ray_count);
+        // What errors of direct light are relative to.
+        self.look_around(cancel)?;
         // Divide elements where interpolation errs: of the linked light of the last step, and of direct light.
         self.adapt_to_linked(threshold_scale);
         self.adapt_to_direct(threshold_scale, cancel)?;
@@ -305,6 +307,17 @@ impl Solver {
         let within = &probed.within;
         self.ray_count += places::probe_within(scene, &mut self.hierarchy, rays, within, cancel)?;
         self.coverage.exclude_inside_solids(&self.hierarchy, within);
+        Some(())
+    }
+
+    /// Find how bright the surroundings of all elements are in the light of the last step.
+    fn look_around(&mut self, cancel: &Cancel) -> Option<()> {
+        // Without shadows direct light is exact.
+        if self.plan.is_clear || self.direct.is_empty() || self.linked.links.is_empty() {
+            return Some(());
+        }
+        let seen = iteration::surroundings(&self.linked, self.surfaces(), &self.settings, cancel)?;
+        self.direct.adapt_to(Surroundings::new(seen));
         Some(())
     }
 

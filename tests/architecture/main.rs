@@ -85,6 +85,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "multipole",
             "light_tree",
             "samples",
+            "scale",
             "sky",
             "openings",
             "sky_guide",
@@ -106,7 +107,14 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
     ),
     (
         "solver::iteration",
-        &["anderson", "light", "gather", "balance", "iterate"],
+        &[
+            "anderson",
+            "light",
+            "gather",
+            "surroundings",
+            "balance",
+            "iterate",
+        ],
     ),
 ];
 

@@ -3,7 +3,13 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::{border::SPREAD_SHARE, field::DirectField, fields::DirectFields, samples::DirectLight};
+use super::{
+    border::SPREAD_SHARE,
+    field::DirectField,
+    fields::DirectFields,
+    samples::DirectLight,
+    scale::{Scale, Surroundings},
+};
 use crate::{
     geometry::RayTree,
     hierarchy::{Hierarchy, longest_edge_squared},
@@ -91,13 +97,16 @@ impl DirectField {
         hierarchy: &mut Hierarchy,
         limits: Limits,
         others: f32,
+        surroundings: &Surroundings,
         cancel: &Cancel,
     ) -> Option<(u64, bool)> {
         let mut ray_count = 0;
         // First element that was not examined in this step.
         let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
-            let (shot, mean) = self.sample(rays, hierarchy, limits, others, cancel)?;
+            let (shot, mean) =
+                self.sample(rays, hierarchy, limits, others, surroundings, cancel)?;
+            let scale = Scale { mean, surroundings };
             ray_count += shot;
             if round == MOST_ROUNDS {
                 break;
@@ -105,8 +114,8 @@ impl DirectField {
             let elements = fresh..hierarchy.mesh.elements.len();
             fresh = elements.end;
             let leaves: Vec<usize> = hierarchy.mesh.leaves_among(elements).collect();
-            ray_count += self.probe_centres(rays, hierarchy, &leaves, limits, mean, cancel)?;
-            let wanted = self.leaves_to_divide(hierarchy, &leaves, limits, mean);
+            ray_count += self.probe_centres(rays, hierarchy, &leaves, limits, scale, cancel)?;
+            let wanted = self.leaves_to_divide(hierarchy, &leaves, limits, scale);
             let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
             if !fits || !hierarchy.mesh.divide(&wanted) {
                 return Some((ray_count, fits));
@@ -123,13 +132,15 @@ impl DirectField {
         hierarchy: &Hierarchy,
         limits: Limits,
         others: f32,
+        surroundings: &Surroundings,
         cancel: &Cancel,
     ) -> Option<(u64, f32)> {
         let sampled =
             self.sample_vertices(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
         let offset = self.offset_before_walls(rays, hierarchy, limits, cancel)?;
         let mean = self.mean(hierarchy) + others;
-        let denoised = self.reduce_noise(rays, hierarchy, limits, mean, cancel)?;
+        let scale = Scale { mean, surroundings };
+        let denoised = self.reduce_noise(rays, hierarchy, limits, scale, cancel)?;
         Some((sampled + offset + denoised, mean))
     }
 
@@ -199,7 +210,7 @@ impl DirectField {
         hierarchy: &Hierarchy,
         leaves: &[usize],
         limits: Limits,
-        mean: f32,
+        scale: Scale<'_>,
         cancel: &Cancel,
     ) -> Option<u64> {
         let element_count = hierarchy.mesh.elements.len();
@@ -214,6 +225,7 @@ impl DirectField {
         let probed: Vec<(usize, bool, Option<f32>)> = candidates
             .map(|leaf| {
                 let mut at_centre = self.unoccluded_at_centres[leaf];
+                let mean = scale.at(hierarchy, leaf);
                 // The light at the centroid takes longest.
                 let is_wanted = self.spread(hierarchy, leaf, mean) > limits.tolerance
                     || self.may_error_be_visible(hierarchy, leaf, limits, mean)
@@ -256,8 +268,10 @@ impl DirectField {
         cancel.proceed()?;
         // More of them where they are too noisy.
         let noisy = |index: usize, light: &DirectLight| {
-            let corners = self.tally_of_corners(hierarchy, unknown[index]);
-            limits.is_noisy(light, corners, share_root(hierarchy, unknown[index]), mean)
+            let leaf = unknown[index];
+            let corners = self.tally_of_corners(hierarchy, leaf);
+            let mean = scale.at(hierarchy, leaf);
+            limits.is_noisy(light, corners, share_root(hierarchy, leaf), mean)
         };
         self.double(rays, &receivers, noisy, limits.seed, &mut lights, cancel)?;
         let mut ray_count = 0;
@@ -274,11 +288,12 @@ impl DirectField {
         hierarchy: &Hierarchy,
         leaves: &[usize],
         limits: Limits,
-        mean: f32,
+        scale: Scale<'_>,
     ) -> Vec<u32> {
         let mut wanted = Vec::new();
         for &leaf in leaves {
             let mut at_centre = self.unoccluded_at_centres[leaf];
+            let mean = scale.at(hierarchy, leaf);
             if self.needs_division(hierarchy, leaf, limits, mean, &mut at_centre) {
                 wanted.push(leaf as u32);
             }

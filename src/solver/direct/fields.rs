@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use glam::Vec4;
 
-use super::{field::DirectField, lights::Lights, samples::DirectLight};
+use super::{field::DirectField, lights::Lights, samples::DirectLight, scale::Surroundings};
 use crate::{
     geometry::RayTree,
     hierarchy::{Channels as _, Hierarchy},
@@ -25,6 +25,8 @@ use crate::{
 #[derive(Default)]
 pub(crate) struct DirectFields {
     fields: Vec<DirectField>,
+    /// To which errors are relative.
+    surroundings: Surroundings,
     /// Stands for the offset places where nothing is sampled.
     no_offsets: OffsetPlaces,
 }
@@ -68,8 +70,14 @@ impl DirectFields {
                 .chain(outside)
                 .map(DirectField::new)
                 .collect(),
+            surroundings: Surroundings::default(),
             no_offsets: OffsetPlaces::default(),
         }
+    }
+
+    /// Make errors relative to the light of these surroundings from now on.
+    pub(crate) fn adapt_to(&mut self, surroundings: Surroundings) {
+        self.surroundings = surroundings;
     }
 
     /// Whether nothing is sampled.
@@ -228,7 +236,8 @@ impl DirectFields {
         let (mut shot, mut fits) = (0, true);
         for index in 0..self.fields.len() {
             let others = self.mean_of_others(hierarchy, index);
-            let found = self.fields[index].adapt(rays, hierarchy, limits, others, cancel)?;
+            let (field, around) = (&mut self.fields[index], &self.surroundings);
+            let found = field.adapt(rays, hierarchy, limits, others, around, cancel)?;
             (shot, fits) = (shot + found.0, fits && found.1);
         }
         // The elements that later fields divided.
@@ -249,9 +258,9 @@ impl DirectFields {
         let mut shot = 0;
         for index in 0..self.fields.len() {
             let others = self.mean_of_others(hierarchy, index);
-            shot += self.fields[index]
-                .sample(rays, hierarchy, limits, others, cancel)?
-                .0;
+            let (field, around) = (&mut self.fields[index], &self.surroundings);
+            let found = field.sample(rays, hierarchy, limits, others, around, cancel)?;
+            shot += found.0;
         }
         Some(shot)
     }
@@ -325,6 +334,7 @@ impl DirectFields {
 
     /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
-        self.fields.iter().map(DirectField::memory_bytes).sum()
+        let fields = self.fields.iter().map(DirectField::memory_bytes);
+        fields.sum::<usize>() + self.surroundings.memory_bytes()
     }
 }

@@ -8,6 +8,7 @@ use glam::Vec4;
 use super::{
     field::DirectField,
     samples::{DirectLight, Tally},
+    scale::Scale,
     sky_guide::SELDOM,
 };
 use crate::{
@@ -153,12 +154,13 @@ impl DirectField {
         rays: &RayTree,
         hierarchy: &Hierarchy,
         limits: Limits,
-        mean: f32,
+        scale: Scale<'_>,
         cancel: &Cancel,
     ) -> Option<u64> {
-        let (weights, emitted) = (
+        let (weights, emitted, means) = (
             vertex_share_roots(hierarchy),
             emitted_as_irradiance(hierarchy),
+            scale.at_vertices(hierarchy),
         );
         let all = 0..hierarchy.mesh.elements.len();
         let neighbours = self.neighbours(hierarchy, all.clone());
@@ -168,10 +170,11 @@ impl DirectField {
             .is_finite()
             .then(|| self.disputed(&neighbours));
         let may_be_noisy = |vertex: usize, light: &DirectLight| {
+            let (weight, mean) = (weights[vertex], means[vertex]);
             let is_disputed = || disputed.as_ref().is_some_and(|disputed| disputed[vertex]);
             light.counts_beside(emitted[vertex])
-                && (limits.is_noisy(light, neighbours[vertex], weights[vertex], mean)
-                    || is_disputed() && limits.is_doubtful(light, weights[vertex], mean))
+                && (limits.is_noisy(light, neighbours[vertex], weight, mean)
+                    || is_disputed() && limits.is_doubtful(light, weight, mean))
         };
         let is_noisy = |vertex: usize, light: Option<DirectLight>| {
             light.is_some_and(|light| may_be_noisy(vertex, &light))

@@ -22,7 +22,14 @@ fn adapted(scene: &Scene, rays: &RayTree, tolerance: f32) -> (Hierarchy, DirectF
     let mut field =
         DirectField::new(Lights::of_emitters(scene, &hierarchy, Direct::Sampled).unwrap());
     let cancel = Cancel::default();
-    let found = field.adapt(rays, &mut hierarchy, limits, 0.0, &cancel);
+    let found = field.adapt(
+        rays,
+        &mut hierarchy,
+        limits,
+        0.0,
+        &Surroundings::default(),
+        &cancel,
+    );
     assert!(found.is_some_and(|(_, fits)| fits));
     let mean = field.mean(&hierarchy);
     (hierarchy, field, mean)
