@@ -13,7 +13,8 @@ use rayon::prelude::*;
 
 use super::{
     gather_estimate::{GatherEstimate, factors},
-    reconstruct::{LeafLight, vertex_means},
+    means::vertex_means,
+    reconstruct::LeafLight,
 };
 use crate::{
     geometry::{Hit, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},

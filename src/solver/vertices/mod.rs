@@ -2,8 +2,9 @@
 
 mod final_gather;
 mod gather_estimate;
+mod means;
 mod reconstruct;
 
 pub(crate) use final_gather::{FinalGather, converged_change};
-pub(crate) use reconstruct::{LeafLight, link_irradiance, own_irradiance, vertex_means};
-pub(crate) use reconstruct::{divide_by_interpolation_error, gather_leaves};
+pub(crate) use means::{divide_by_interpolation_error, vertex_means};
+pub(crate) use reconstruct::{LeafLight, gather_leaves, link_irradiance, own_irradiance};

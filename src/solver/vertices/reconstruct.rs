@@ -1,8 +1,10 @@
-//! Light at vertices from links.
+//! Light of leaves from links.
 //!
 //! Each leaf gathers once more over its own links and those of its ancestors, at its own position instead of the
-//! centroids of clusters: over links of clusters at its centroid, over links of elements at each of its corners. A
-//! vertex takes the mean of the leaves that share it; vertices are not shared across creases and borders of materials.
+//! centroids of clusters: over links of clusters at its centroid, over links of elements at each of its corners.
+//! Leaves with the same ancestors are evaluated together.
+
+use std::ops::Range;
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
@@ -13,11 +15,12 @@ use crate::{
     solver::{
         Cancel,
         coverage::{CoverageMap, HemisphereCoverage},
-        direct::{SPREAD_SHARE, Surfaces},
-        limits::Limits,
-        places::{OffsetPlaces, carry_over, project, share_root},
+        direct::Surfaces,
+        places::OffsetPlaces,
     },
-    transport::{Kernel, LinkStore, Sights, TintedLink, TintedLinks, luminance, self_irradiance},
+    transport::{
+        Kernel, LinkStore, Sights, TintedLink, TintedLinks, element_form_factors, self_irradiance,
+    },
 };
 
 /// Most patches of a group whose leaves one task visits; fewer in small scenes.
@@ -27,9 +30,8 @@ const TASK_PATCHES: u32 = 256;
 /// group. Smaller, and seams between groups are visible; larger, and it is evaluated for each leaf.
 const SIGHT_DISTANCE: f32 = 8.0;
 
-/// Weight of a contact element beside others at a vertex: links see it as a whole. Smaller, and rounding decides;
-/// larger, and vertices beside contacts are too dark.
-const CONTACT_TRUST: f32 = 1e-3;
+/// Leaves whose light from above is computed together.
+const LANES: usize = 4;
 
 /// Linked light of a leaf.
 #[derive(Clone, Copy, Debug, Default)]
@@ -174,8 +176,13 @@ impl<'a> Walk<'a> {
             self.leave(depth);
             self.push_cluster(cluster);
             if hierarchy.clusters[cluster].is_leaf() {
-                for patch in hierarchy.clusters[cluster].patches() {
-                    self.visit_patch(patch);
+                let patches = hierarchy.clusters[cluster].patches();
+                for start in patches.clone().step_by(LANES) {
+                    let four = start..patches.end.min(start + LANES);
+                    let above = self.light_from_above(four.clone());
+                    for (patch, above) in four.zip(above) {
+                        self.visit_patch(patch, above);
+                    }
                 }
             } else {
                 let children = hierarchy.children(NodeId(cluster as u32));
@@ -217,29 +224,36 @@ impl<'a> Walk<'a> {
         self.push(cluster.centroid, cluster.radius, chain);
     }
 
-    /// Visit the leaves of a patch.
-    fn visit_patch(&mut self, patch: usize) {
+    /// Visit the leaves of a patch; `above` is its light from above if it is a leaf itself.
+    fn visit_patch(&mut self, patch: usize, above: Vec4) {
         let hierarchy = self.kernel.hierarchy;
         let normal = hierarchy.patches[patch].normal;
         let base = hierarchy.clusters.len() as u32;
-        let (first, above) = (self.found.len(), self.path.len());
-        // Elements with the length of the path to them: depth first, without recursion.
-        let mut pending = vec![(patch, above)];
-        while let Some((index, depth)) = pending.pop() {
+        let (first, top) = (self.found.len(), self.path.len());
+        // Elements with the length of the path to them and their light from above: depth first, without recursion.
+        let mut pending = vec![(patch, top, above)];
+        while let Some((index, depth, above)) = pending.pop() {
             let element = &hierarchy.mesh.elements[index];
             self.leave(depth);
             let own = self.links.tinted(NodeId(base + index as u32));
             if element.is_leaf() {
-                let light = self.leaf_light(index, normal, own);
+                let light = self.leaf_light(index, normal, above, own);
                 self.found.push(light);
                 continue;
             }
             let mut chain = self.spare.pop().unwrap_or_default();
             chain.own = own;
             self.push(element.centroid, element.radius, chain);
-            pending.extend(element.children().rev().map(|child| (child, depth + 1)));
+            let children = element.children();
+            let above = self.light_from_above(children.clone());
+            let children = children.zip(above);
+            pending.extend(
+                children
+                    .rev()
+                    .map(|(child, above)| (child, depth + 1, above)),
+            );
         }
-        self.leave(above);
+        self.leave(top);
         // Leaves come depth first, so those of a cell are consecutive.
         let cell = |leaf: &LeafLight| self.coverage.cell(hierarchy, leaf.element as usize);
         let nearby = self.coverage.nearby(self.kernel.tables, patch);
@@ -248,21 +262,66 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Linked light of a leaf, before scaling; `own` are its links.
-    fn leaf_light(&self, index: usize, normal: Vec3, own: TintedLinks<'_>) -> LeafLight {
+    /// Irradiance at the centroids of those of up to four elements with the same path that are leaves, over the links of
+    /// its nodes, but not over those of elements: they are evaluated at corners.
+    fn light_from_above(&self, elements: Range<usize>) -> [Vec4; LANES] {
+        let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
+        let mut sums = [Vec4::ZERO; LANES];
+        let mesh = &hierarchy.mesh;
+        let is_leaf = |lane: &usize| mesh.elements[elements.start + lane].is_leaf();
+        let lanes: Vec<usize> = (0..elements.len()).filter(is_leaf).collect();
+        let Some(&first) = lanes.first() else {
+            return sums;
+        };
+        // Other lanes repeat the first leaf.
+        let element =
+            |lane: usize| elements.start + if lanes.contains(&lane) { lane } else { first };
+        let all = [0, 1, 2, 3].map(element);
+        let points = all.map(|index| mesh.elements[index].centroid);
+        let normals = all.map(|index| hierarchy.patch_of(index).normal);
+        for chain in &self.path {
+            for &lane in &lanes {
+                sums[lane] += chain.known(points[lane], normals[lane]);
+            }
+        }
+        let (four_points, four_normals) = (Vectors4::new(points), Vectors4::new(normals));
+        for link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
+            let transmission = transmission(kernel, *link);
+            match hierarchy.kind(link.source) {
+                Kind::Element(source) => {
+                    let factors =
+                        element_form_factors(hierarchy, source, &four_points, &four_normals);
+                    let light = kernel.tables.elements[source] * transmission;
+                    for (sum, factor) in sums.iter_mut().zip(factors.to_array()) {
+                        *sum += light * factor;
+                    }
+                }
+                Kind::Cluster(_) => {
+                    for &lane in &lanes {
+                        let light = kernel.irradiance(link.source, points[lane], normals[lane]);
+                        sums[lane] += light * transmission;
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// Linked light of a leaf, before scaling, with its light from above; `own` are its links.
+    fn leaf_light(
+        &self,
+        index: usize,
+        normal: Vec3,
+        above: Vec4,
+        own: TintedLinks<'_>,
+    ) -> LeafLight {
         let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
         let centroid = hierarchy.mesh.elements[index].centroid;
         let mut light = LeafLight {
             element: index as u32,
-            ..LeafLight::default()
+            corners: [above; 3],
+            centre: above,
         };
-        for chain in &self.path {
-            light.centre += chain.known(centroid, normal);
-        }
-        for &link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
-            light.centre += link_irradiance(kernel, link, centroid, normal);
-        }
-        light.corners = [light.centre; 3];
         let corners = hierarchy.mesh.corners(index);
         let [a, b, c] = self
             .offsets
@@ -306,87 +365,4 @@ fn transmission(kernel: Kernel<'_>, link: TintedLink<'_>) -> Vec4 {
         Kind::Cluster(_) => link.tinted_transmission(),
         Kind::Element(_) => link.tinted_light_factor(),
     }
-}
-
-/// Linked irradiance at each vertex: the area-weighted mean of the leaves about it. It is multiplied by `factors`, or by 1 if
-/// they are empty. Vertices that only prevent cracks take the mean of the ends of their edge.
-pub(crate) fn vertex_means(
-    hierarchy: &Hierarchy,
-    leaves: &[LeafLight],
-    factors: &[Vec4],
-) -> Vec<Vec4> {
-    let count = hierarchy.mesh.vertices.len();
-    let mut irradiance = vec![Vec4::ZERO; count];
-    let mut weight = vec![0.0f32; count];
-    // Sums over the leaves about each vertex.
-    for leaf in leaves {
-        let element = &hierarchy.mesh.elements[leaf.element as usize];
-        let trust = if element.is_outside_solids() {
-            1.0
-        } else {
-            CONTACT_TRUST
-        };
-        let area = (element.area_vector.length() * trust).max(f32::MIN_POSITIVE);
-        for (&vertex, &value) in element.vertices.iter().zip(&leaf.corners) {
-            irradiance[vertex as usize] += value * area;
-            weight[vertex as usize] += area;
-        }
-    }
-    // Patches that no light reaches receive nothing.
-    for patch in hierarchy.active_patches().end..hierarchy.patches.len() {
-        for &vertex in &hierarchy.mesh.elements[patch].vertices {
-            weight[vertex as usize] += hierarchy.patches[patch].area;
-        }
-    }
-    for index in (0..count).filter(|&index| weight[index] > 0.0) {
-        irradiance[index] /= weight[index];
-    }
-    // Vertices of contact elements only, and the means of elements.
-    carry_over(
-        &hierarchy.mesh,
-        |element, _| element.is_outside_solids(),
-        &mut irradiance,
-    );
-    let centres = leaves
-        .iter()
-        .map(|leaf| (leaf.element as usize, leaf.centre))
-        .filter(|&(element, _)| hierarchy.mesh.elements[element].is_outside_solids());
-    project(hierarchy, &mut irradiance, centres);
-    // The factors of the final gather.
-    for (value, factor) in irradiance.iter_mut().zip(factors) {
-        *value *= *factor;
-    }
-    for index in (0..count).filter(|&index| weight[index] <= 0.0) {
-        if let Some([a, b]) = hierarchy.mesh.vertices[index].ends {
-            // Ends were made before the vertices between them.
-            irradiance[index] = (irradiance[a as usize] + irradiance[b as usize]) * 0.5;
-        }
-    }
-    irradiance
-}
-
-/// Divide leaves whose linked light has an interpolation error above the tolerance. Returns whether memory allowed it;
-/// otherwise none is divided.
-pub(crate) fn divide_by_interpolation_error(
-    hierarchy: &mut Hierarchy,
-    found: &[LeafLight],
-    limits: Limits,
-    mean: f32,
-) -> bool {
-    let has_error = |light: &LeafLight| {
-        let element = &hierarchy.mesh.elements[light.element as usize];
-        let corners = light.corners.map(luminance);
-        let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
-        let error = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
-        let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
-        element.area_vector.length() * 0.25 >= limits.min_area
-            && (error + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
-    };
-    let divided = found.iter().filter(|light| has_error(light));
-    let wanted: Vec<u32> = divided.map(|light| light.element).collect();
-    let fits = hierarchy.mesh.fits(&wanted, limits.most_elements);
-    if fits {
-        hierarchy.mesh.divide(&wanted);
-    }
-    fits
 }
