@@ -197,8 +197,6 @@ impl Solver {
         // Coverage of the hemisphere of each cell of the first mesh by lit surfaces.
         self.probe_coverage(is_coarse, cancel)?;
         begin(Phase::Direct, self.ray_count);
-        // What errors of direct light are relative to.
-        self.look_around(cancel)?;
         // Divide elements where interpolation errs: of the linked light of the last step, and of direct light.
         self.adapt_to_linked(threshold_scale);
         self.adapt_to_direct(threshold_scale, cancel)?;
@@ -230,10 +228,13 @@ impl Solver {
             is_last = self.is_error_reached(coarse);
             estimated = Some(coarse).filter(|_| !is_last);
         }
-        // In the last step, factors of the linked light from rays at the vertices.
+        // In the last step, factors of the linked light from rays at the vertices; in others, what errors of direct light
+        // are relative to in the next.
         if is_last {
             begin(Phase::FinalGather, self.ray_count);
             self.vertex_factors = self.final_gather(threshold_scale.min(1.0), cancel)?;
+        } else {
+            self.look_around(cancel)?;
         }
         // Figures and picture.
         begin(Phase::Display, self.ray_count);
@@ -310,10 +311,10 @@ impl Solver {
         Some(())
     }
 
-    /// Find how bright the surroundings of all elements are in the light of the last step.
+    /// Find how bright the surroundings of all elements are.
     fn look_around(&mut self, cancel: &Cancel) -> Option<()> {
         // Without shadows direct light is exact.
-        if self.plan.is_clear || self.direct.is_empty() || self.linked.links.is_empty() {
+        if self.plan.is_clear || self.direct.is_empty() {
             return Some(());
         }
         let seen = iteration::surroundings(&self.linked, self.surfaces(), &self.settings, cancel)?;

@@ -6,8 +6,10 @@
 use crate::hierarchy::Hierarchy;
 
 /// Least light to which errors are relative, as a share of the mean. Smaller costs elements and rays in rooms that are
-/// nearly black; larger leaves shadows in rooms that a window lights as coarse as if nobody looked into them.
-const LEAST: f32 = 1.0 / 30.0;
+/// nearly black (36 of them behind slots of half a square metre: at 1/30 22 times the processor time of 1, at 1/10 7
+/// times); larger leaves shadows in rooms that a window lights as coarse as if nobody looked into them (behind one of a
+/// square metre: an error of 8 % at 1, 4 % at 1/5, 3 % at 1/10 and 2 % at 1/30).
+const LEAST: f32 = 0.1;
 
 /// How bright the surroundings of each element are.
 #[derive(Default)]
