@@ -415,6 +415,27 @@ fn a_cancelled_step_leaves_the_last_light() {
 }
 
 #[test]
+fn a_step_that_is_cancelled_in_any_phase_can_be_repeated() {
+    for cancelled in Phase::ALL {
+        let mut solver = prepare(&scene("cornell"), SolveSettings::draft());
+        solver.step(&Cancel::default()).unwrap();
+        let cancel = Cancel::default();
+        let found = solver.step_in_phases(&cancel, &mut |phase, _| {
+            if phase == cancelled {
+                cancel.cancel();
+            }
+        });
+        // Only the last step gathers by rays.
+        assert_eq!(found.is_some(), cancelled == Phase::FinalGather);
+        step_to_end(&mut solver, |solver, _| {
+            solver.hierarchy().validate().unwrap();
+            solver.links().validate(solver.hierarchy()).unwrap();
+            assert_presentable(&solver.snapshot());
+        });
+    }
+}
+
+#[test]
 fn a_step_tells_its_phases_in_order_with_the_rays_shot_so_far() {
     let cancel = Cancel::default();
     let mut solver = prepare(&scene("cornell"), SolveSettings::draft());
