@@ -318,7 +318,7 @@ impl Solver {
             return Some(());
         }
         let seen = iteration::surroundings(&self.linked, self.surfaces(), &self.settings, cancel)?;
-        self.direct.adapt_to(Surroundings::new(seen));
+        self.direct.set_surroundings(Surroundings::new(seen));
         Some(())
     }
 

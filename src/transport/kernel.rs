@@ -232,15 +232,18 @@ impl Kernel<'_> {
         }
     }
 
-    /// As [`Self::irradiance`], at four points with one unit normal.
-    pub fn irradiances(&self, source: NodeId, points: &Vectors4, normal: Vec3) -> [Vec4; 4] {
+    /// As [`Self::irradiance`], at four points with a unit normal each.
+    pub fn irradiances(&self, source: NodeId, points: &Vectors4, normals: &Vectors4) -> [Vec4; 4] {
         match self.hierarchy.kind(source) {
-            Kind::Cluster(index) => points
-                .to_array()
-                .map(|point| self.sight(index, point).incident(point).on_face(normal)),
+            Kind::Cluster(index) => {
+                let (points, normals) = (points.to_array(), normals.to_array());
+                [0, 1, 2, 3].map(|lane| {
+                    let sight = self.sight(index, points[lane]);
+                    sight.incident(points[lane]).on_face(normals[lane])
+                })
+            }
             Kind::Element(index) => {
-                let normals = Vectors4::splat(normal);
-                let factors = element_form_factors(self.hierarchy, index, points, &normals);
+                let factors = element_form_factors(self.hierarchy, index, points, normals);
                 let radiosity = self.tables.elements[index];
                 // Written out: a `map` compiles to a call for every link.
                 [

@@ -90,7 +90,7 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
 
 impl DirectField {
     /// Sample all vertices, then divide elements and sample again until the interpolation error is tolerated, relative
-    /// to the mean luminance with that of `others`. Returns the rays shot, and whether memory allowed all divisions; `None` when cancelled.
+    /// to the mean luminance with that of `others` and the surroundings. Returns the rays shot, and whether memory allowed all divisions; `None` when cancelled.
     pub(crate) fn adapt(
         &mut self,
         rays: &RayTree,
@@ -104,9 +104,8 @@ impl DirectField {
         // First element that was not examined in this step.
         let mut fresh = 0;
         for round in 0..=MOST_ROUNDS {
-            let (shot, mean) =
+            let (shot, scale) =
                 self.sample(rays, hierarchy, limits, others, surroundings, cancel)?;
-            let scale = Scale { mean, surroundings };
             ray_count += shot;
             if round == MOST_ROUNDS {
                 break;
@@ -125,23 +124,25 @@ impl DirectField {
     }
 
     /// Sample all vertices until their noise is tolerated, relative to the mean luminance with that of `others`.
-    /// Returns the rays shot and this mean; `None` when cancelled.
-    pub(crate) fn sample(
+    /// Returns the rays shot and what errors are relative to; `None` when cancelled.
+    pub(super) fn sample<'a>(
         &mut self,
         rays: &RayTree,
         hierarchy: &Hierarchy,
         limits: Limits,
         others: f32,
-        surroundings: &Surroundings,
+        surroundings: &'a Surroundings,
         cancel: &Cancel,
-    ) -> Option<(u64, f32)> {
+    ) -> Option<(u64, Scale<'a>)> {
         let sampled =
             self.sample_vertices(rays, hierarchy, limits.shadow_samples, limits.seed, cancel)?;
         let offset = self.offset_before_walls(rays, hierarchy, limits, cancel)?;
-        let mean = self.mean(hierarchy) + others;
-        let scale = Scale { mean, surroundings };
+        let scale = Scale {
+            mean: self.mean(hierarchy) + others,
+            surroundings,
+        };
         let denoised = self.reduce_noise(rays, hierarchy, limits, scale, cancel)?;
-        Some((sampled + offset + denoised, mean))
+        Some((sampled + offset + denoised, scale))
     }
 
     /// Range of the luminance of the corners, times the weight of the element, relative to the mean.

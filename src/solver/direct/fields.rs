@@ -76,7 +76,7 @@ impl DirectFields {
     }
 
     /// Make errors relative to the light of these surroundings from now on.
-    pub(crate) fn adapt_to(&mut self, surroundings: Surroundings) {
+    pub(crate) fn set_surroundings(&mut self, surroundings: Surroundings) {
         self.surroundings = surroundings;
     }
 

@@ -61,6 +61,9 @@ impl Scale<'_> {
     /// At each vertex.
     pub(super) fn at_vertices(self, hierarchy: &Hierarchy) -> Vec<f32> {
         let mesh = &hierarchy.mesh;
+        if self.surroundings.relative.is_empty() {
+            return vec![self.mean; mesh.vertices.len()];
+        }
         let area = |leaf: usize| mesh.elements[leaf].area_vector.length();
         let areas = mesh.areas_about_vertices();
         let sums = mesh.sums_about_vertices(|leaf| area(leaf) * self.at(hierarchy, leaf));

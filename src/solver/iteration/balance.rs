@@ -18,10 +18,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::{
-    gather::{self, LinkedClusters},
-    light::LinkedLight,
-};
+use super::{gather::LinkedClusters, light::LinkedLight};
 use crate::solver::{Cancel, SolveSettings, coverage::CoverageMap, direct::Surfaces};
 
 /// Largest factor of a sender; the smallest is its inverse. Larger, and larger errors of coarse links, which are not
@@ -50,14 +47,7 @@ pub(crate) fn balance(
         |leaf: usize| !surfaces.is_sampled(leaf) && hierarchy.emission_of(leaf) != Vec3::ZERO;
     for sweep in 0..SWEEPS {
         // The sums of form factors with the present factors.
-        let kernel = linked.kernel(hierarchy, settings.method.reading());
-        let sums = gather::gather(
-            kernel,
-            &linked.links,
-            &linked_clusters,
-            settings.push,
-            cancel,
-        )?;
+        let sums = linked.gather(hierarchy, &linked.power, &linked_clusters, settings, cancel)?;
         // Change the factors towards those for which these sums equal the coverage.
         let relaxation = relaxation(sweep);
         let next = |sending: &f32, factor: f32| {

@@ -7,9 +7,10 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
+use super::light::LinkedLight;
 use crate::{
-    hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading},
-    solver::{Cancel, Push},
+    hierarchy::{Hierarchy, Kind, Moments, NodeId, Reading, Tables},
+    solver::{Cancel, Push, SolveSettings},
     transport::{Kernel, LinkStore, self_irradiance},
 };
 
@@ -56,9 +57,27 @@ impl LinkedClusters {
     }
 }
 
-/// Linked irradiance of every element, leaves and their ancestors (eqs 14 and 15), with the sum of form factors in the
-/// fourth channel. `None` when cancelled.
-pub(super) fn gather(
+impl LinkedLight {
+    /// Irradiance over the links of every element, leaves and their ancestors (eqs 14 and 15), if sources send what
+    /// these tables tell, with the sum of form factors in the fourth channel. `None` when cancelled.
+    pub(super) fn gather(
+        &self,
+        hierarchy: &Hierarchy,
+        tables: &Tables,
+        linked_clusters: &LinkedClusters,
+        settings: &SolveSettings,
+        cancel: &Cancel,
+    ) -> Option<Vec<Vec4>> {
+        let kernel = Kernel {
+            hierarchy,
+            tables,
+            reading: settings.method.reading(),
+        };
+        gather(kernel, &self.links, linked_clusters, settings.push, cancel)
+    }
+}
+
+fn gather(
     kernel: Kernel<'_>,
     links: &LinkStore,
     linked_clusters: &LinkedClusters,

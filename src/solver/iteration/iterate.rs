@@ -18,11 +18,7 @@
 use glam::Vec4;
 use rayon::prelude::*;
 
-use super::{
-    anderson::Anderson,
-    gather::{self, LinkedClusters},
-    light::LinkedLight,
-};
+use super::{anderson::Anderson, gather::LinkedClusters, light::LinkedLight};
 use crate::{
     hierarchy::Hierarchy,
     solver::{
@@ -226,14 +222,7 @@ fn sweep(
         cancel,
     } = iteration;
     let hierarchy = surfaces.hierarchy;
-    let kernel = linked.kernel(hierarchy, settings.method.reading());
-    let mut image = gather::gather(
-        kernel,
-        &linked.links,
-        linked_clusters,
-        settings.push,
-        cancel,
-    )?;
+    let mut image = linked.gather(hierarchy, &linked.power, linked_clusters, settings, cancel)?;
     let returned = |image: &[Vec4]| {
         area_total(hierarchy, |leaf| {
             hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])

@@ -1,12 +1,12 @@
 //! How bright what each element sees is.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 
-use super::{gather, gather::LinkedClusters, light::LinkedLight};
+use super::{gather::LinkedClusters, light::LinkedLight};
 use crate::{
     hierarchy::{Channels as _, Tables, luminance},
     solver::{Cancel, SolveSettings, direct::Surfaces, sums},
-    transport::Kernel,
 };
 
 /// By element, the mean luminance of the irradiance of all that is seen from there, relative to that of the scene: one
@@ -27,21 +27,10 @@ pub(crate) fn surroundings(
         let share = linked.power.elements[leaf].active_share();
         Vec3::splat(own(leaf) * share).extend(share)
     });
-    let kernel = Kernel {
-        hierarchy,
-        tables: &tables,
-        reading: settings.method.reading(),
-    };
     let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
-    let seen = gather::gather(
-        kernel,
-        &linked.links,
-        &linked_clusters,
-        settings.push,
-        cancel,
-    )?;
-    let elements = seen.into_iter().enumerate();
-    let of = |(element, seen): (usize, glam::Vec4)| {
+    let seen = linked.gather(hierarchy, &tables, &linked_clusters, settings, cancel)?;
+    let elements = seen.into_par_iter().enumerate();
+    let of = |(element, seen): (usize, Vec4)| {
         let filled = seen.form_factor_sum();
         match hierarchy.mesh.elements[element].is_leaf() && filled < 1.0 {
             true => seen.x + (1.0 - filled) * own(element),

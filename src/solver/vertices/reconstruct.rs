@@ -18,9 +18,7 @@ use crate::{
         direct::Surfaces,
         places::OffsetPlaces,
     },
-    transport::{
-        Kernel, LinkStore, Sights, TintedLink, TintedLinks, element_form_factors, self_irradiance,
-    },
+    transport::{Kernel, LinkStore, Sights, TintedLink, TintedLinks, self_irradiance},
 };
 
 /// Most patches of a group whose leaves one task visits; fewer in small scenes.
@@ -268,40 +266,28 @@ impl<'a> Walk<'a> {
         let (kernel, hierarchy) = (self.kernel, self.kernel.hierarchy);
         let mut sums = [Vec4::ZERO; LANES];
         let mesh = &hierarchy.mesh;
-        let is_leaf = |lane: &usize| mesh.elements[elements.start + lane].is_leaf();
-        let lanes: Vec<usize> = (0..elements.len()).filter(is_leaf).collect();
-        let Some(&first) = lanes.first() else {
+        let leaves = [0, 1, 2, 3].map(|lane| {
+            let index = elements.start + lane;
+            (index < elements.end && mesh.elements[index].is_leaf()).then_some(index)
+        });
+        let Some(first) = leaves.into_iter().flatten().next() else {
             return sums;
         };
         // Other lanes repeat the first leaf.
-        let element =
-            |lane: usize| elements.start + if lanes.contains(&lane) { lane } else { first };
-        let all = [0, 1, 2, 3].map(element);
+        let all = leaves.map(|leaf| leaf.unwrap_or(first));
         let points = all.map(|index| mesh.elements[index].centroid);
         let normals = all.map(|index| hierarchy.patch_of(index).normal);
-        for chain in &self.path {
-            for &lane in &lanes {
+        for lane in (0..LANES).filter(|&lane| leaves[lane].is_some()) {
+            for chain in &self.path {
                 sums[lane] += chain.known(points[lane], normals[lane]);
             }
         }
-        let (four_points, four_normals) = (Vectors4::new(points), Vectors4::new(normals));
-        for link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
-            let transmission = transmission(kernel, *link);
-            match hierarchy.kind(link.source) {
-                Kind::Element(source) => {
-                    let factors =
-                        element_form_factors(hierarchy, source, &four_points, &four_normals);
-                    let light = kernel.tables.elements[source] * transmission;
-                    for (sum, factor) in sums.iter_mut().zip(factors.to_array()) {
-                        *sum += light * factor;
-                    }
-                }
-                Kind::Cluster(_) => {
-                    for &lane in &lanes {
-                        let light = kernel.irradiance(link.source, points[lane], normals[lane]);
-                        sums[lane] += light * transmission;
-                    }
-                }
+        let (points, normals) = (Vectors4::new(points), Vectors4::new(normals));
+        for &link in self.path.last().map_or(&[][..], |chain| &chain.rest) {
+            let transmission = transmission(kernel, link);
+            let lights = kernel.irradiances(link.source, &points, &normals);
+            for (sum, light) in sums.iter_mut().zip(lights) {
+                *sum += light * transmission;
             }
         }
         sums
@@ -327,9 +313,10 @@ impl<'a> Walk<'a> {
             .offsets
             .places(&hierarchy.mesh.elements[index], corners);
         let points = Vectors4::new([centroid, a, b, c]);
+        let normals = Vectors4::splat(normal);
         let mut add = |link: TintedLink<'_>| {
             let transmission = transmission(kernel, link);
-            let [centre, corners @ ..] = kernel.irradiances(link.source, &points, normal);
+            let [centre, corners @ ..] = kernel.irradiances(link.source, &points, &normals);
             light.centre += centre * transmission;
             for (sum, corner) in light.corners.iter_mut().zip(corners) {
                 *sum += corner * transmission;
