@@ -14,6 +14,7 @@
 //! * [`metrics`]: error measures and reports;
 //! * [`experiments`]: suites of runs, on omissions, stability and growth with size;
 //! * [`export`] writes files;
+//! * [`picture`]: pictures by rays from the eye over the light of a solve;
 //! * [`worker`]: the solver thread;
 //! * `viewer`: the window and its pictures;
 //! * [`cli`]: flags to settings, headless commands.
@@ -26,6 +27,7 @@ pub mod export;
 pub mod geometry;
 pub mod hierarchy;
 pub mod metrics;
+pub mod picture;
 pub mod reference;
 pub mod sampling;
 pub mod scene;

@@ -52,6 +52,7 @@ fn lit(scene: &Scene, irradiance: f32) -> Snapshot {
     Snapshot {
         step: 1,
         omitted: Arc::default(),
+        lights: None,
         errors: Arc::default(),
         mesh: Arc::new(mesh),
         light: Arc::new(VertexLight {

@@ -125,11 +125,55 @@ fn a_picture_that_is_too_large_is_refused_before_the_work() {
             name,
             "--size",
             size,
+            "--quality",
+            "vertex",
         ];
         // Without an adapter no picture can be had, which is known as early.
         assert_refused(folder.path(), &arguments, 5, "graphics adapter");
         assert!(!folder.path().join("r.json").exists(), "nothing was solved");
     }
+}
+
+#[cfg(feature = "viewer")]
+#[test]
+fn traced_pictures_are_refused_where_they_cannot_be_had() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let cases: [(&[&str], &str); 2] = [
+        (&["--size", "32768x32768"], "67108864 pixels"),
+        (
+            &["--quality", "traced", "--view", "irradiance"],
+            "radiance alone",
+        ),
+    ];
+    for (more, sentence) in cases {
+        let start = ["solve", "s.obj", "--screenshot", "a.png"];
+        let arguments: Vec<&str> = start.iter().chain(more).copied().collect();
+        assert_refused(folder.path(), &arguments, 2, sentence);
+    }
+}
+
+/// Neither an adapter nor a display is needed.
+#[cfg(feature = "viewer")]
+#[test]
+fn a_traced_picture_needs_no_graphics_adapter() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let output = Command::new(env!("CARGO_BIN_EXE_vecrad"))
+        .args([
+            "solve", "s.obj", "--preset", "draft", "--quiet", "--size", "32x32",
+        ])
+        .args(["--quality", "traced=4", "--screenshot", "a.exr"])
+        .current_dir(folder.path())
+        .env("VK_DRIVER_FILES", "none.json")
+        .env("VK_ICD_FILENAMES", "none.json")
+        .env("LIBGL_DRIVERS_PATH", "none")
+        .env_remove("DISPLAY")
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{error}");
+    assert!(folder.path().join("a.exr").exists());
 }
 
 /// Messages of the loader of graphics drivers about displays that a picture does not need.

@@ -48,6 +48,7 @@ fn snapshot(scene: &Scene, step: u32, irradiance: f32) -> Arc<Snapshot> {
         light: Arc::new(light),
         clusters: Arc::default(),
         omitted: Arc::default(),
+        lights: None,
         errors: Arc::default(),
     })
 }

@@ -81,6 +81,7 @@ fn snapshot(scene: &Scene, irradiance: Vec3) -> Snapshot {
         }),
         clusters: Arc::new(vec![root]),
         omitted: Arc::default(),
+        lights: None,
         errors: Arc::default(),
     }
 }

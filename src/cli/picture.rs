@@ -9,14 +9,16 @@ use glam::{DVec3, Vec3};
 use super::{RunFlags, UsageError, output};
 use crate::{
     geometry::RayTree,
+    picture::Exposure,
     scene::{Scene, builtin},
-    solver::Snapshot,
+    solver::{Cancel, Snapshot},
     viewer::{
         CameraRequest,
         first_look::first_look,
         headless::{self, Subject},
         loader,
         stderr::StderrCapture,
+        traced,
         view::{ClusterOverlay, ClusterRequest, ViewMode, ViewRequest, ViewSettings},
     },
 };
@@ -89,6 +91,12 @@ impl ViewFlags {
         }
     }
 
+    /// Whether nothing but the light of surfaces is asked for.
+    fn shows_light_only(&self) -> bool {
+        let is_radiance = self.mode().is_none_or(|mode| mode == ViewMode::Radiance);
+        is_radiance && !self.edges && self.clusters.is_none()
+    }
+
     fn mode(&self) -> Option<ViewMode> {
         self.view.as_deref().and_then(ViewMode::from_name)
     }
@@ -118,6 +126,15 @@ pub struct PictureFlags {
         help_heading = "Picture"
     )]
     pub size: Size,
+    /// How the picture is made: traced[=SAMPLES] by rays from the eye, SAMPLES at most through a pixel (needs no graphics
+    /// adapter), or vertex, as the window draws it [default: traced=16 for radiance without overlays, else vertex]
+    #[arg(
+        long,
+        value_name = "HOW",
+        requires = "screenshot",
+        help_heading = "Picture"
+    )]
+    pub quality: Option<Quality>,
     /// Transparent background: straight alpha in a PNG, premultiplied alpha in an EXR
     #[arg(long, requires = "screenshot", help_heading = "Picture")]
     pub transparent: bool,
@@ -141,12 +158,37 @@ impl PictureFlags {
             let message = format!("the picture must end in .png or .exr: {}", path.display());
             bail!(UsageError(message));
         }
+        let traced = matches!(self.quality, Some(Quality::Traced(_)));
+        if traced && !self.view.shows_light_only() {
+            let message = "traced pictures show radiance alone: leave out --view, --edges and --clusters, or add --quality vertex";
+            bail!(UsageError(message.to_owned()));
+        }
+        let Size([width, height]) = self.size;
+        let pixels = u64::from(width) * u64::from(height);
+        if self.traced_samples().is_some() && pixels > MOST_TRACED_PIXELS {
+            let message = format!(
+                "a traced picture has at most {MOST_TRACED_PIXELS} pixels; choose a smaller --size, or --quality vertex"
+            );
+            bail!(UsageError(message));
+        }
         output::check(path)
+    }
+
+    /// Samples of a traced picture; `None` for one that is drawn.
+    fn traced_samples(&self) -> Option<u32> {
+        match self.quality {
+            Some(Quality::Traced(samples)) => Some(samples),
+            Some(Quality::Vertex) => None,
+            None => self
+                .view
+                .shows_light_only()
+                .then_some(Quality::DEFAULT_SAMPLES),
+        }
     }
 
     /// Refuse a picture that this machine cannot draw.
     pub fn check_size(&self) -> Result<()> {
-        if self.screenshot.is_some() {
+        if self.screenshot.is_some() && self.traced_samples().is_none() {
             let _capture = StderrCapture::begin();
             headless::check(self.size.0, self.transparent)?;
         }
@@ -166,12 +208,14 @@ impl PictureFlags {
         snapshot: &Snapshot,
         errors: Option<&Arc<Vec<f32>>>,
         run_flags: &RunFlags,
+        seed: u64,
     ) -> Result<()> {
         let Some(path) = &self.screenshot else {
             return Ok(());
         };
         let Size(size) = self.size;
-        let look = first_look(scene, &RayTree::new(scene));
+        let rays = RayTree::new(scene);
+        let look = first_look(scene, &rays);
         let opening = match builtin_name.and_then(builtin::find_builtin) {
             Some(found) => loader::builtin_camera(found, scene),
             None => look.camera,
@@ -191,7 +235,20 @@ impl PictureFlags {
             interior: look.interior,
             is_dark: scene.has_light() && !look.is_lit,
         };
-        let encoded = {
+        let traced = self.traced_samples().map(|samples| Exposure {
+            size,
+            samples,
+            seed,
+        });
+        let encoded = if let Some(exposure) = traced {
+            let cancel = Cancel::default();
+            let traced = traced::trace(subject, &rays, &camera, &view, &exposure, &cancel)
+                .context("the picture was cancelled")?;
+            match self.transparent {
+                true => traced.cutout().encode(path),
+                false => traced.picture().encode(path),
+            }
+        } else {
             let _capture = StderrCapture::begin();
             if self.transparent {
                 headless::cutout(subject, &camera, &view, size)?.encode(path)
@@ -201,6 +258,45 @@ impl PictureFlags {
         };
         let bytes = encoded.with_context(|| format!("cannot write {}", path.display()))?;
         output::write_whole(path, |out| out.write_all(&bytes))
+    }
+}
+
+/// Most pixels of a traced picture. More take more than 16 GiB of memory.
+const MOST_TRACED_PIXELS: u64 = 1 << 26;
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// By rays from the eye, so many at most through a pixel.
+    Traced(u32),
+    /// From the light at vertices, by the graphics adapter.
+    Vertex,
+}
+
+impl Quality {
+    const DEFAULT_SAMPLES: u32 = 16;
+    const MOST_SAMPLES: u32 = 4096;
+}
+
+impl FromStr for Quality {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let samples = match text.split_once('=') {
+            None if text == "vertex" => return Ok(Self::Vertex),
+            None if text == "traced" => Some(Self::DEFAULT_SAMPLES),
+            Some(("traced", samples)) => samples.parse().ok(),
+            _ => None,
+        };
+        samples
+            .filter(|samples| (1..=Self::MOST_SAMPLES).contains(samples))
+            .map(Self::Traced)
+            .ok_or_else(|| {
+                format!(
+                    "expected vertex, traced, or traced=SAMPLES with 1 to {} samples",
+                    Self::MOST_SAMPLES
+                )
+            })
     }
 }
 
@@ -330,6 +426,11 @@ mod tests {
         assert_eq!(clusters("used"), Some(ClusterRequest::Used));
         for wrong in ["", "-1", "size=0", "size=nan", "level=3", "used=1"] {
             assert_eq!(clusters(wrong), None, "{wrong}");
+        }
+        assert_eq!("traced=64".parse(), Ok(Quality::Traced(64)));
+        assert_eq!("vertex".parse(), Ok(Quality::Vertex));
+        for wrong in ["", "fine", "traced=0", "traced=5000", "vertex=2"] {
+            assert!(wrong.parse::<Quality>().is_err(), "{wrong}");
         }
         assert_eq!("0,-2,0".parse(), Ok(Direction(Vec3::NEG_Y)));
         assert!("0,0,0".parse::<Direction>().is_err());

@@ -156,6 +156,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &run.snapshot,
         errors_of(arguments, &scene, &run, &measured.errors, &interrupted).as_ref(),
         &arguments.run_flags,
+        arguments.setting_flags.settings().seed,
     );
     export?;
     report?;

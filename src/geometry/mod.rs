@@ -10,10 +10,10 @@ mod wide;
 
 pub use lanes::Vectors4;
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};
-pub use rays::{Hit, RAY_OFFSET, RayTree};
+pub use rays::{Hit, Passage, RAY_OFFSET, RayTree};
 pub use sampling::{
-    Random, SphericalTriangle, cosine_direction, low_discrepancy_1d, low_discrepancy_2d,
-    triangle_point,
+    Random, Shuffle, SphericalTriangle, cosine_direction, low_discrepancy_1d, low_discrepancy_2d,
+    shuffled, sobol_2d, triangle_point,
 };
 
 use glam::Vec3;

@@ -24,6 +24,22 @@ pub struct Hit {
     pub distance: f32,
 }
 
+/// What passes along a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passage {
+    /// By channel, 0…1.
+    pub transmittance: Vec3,
+    /// Distance of the last triangle that was found on it: where nothing passes, of one that blocks.
+    pub end: f32,
+}
+
+impl Passage {
+    const FREE: Self = Self {
+        transmittance: Vec3::ONE,
+        end: f32::INFINITY,
+    };
+}
+
 /// Answers occlusion and closest-hit questions about a scene.
 pub struct RayTree {
     /// Triangles have the numbers that they have in the scene.
@@ -85,10 +101,15 @@ impl RayTree {
     /// What passes along a segment, by channel, 0…1: the product over all triangles on it but the two of its ends.
     /// Naming the ends lets a segment start on its own surface however small that is.
     pub fn transmittance(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> Vec3 {
+        self.passage(from, to, ends).transmittance
+    }
+
+    /// As [`Self::transmittance`], with what blocks.
+    pub fn passage(&self, from: Vec3, to: Vec3, ends: [Option<TriangleId>; 2]) -> Passage {
         let separation = to - from;
         let length = separation.length();
         if self.is_clear() || length <= 2.0 * RAY_OFFSET {
-            return Vec3::ONE;
+            return Passage::FREE;
         }
         let ray = Ray::new(from, separation / length);
         self.passing(&ray, length - RAY_OFFSET, ends)
@@ -102,23 +123,34 @@ impl RayTree {
         direction: Vec3,
         from: Option<TriangleId>,
     ) -> Vec3 {
+        self.passage_outward(origin, direction, from).transmittance
+    }
+
+    /// As [`Self::transmittance_outward`], with what blocks.
+    pub fn passage_outward(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        from: Option<TriangleId>,
+    ) -> Passage {
         if self.is_clear() {
-            return Vec3::ONE;
+            return Passage::FREE;
         }
         self.passing(&Ray::new(origin, direction), f32::MAX, [from, None])
     }
 
     /// What passes through all triangles on a ray but two, up to a distance.
-    fn passing(&self, ray: &Ray, until: f32, ends: [Option<TriangleId>; 2]) -> Vec3 {
-        let mut passing = Vec3::ONE;
+    fn passing(&self, ray: &Ray, until: f32, ends: [Option<TriangleId>; 2]) -> Passage {
+        let mut passage = Passage::FREE;
         self.tree.each(ray, reach(until, ends), |met| {
-            passing *= match &self.panes {
+            passage.transmittance *= match &self.panes {
                 None => Vec3::ZERO,
                 Some(panes) => panes.passing(met.triangle, point_at(ray, met.distance)),
             };
-            passing != Vec3::ZERO
+            passage.end = met.distance;
+            passage.transmittance != Vec3::ZERO
         });
-        passing
+        passage
     }
 
     /// Whether nothing passes along a segment; see [`Self::transmittance`].

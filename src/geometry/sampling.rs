@@ -32,7 +32,7 @@ impl Random {
 
     /// Uniform in 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f32 {
-        (self.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
+        unit(self.next_u32())
     }
 
     /// Uniform in the unit square.
@@ -61,17 +61,77 @@ pub fn low_discrepancy_2d(index: u32, shift: Vec2) -> Vec2 {
     (point - point.floor()).min(Vec2::splat(1.0 - f32::EPSILON))
 }
 
-/// Point `index` of the van der Corput sequence in base 2, scrambled by nested permutations (Owen 1995, by the hash of Laine
-/// and Karras, "Stratified Sampling for Stochastic Transparency", 2011): 0 (included) to 1 (excluded). Of the points `k n`
-/// to `(k + 1) n - 1`, where n is a power of 2, one lies in each n-th part.
+/// Point `index` of the van der Corput sequence in base 2, scrambled by nested permutations (Owen 1995): 0 (included) to 1
+/// (excluded). Of the points `k n` to `(k + 1) n - 1`, where n is a power of 2, one lies in each n-th part.
 pub fn low_discrepancy_1d(index: u32, scramble: u32) -> f32 {
+    unit(permuted(index, scramble).reverse_bits())
+}
+
+/// Point `index` of the first two dimensions of the sequence of Sobol' (1967), scrambled by nested permutations, in the unit
+/// square. Of the points `k n` to `(k + 1) n - 1`, where n is a power of 2, one lies in each rectangle of area 1/n whose
+/// sides are powers of 2 and that stands in their grid.
+pub fn sobol_2d(index: u32, scramble: [u32; 2]) -> Vec2 {
+    // Direction numbers are the rows of Pascal's triangle modulo 2.
+    let (mut second, mut direction, mut left) = (0, 1_u32 << 31, index);
+    while left != 0 {
+        second ^= direction * (left & 1);
+        direction ^= direction >> 1;
+        left >>= 1;
+    }
+    Vec2::new(
+        low_discrepancy_1d(index, scramble[0]),
+        low_discrepancy_1d(second.reverse_bits(), scramble[1]),
+    )
+}
+
+/// The same numbers in another order: a nested permutation, so that the points `k n` to `(k + 1) n - 1`, where n is a power
+/// of 2, stay together.
+pub fn shuffled(index: u32, scramble: u32) -> u32 {
+    permuted(index.reverse_bits(), scramble).reverse_bits()
+}
+
+/// A permutation of the numbers in which each bit depends on the lower ones only (the hash of Laine and Karras, "Stratified
+/// Sampling for Stochastic Transparency", 2011).
+fn permuted(number: u32, scramble: u32) -> u32 {
     const FACTORS: [u32; 4] = [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6];
-    let permuted = FACTORS
+    FACTORS
         .into_iter()
-        .fold(index.wrapping_add(scramble), |x, factor| {
+        .fold(number.wrapping_add(scramble), |x, factor| {
             x ^ x.wrapping_mul(factor)
-        });
-    (permuted.reverse_bits() >> 8) as f32 * (1.0 / 16_777_216.0)
+        })
+}
+
+/// The upper bits as a number from 0 (included) to 1 (excluded).
+fn unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// What makes one use of the low-discrepancy points differ from another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shuffle {
+    /// Shift of [`low_discrepancy_2d`].
+    pub shift: Vec2,
+    /// Scramble of [`low_discrepancy_1d`].
+    pub scramble: u32,
+    /// Shift of these, 0 (included) to 1 (excluded).
+    pub offset: f32,
+}
+
+impl Shuffle {
+    /// The place of a point on a line, 0 (included) to 1 (excluded).
+    pub fn place(&self, index: u32) -> f32 {
+        let at = low_discrepancy_1d(index, self.scramble) + self.offset;
+        if at < 1.0 { at } else { at - 1.0 }
+    }
+
+    /// The next one of a stream.
+    pub fn next(random: &mut Random) -> Self {
+        Self {
+            shift: random.uniform_2d(),
+            scramble: random.next_u32(),
+            offset: 0.0,
+        }
+    }
 }
 
 /// Barycentric coordinates of an area-uniform point of a triangle from a point of the unit square

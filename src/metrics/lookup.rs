@@ -94,12 +94,26 @@ impl<'a> MeshLookup<'a> {
     }
 
     fn irradiance_at(&self, light: &VertexLight, point: &ReferencePoint) -> Option<Vec3> {
+        let place = self.place(&SidePoint {
+            triangle: point.triangle,
+            is_back: point.is_back,
+            barycentric: point.barycentric,
+            position: point.position,
+        })?;
+        Some(place.interpolate(&light.irradiance))
+    }
+
+    /// The place of a point among the vertices; `None` where the mesh does not cover it.
+    pub fn place(&self, point: &SidePoint) -> Option<MeshPlace> {
         let triangle = self.find(point)?;
-        Some(interpolate(self.mesh, light, triangle, point.position))
+        Some(MeshPlace {
+            vertices: self.mesh.indices[triangle],
+            weights: barycentric(point.position, corners(self.mesh, triangle)),
+        })
     }
 
     /// The display triangle that holds a point best.
-    fn find(&self, point: &ReferencePoint) -> Option<usize> {
+    fn find(&self, point: &SidePoint) -> Option<usize> {
         let side = 2 * point.triangle.index() + usize::from(point.is_back);
         let cells = *self.resolution.get(side)?;
         if cells == 0 {
@@ -108,6 +122,9 @@ impl<'a> MeshLookup<'a> {
         let [column, row] =
             [point.barycentric.x, point.barycentric.y].map(|place| cell_at(place, cells));
         let cell = self.first_cell[side] + (row * cells + column) as usize;
+        if let [only] = self.items[self.first_item[cell]..self.first_item[cell + 1]] {
+            return Some(only as usize);
+        }
         let depth = |triangle: u32| {
             barycentric_in_plane(point.position, corners(self.mesh, triangle as usize))
                 .min_element()
@@ -117,6 +134,36 @@ impl<'a> MeshLookup<'a> {
             .map(|&triangle| (triangle as usize, depth(triangle)))
             .max_by(|a, b| a.1.total_cmp(&b.1))
             .map(|(triangle, _)| triangle)
+    }
+}
+
+/// A point of one side of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SidePoint {
+    /// The triangle.
+    pub triangle: TriangleId,
+    /// Whether it lies on the back.
+    pub is_back: bool,
+    /// Its place in the triangle; sums to 1.
+    pub barycentric: Vec3,
+    /// Position in frame units.
+    pub position: Vec3,
+}
+
+/// A place among the vertices of a display mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeshPlace {
+    /// Those about it.
+    pub vertices: [u32; 3],
+    /// Their shares of it; they sum to 1.
+    pub weights: Vec3,
+}
+
+impl MeshPlace {
+    /// Values of vertices, interpolated there.
+    pub fn interpolate(&self, values: &[Vec3]) -> Vec3 {
+        let [a, b, c] = self.vertices.map(|vertex| values[vertex as usize]);
+        a * self.weights.x + b * self.weights.y + c * self.weights.z
     }
 }
 
@@ -185,11 +232,4 @@ fn running_sums(values: impl Iterator<Item = usize>) -> Vec<usize> {
 
 fn corners(mesh: &DisplayMesh, triangle: usize) -> [Vec3; 3] {
     mesh.indices[triangle].map(|vertex| mesh.positions[vertex as usize])
-}
-
-/// Irradiance of a display triangle at a position, interpolated between its vertices.
-fn interpolate(mesh: &DisplayMesh, light: &VertexLight, triangle: usize, position: Vec3) -> Vec3 {
-    let place = barycentric(position, corners(mesh, triangle));
-    let [a, b, c] = mesh.indices[triangle].map(|vertex| light.irradiance[vertex as usize]);
-    a * place.x + b * place.y + c * place.z
 }

@@ -291,15 +291,27 @@ impl Scene {
 
     /// Reflectance at a point of a triangle of what rays meet there, texture looked up. `barycentric` sums to 1.
     pub fn reflectance_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
+        let reflectance = self.material(triangle).reflectance;
+        self.reflected_at(triangle, reflectance, barycentric)
+    }
+
+    /// The same where the reflectance of the material is another one.
+    pub fn reflected_at(&self, triangle: TriangleId, reflectance: Vec3, barycentric: Vec3) -> Vec3 {
         let material = self.material(triangle);
-        let color = material.reflectance * material.share_of_met();
+        let color = reflectance * material.share_of_met();
         self.textured(triangle, material.reflectance_texture, color, barycentric)
     }
 
     /// Emitted radiance at a point of a triangle of what rays meet there, texture looked up. `barycentric` sums to 1.
     pub fn emission_at(&self, triangle: TriangleId, barycentric: Vec3) -> Vec3 {
+        let emission = self.material(triangle).emission;
+        self.emitted_at(triangle, emission, barycentric)
+    }
+
+    /// The same where the emission of the material is another one.
+    pub fn emitted_at(&self, triangle: TriangleId, emission: Vec3, barycentric: Vec3) -> Vec3 {
         let material = self.material(triangle);
-        let color = material.emission * material.share_of_met();
+        let color = emission * material.share_of_met();
         self.textured(triangle, material.emission_texture, color, barycentric)
     }
 

@@ -21,7 +21,7 @@ impl Cancel {
     }
 
     /// `None` if stopping was requested, to return early by `?`.
-    pub(super) fn proceed(&self) -> Option<()> {
+    pub(crate) fn proceed(&self) -> Option<()> {
         (!self.is_cancelled()).then_some(())
     }
 }

@@ -446,6 +446,7 @@ impl Solver {
             step,
         };
         self.snapshot = view.show(triangles, &self.snapshot, cancel)?;
+        self.snapshot.lights = Some(self.direct.shared(&self.rays));
         Some(())
     }
 }

@@ -75,7 +75,7 @@ pub struct Subject<'a> {
 
 impl Subject<'_> {
     /// Whether there is no light to show.
-    fn is_unlit(&self, view: &ViewSettings) -> bool {
+    pub(super) fn is_unlit(&self, view: &ViewSettings) -> bool {
         !self.snapshot.is_lit() || (self.is_dark && view.auto_exposure)
     }
 }

@@ -45,6 +45,7 @@ pub mod start;
 pub mod state;
 pub mod stderr;
 pub mod theme;
+pub mod traced;
 pub mod truth;
 pub mod view;
 pub mod viewport;

@@ -14,7 +14,7 @@ use std::{
 use circles::{ModulePath, SiblingImports, circle, sibling_imports, upward};
 
 /// From the top of the house to its foundation's users; a room may import those before it.
-const ROOMS: [&str; 12] = [
+const ROOMS: [&str; 13] = [
     "scene",
     "geometry",
     "sampling",
@@ -25,6 +25,7 @@ const ROOMS: [&str; 12] = [
     "metrics",
     "experiments",
     "export",
+    "picture",
     "worker",
     "viewer",
 ];
@@ -100,6 +101,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "interpolation",
             "before_walls",
             "fields",
+            "point_lights",
             "surfaces",
             "adapt",
             "light_parts",

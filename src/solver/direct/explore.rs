@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{
-    lights::{Guidance, Lights, Shot, Source},
+    lights::{Guidance, Lights, Shot, Source, shuffle_at},
     openings::{SkyHit, openings},
     samples::DirectLight,
     sky::SkyTree,
@@ -99,7 +99,8 @@ impl Lights {
             let mut light = DirectLight::default();
             if !cancel.is_cancelled() {
                 light.exact = self.unoccluded(receiver, None, &mut shot.cut);
-                self.shoot_at(rays, receiver, 0..count, seed, shot, &mut light);
+                let shuffle = shuffle_at(receiver.point, seed);
+                self.shoot_at(rays, receiver, 0..count, shuffle, shot, &mut light);
             }
             let whole = luminance(light.exact);
             let hits = shot.seen.iter().map(|(ray, weight)| SkyHit {

@@ -1,5 +1,7 @@
 //! Direct light as a field on the mesh: sampled at vertices, and at the centroids of elements where it varies.
 
+use std::sync::Arc;
+
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -15,7 +17,8 @@ use crate::{
 
 /// Direct light on a mesh.
 pub(crate) struct DirectField {
-    pub(crate) lights: Lights,
+    /// Shared with snapshots.
+    pub(crate) lights: Arc<Lights>,
     /// By vertex, if it was sampled; shorter than the vertices of the mesh if some are new.
     pub(super) vertices: Vec<Option<DirectLight>>,
     /// At the centroid by element, where it was needed.
@@ -34,7 +37,7 @@ impl DirectField {
     /// The field before any sample.
     pub(crate) fn new(lights: Lights) -> Self {
         Self {
-            lights,
+            lights: Arc::new(lights),
             vertices: Vec::new(),
             centres: Vec::new(),
             unoccluded_at_centres: Vec::new(),
@@ -51,7 +54,7 @@ impl DirectField {
         vertices: Vec<Option<DirectLight>>,
         centres: Vec<Option<DirectLight>>,
     ) {
-        (self.lights, self.vertices, self.centres) = (lights, vertices, centres);
+        (self.lights, self.vertices, self.centres) = (Arc::new(lights), vertices, centres);
         self.unoccluded_at_centres.clear();
     }
 

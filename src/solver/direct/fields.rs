@@ -3,7 +3,7 @@
 //! Direct light is linear in its sources. Each kind has shadow rays, noise and shadow borders of its own, so that a sky
 //! or a sun that most places do not see takes no rays from the lamps of a room.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec4;
 
@@ -130,6 +130,11 @@ impl DirectFields {
     /// Largest irradiance from outside by channel, W/m²: light of surfaces is bounded by their radiosity.
     pub(crate) fn brightest_outside(&self) -> Vec4 {
         self.outside().map(|field| field.lights.brightest()).sum()
+    }
+
+    /// The lights of all fields.
+    pub(super) fn lights(&self) -> impl Iterator<Item = &Arc<Lights>> {
+        self.fields.iter().map(|field| &field.lights)
     }
 
     fn outside(&self) -> impl Iterator<Item = &DirectField> {

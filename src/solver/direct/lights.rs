@@ -20,7 +20,9 @@ use super::{
     sun::SunDisc,
 };
 use crate::{
-    geometry::{Random, RayTree, SphericalTriangle, low_discrepancy_1d, low_discrepancy_2d},
+    geometry::{
+        Passage, RAY_OFFSET, Random, RayTree, Shuffle, SphericalTriangle, low_discrepancy_2d,
+    },
     hierarchy::{Hierarchy, Reading},
     scene::{MaterialId, Scene, Sky, Sun, TriangleId},
     solver::{Cancel, Direct, places::Receiver},
@@ -32,6 +34,7 @@ use crate::{
 const PLACES: f32 = 16_384.0;
 
 /// What gives the light.
+#[derive(Clone, Debug)]
 pub(super) enum Source {
     Emitters(LightTree),
     Sky(SkyTree, Guidance),
@@ -39,6 +42,7 @@ pub(super) enum Source {
 }
 
 /// Where places that see little of the sky see it.
+#[derive(Clone, Debug)]
 pub(super) enum Guidance {
     /// Nothing was learnt yet.
     Unknown,
@@ -48,6 +52,7 @@ pub(super) enum Guidance {
 }
 
 /// The light of one kind that is sampled: that of all emitters, of the sky, or of the sun.
+#[derive(Clone, Debug)]
 pub(crate) struct Lights {
     pub(super) source: Source,
     /// Largest radiosity by channel, or largest irradiance from outside: no irradiance can be larger.
@@ -209,7 +214,8 @@ impl Lights {
                 light.exact = self.unoccluded(receiver, scale, &mut shot.cut);
                 while !samples.is_empty() {
                     light.tried = samples.end;
-                    self.shoot_at(rays, receiver, samples, seed, shot, light);
+                    let shuffle = shuffle_at(receiver.point, seed);
+                    self.shoot_at(rays, receiver, samples, shuffle, shot, light);
                     samples = light.tried..wanted(index, light);
                 }
             });
@@ -221,16 +227,18 @@ impl Lights {
         rays: &RayTree,
         receiver: &Receiver,
         samples: Range<u32>,
-        seed: u64,
+        shuffle: Shuffle,
         Shot {
             cut,
             strata,
             lobes,
             seen,
+            blocked,
         }: &mut Shot,
         light: &mut DirectLight,
     ) {
         seen.clear();
+        *blocked = Blocked::default();
         if rays.is_clear() {
             light.arrive_whole();
             return;
@@ -248,17 +256,9 @@ impl Lights {
         };
         light.expect_square(mixture.as_ref().map_or(1.0, |mixture| mixture.square));
         let total = cut.last().map_or(0.0, |last| last.until);
-        // The random stream depends on the rounded position, not on the order of points.
-        let [x, y, z] = (receiver.point * PLACES)
-            .round()
-            .to_array()
-            .map(|x| u64::from(x.to_bits()));
-        let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
-        let mut random = Random::new(seed, place);
-        let (shift, scramble) = (random.uniform_2d(), random.next_u32());
         // All rays so far are stratified together. Those to one target are consecutive.
         strata.clear();
-        strata.extend(samples.map(|sample| (low_discrepancy_1d(sample, scramble), sample)));
+        strata.extend(samples.map(|sample| (shuffle.place(sample), sample)));
         strata.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         // Shoot them, each into its part of the cut.
         let shots = strata.iter().map(|&(at, sample)| {
@@ -271,11 +271,13 @@ impl Lights {
                     .checked_sub(own)
                     .map_or(share, |lobe| lobes[lobe].irradiance),
                 place,
-                square: low_discrepancy_2d(sample, shift),
+                square: low_discrepancy_2d(sample, shuffle.shift),
             }
         });
         match &self.source {
-            Source::Emitters(tree) => shoot_at_emitters(tree, rays, receiver, shots, light),
+            Source::Emitters(tree) => {
+                shoot_at_emitters(tree, rays, receiver, shots, light, blocked);
+            }
             Source::Sky(sky, _) => {
                 let aim = |ray: Ray| match ray.target {
                     Target::Node(node) => {
@@ -286,11 +288,13 @@ impl Lights {
                 };
                 let shots = shots.map(aim);
                 let mixture = mixture.as_ref().map(|mixture| (mixture, &**lobes));
-                shoot_outside(rays, receiver, shots, mixture, light, seen);
+                let blocked = (sky.width(), blocked);
+                shoot_outside(rays, receiver, shots, mixture, light, seen, blocked);
             }
             Source::Sun(sun) => {
                 let aim = |ray: Ray| sun.aim(receiver.normal, ray.square);
-                shoot_outside(rays, receiver, shots.map(aim), None, light, seen);
+                let blocked = (sun.width(), blocked);
+                shoot_outside(rays, receiver, shots.map(aim), None, light, seen, blocked);
             }
         }
         cut.truncate(own);
@@ -311,6 +315,16 @@ impl Lights {
     }
 }
 
+/// The random numbers of a point: they depend on its rounded position, not on the order of points.
+pub(super) fn shuffle_at(point: Vec3, seed: u64) -> Shuffle {
+    let [x, y, z] = (point * PLACES)
+        .round()
+        .to_array()
+        .map(|x| u64::from(x.to_bits()));
+    let place = x ^ (y << 21) ^ (z << 42) ^ (z >> 22);
+    Shuffle::next(&mut Random::new(seed, place))
+}
+
 /// Random numbers of a shadow ray.
 struct Ray {
     /// The part of the cut, its target and the luminance of its irradiance.
@@ -329,6 +343,7 @@ fn shoot_at_emitters(
     receiver: &Receiver,
     shots: impl Iterator<Item = Ray>,
     light: &mut DirectLight,
+    blocked: &mut Blocked,
 ) {
     let (mut part, mut bundle) = (usize::MAX, Bundle::default());
     let mut outcomes = Outcomes::default();
@@ -347,7 +362,14 @@ fn shoot_at_emitters(
         }
         let ends = [Some(receiver.triangle), Some(emitter.triangle)];
         let color = emitter.radiosity / luminance(emitter.radiosity);
-        let passing = rays.transmittance(receiver.point, point, ends);
+        let passage = rays.passage(receiver.point, point, ends);
+        let passing = passage.transmittance;
+        if passing == Vec3::ZERO {
+            // As wide as two of these triangles, of which lamps are mostly made.
+            let distance = (point - receiver.point).length();
+            let width = (2.0 * emitter.area).sqrt() / distance;
+            blocked.count(passage, distance, width);
+        }
         outcomes.count(passing != Vec3::ZERO);
         bundle.count(weight, 1.0, color, passing);
     }
@@ -375,15 +397,20 @@ fn shoot_outside(
     mixture: Option<(&Mixture, &[Lobe])>,
     light: &mut DirectLight,
     seen: &mut Vec<(OutsideRay, f32)>,
+    (width, blocked): (f32, &mut Blocked),
 ) {
     let (mut bundle, mut outcomes) = (Bundle::default(), Outcomes::default());
     for ray in shots {
         bundle.rays += 1;
         let Some(ray) = ray else { continue };
         let start = Some(receiver.triangle);
-        let passing = rays.transmittance_outward(receiver.point, ray.direction, start);
+        let passage = rays.passage_outward(receiver.point, ray.direction, start);
+        let passing = passage.transmittance;
         let is_visible = passing != Vec3::ZERO;
         outcomes.count(is_visible);
+        if !is_visible {
+            blocked.count(passage, f32::INFINITY, width);
+        }
         let worth = mixture.map_or(1.0, |(mixture, lobes)| mixture.weight(lobes, ray.leaf));
         bundle.count(ray.weight, worth, ray.color, passing);
         if is_visible {
@@ -404,6 +431,25 @@ pub(super) struct Shot {
     lobes: Vec<Lobe>,
     /// Rays of the last point that reached the sky or the sun, with their weights relative to rays that follow the unoccluded light.
     pub(super) seen: Vec<(OutsideRay, f32)>,
+    pub(super) blocked: Blocked,
+}
+
+/// The rays of the last point that were blocked.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Blocked {
+    pub(super) count: u32,
+    /// Sum of their sharpness: the inverse of the distance over which a point has to move until it sees another part of what
+    /// blocks before all of the light.
+    pub(super) sharpness: f32,
+}
+
+impl Blocked {
+    /// Count a ray that ends before the light at a distance, of an angular width in radians.
+    fn count(&mut self, passage: Passage, distance: f32, width: f32) {
+        let before = 1.0 / passage.end.max(RAY_OFFSET) - 1.0 / distance;
+        self.count += 1;
+        self.sharpness += before.max(0.0) / width.max(f32::MIN_POSITIVE);
+    }
 }
 
 /// Largest radiosity by channel.

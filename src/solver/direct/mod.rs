@@ -15,6 +15,7 @@ mod multipole;
 mod noise;
 mod openings;
 mod panel;
+mod point_lights;
 mod samples;
 mod scale;
 mod sky;

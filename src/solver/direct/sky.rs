@@ -56,6 +56,8 @@ pub(crate) struct SkyTree {
     /// If its light is to be that of a link: its moments as those of a cluster around the scene whose surfaces face
     /// inwards, and how they are read.
     table: Option<(Moments<Vec4>, Reading)>,
+    /// The angular width of most of its light, radians.
+    width: f32,
 }
 
 /// A ray to the sky or to the sun.
@@ -127,8 +129,32 @@ impl SkyTree {
         };
         tree.carry_up();
         tree.find_neighbours();
+        tree.width = tree.find_width();
         tree.table = reading.map(|reading| (tree.moments(), reading));
         Some(tree)
+    }
+
+    /// The angular width of most of its light, radians: that of as many leaves as would give its light if all were alike.
+    fn find_width(&self) -> f32 {
+        let leaves = self.nodes.iter().filter(|node| node.first_child == 0);
+        let (mut sum, mut squares, mut angles) = (0.0, 0.0, 0.0);
+        for leaf in leaves {
+            let (angle, light) = (solid_angle(leaf.path), luminance(leaf.radiosity));
+            angles += angle;
+            sum += angle * light;
+            squares += angle * light * light;
+        }
+        let part = if squares > 0.0 {
+            sum * sum / (squares * angles)
+        } else {
+            1.0
+        };
+        (4.0 * part).sqrt().min(1.0)
+    }
+
+    /// See [`Self::find_width`].
+    pub(super) fn width(&self) -> f32 {
+        self.width
     }
 
     /// Compute the vector irradiances of parents, children before parents.

@@ -42,6 +42,11 @@ impl SunDisc {
         })
     }
 
+    /// Its angular diameter, radians.
+    pub(super) fn width(&self) -> f32 {
+        2.0 * self.sine
+    }
+
     /// Irradiance of a surface that faces it, W/m².
     pub(super) fn brightest(&self) -> Vec4 {
         self.irradiance

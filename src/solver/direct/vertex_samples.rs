@@ -1,7 +1,7 @@
 //! Shadow rays from vertices: first a few from each, more where neighbours disagree, and more where the noise is too
 //! large.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use glam::Vec4;
 
@@ -145,7 +145,7 @@ impl DirectField {
         };
         let seldom = receivers.iter().filter(sees_little);
         let seldom: Vec<Receiver> = seldom.map(|&(_, receiver)| receiver).collect();
-        self.lights.explore(rays, &seldom, seed, cancel)
+        Arc::make_mut(&mut self.lights).explore(rays, &seldom, seed, cancel)
     }
 
     /// Double the rays of vertices whose noise exceeds its tolerance. Returns the rays shot; `None` when cancelled.

@@ -1,5 +1,6 @@
 //! Plain data that a solve hands out: snapshots, reports, inspections, omissions.
 
+mod direct_lights;
 mod estimated_error;
 mod inspection;
 mod note;
@@ -9,6 +10,7 @@ mod relit;
 mod snapshot;
 mod step_report;
 
+pub use direct_lights::{Arrived, DirectLights, LIGHT_KINDS, LightSampler, LitPoint};
 pub use estimated_error::{ErrorPoint, EstimatedError};
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use note::{Note, Obstacle};

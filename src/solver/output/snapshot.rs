@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{estimated_error::ErrorPoint, omitted::Omitted};
+use super::{direct_lights::DirectLights, estimated_error::ErrorPoint, omitted::Omitted};
 use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
@@ -88,6 +88,8 @@ pub struct Snapshot {
     pub clusters: Arc<Vec<ClusterBox>>,
     /// The parts that the scene does not need.
     pub omitted: Arc<Vec<Omitted>>,
+    /// Direct light at any point, as far as it is sampled; `None` before there is any light.
+    pub lights: Option<Arc<dyn DirectLights>>,
     /// The estimated error of its light at random points; none before the first step, and after a change of emitters and
     /// materials until the next.
     pub errors: Arc<Vec<ErrorPoint>>,

@@ -88,6 +88,7 @@ impl View<'_> {
             light: Arc::new(light),
             clusters: Arc::new(clusters?),
             omitted: self.omitted.clone(),
+            lights: None,
             errors: Arc::default(),
         })
     }

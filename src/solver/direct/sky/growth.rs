@@ -41,6 +41,7 @@ impl SkyTree {
             nodes: Vec::new(),
             neighbours: Vec::new(),
             table: None,
+            width: 0.0,
         };
         let mut pending = BinaryHeap::new();
         let candidate = |node: usize, samples: &[SkySample], from: Range<usize>, halvings: u32| {

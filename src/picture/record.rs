@@ -1,0 +1,195 @@
+//! Light by rays from the surface of a pixel.
+
+use glam::{Vec2, Vec3};
+
+use super::{
+    sampler::{Numbers, Sampler, Use},
+    surface::{LitScene, Surface},
+};
+use crate::{
+    geometry::cosine_direction,
+    scene::luminance,
+    solver::{LIGHT_KINDS, LightSampler},
+};
+
+/// Kinds of light: direct light of each kind, and indirect light.
+pub(super) const KINDS: usize = LIGHT_KINDS + 1;
+
+/// Index of indirect light.
+pub(super) const INDIRECT: usize = LIGHT_KINDS;
+
+/// The light at a surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    pub(super) position: Vec3,
+    pub(super) normal: Vec3,
+    /// Distance to the next pixel on a surface square to the view.
+    pub(super) spacing: f32,
+    /// Unoccluded direct irradiance, W/m².
+    pub(super) unoccluded: Vec3,
+    /// Luminance of the irradiance stored there.
+    pub(super) stored: f32,
+    /// By kind: how fast it changes, as the inverse of a distance. Of direct light the sharpness of its shadows, 0 where
+    /// nothing is blocked; of indirect light the inverse of the harmonic mean of the lengths of its rays.
+    pub(super) changes: [f32; KINDS],
+    /// By kind, W/m²: what is missing of direct light, and what is more than stored of indirect light.
+    pub(super) light: [Estimate; KINDS],
+}
+
+/// The mean of several estimates.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Estimate {
+    pub(super) mean: Vec3,
+    pub(super) count: f32,
+    /// Sum of the squared differences of the luminances from their mean.
+    spread: f32,
+}
+
+impl Estimate {
+    /// That of so many estimates with a mean of this variance.
+    fn of_mean(mean: Vec3, variance: f32, count: u32) -> Self {
+        let count = count as f32;
+        Self {
+            mean,
+            count,
+            spread: variance * count * (count - 1.0),
+        }
+    }
+
+    /// Add an estimate.
+    fn add(&mut self, value: Vec3) {
+        self.count += 1.0;
+        let before = value - self.mean;
+        self.mean += before / self.count;
+        self.spread += luminance(before) * luminance(value - self.mean);
+    }
+
+    /// Variance of an estimate. Of one it is not known, and 0.
+    pub(super) fn variance(&self) -> f32 {
+        self.spread.max(0.0) / (self.count - 1.0).max(1.0)
+    }
+
+    /// Add other estimates.
+    pub(super) fn merge(&mut self, other: &Self) {
+        let count = self.count + other.count;
+        if count > 0.0 {
+            let apart = luminance(other.mean - self.mean);
+            self.spread += other.spread + apart * apart * self.count * other.count / count;
+            self.mean = self.mean.lerp(other.mean, other.count / count);
+            self.count = count;
+        }
+    }
+}
+
+/// Shoots the rays of records, for the pixels of one thread.
+pub(super) struct Recorder<'a> {
+    lit: &'a LitScene<'a>,
+    direct: Option<Box<dyn LightSampler + 'a>>,
+}
+
+impl<'a> Recorder<'a> {
+    pub(super) fn new(lit: &'a LitScene<'a>) -> Self {
+        Self {
+            lit,
+            direct: lit.lights.map(|lights| lights.sampler()),
+        }
+    }
+
+    /// So many rays over the hemisphere and to each kind of light; `numbers` are those of the first.
+    pub(super) fn record(
+        &mut self,
+        surface: &Surface,
+        spacing: f32,
+        sampler: &Sampler,
+        numbers: Numbers,
+        count: u32,
+    ) -> Record {
+        let [all, direct] = self.lit.stored(surface);
+        let mut record = Record {
+            position: surface.position,
+            normal: surface.normal,
+            spacing,
+            unoccluded: Vec3::ZERO,
+            stored: luminance(all),
+            changes: [0.0; KINDS],
+            light: [Estimate::default(); KINDS],
+        };
+        if let Some(lights) = &mut self.direct {
+            let mut point = surface.lit_point(Vec3::ZERO);
+            record.unoccluded = lights.unoccluded(&point);
+            point.visible = visible(direct, record.unoccluded);
+            let (rays, shuffle) = sampler.shadow(numbers, count);
+            let arrived = lights.arriving(&point, rays, shuffle);
+            for (kind, arrived) in arrived.into_iter().enumerate() {
+                record.light[kind] = Estimate::of_mean(arrived.missing, arrived.variance, count);
+                record.changes[kind] = arrived.sharpness;
+            }
+        }
+        let stored = (all - direct).max(Vec3::ZERO);
+        let square = |ray| sampler.point(numbers.after(ray), Use::Hemisphere);
+        let (indirect, nearness) = self.indirect(surface, stored, count, square);
+        record.light[INDIRECT] = indirect;
+        record.changes[INDIRECT] = nearness;
+        record
+    }
+
+    /// What indirect light is more than stored, and the inverse of the harmonic mean of the lengths of the rays.
+    fn indirect(
+        &self,
+        surface: &Surface,
+        stored: Vec3,
+        count: u32,
+        square: impl Fn(u32) -> Vec2,
+    ) -> (Estimate, f32) {
+        let (mut light, mut nearness) = (Estimate::default(), 0.0);
+        for ray in 0..count {
+            let direction = cosine_direction(surface.normal, square(ray));
+            if direction.dot(surface.flat_normal) <= 0.0 {
+                // Below the surface: as if it met what the others meet.
+                continue;
+            }
+            let (start, from) = (surface.start, Some(surface.triangle));
+            let hit = self.lit.rays.closest(start, direction, from);
+            let met = hit.and_then(|hit| {
+                nearness += 1.0 / hit.distance.max(f32::MIN_POSITIVE);
+                self.lit.surface(start, direction, hit)
+            });
+            let sent = met.map_or(Vec3::ZERO, |met| {
+                self.lit.rays.tint(start, direction, from, hit)
+                    * self.lit.sent(&met)
+                    * std::f32::consts::PI
+            });
+            light.add(sent - stored);
+        }
+        (light, nearness / count.max(1) as f32)
+    }
+}
+
+impl Record {
+    /// By its own rays what is [`Self::excess_of`].
+    pub(super) fn excess(&self) -> Vec3 {
+        self.excess_of(self.light.map(|light| light.mean))
+    }
+
+    /// What the irradiance is more than the indirect light stored there, from the light of each kind.
+    pub(super) fn excess_of(&self, light: [Vec3; KINDS]) -> Vec3 {
+        let missing: Vec3 = light[..INDIRECT].iter().sum();
+        (self.unoccluded - missing).max(Vec3::ZERO) + light[INDIRECT]
+    }
+}
+
+/// The part of the unoccluded light that is visible by the direct light stored about a point, by colour, 0…1.
+fn visible(direct: Vec3, unoccluded: Vec3) -> Vec3 {
+    let part = |direct: f32, all: f32| {
+        if all > 0.0 {
+            (direct / all).clamp(0.0, 1.0)
+        } else {
+            1.0
+        }
+    };
+    Vec3::new(
+        part(direct.x, unoccluded.x),
+        part(direct.y, unoccluded.y),
+        part(direct.z, unoccluded.z),
+    )
+}

@@ -1,0 +1,102 @@
+//! Random numbers of pixels: neighbouring pixels share one low-discrepancy sequence, so that not only the samples of a pixel
+//! are spread evenly but also those of a group of pixels (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
+//! Sampling Error via Hierarchical Ordering of Pixels", 2020).
+
+use std::ops::Range;
+
+use glam::Vec2;
+
+use crate::geometry::{Random, Shuffle, shuffled, sobol_2d};
+
+/// What numbers are used for. Each use has a sequence of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Use {
+    /// Place within the pixel.
+    Place,
+    /// Direction over the hemisphere.
+    Hemisphere,
+    /// Which light, and which part of it.
+    Light,
+    Part,
+}
+
+/// The numbers of a picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sampler {
+    /// Samples of a pixel at most, a power of 2 in the exponent.
+    bits: u32,
+    seed: u64,
+}
+
+impl Sampler {
+    /// For so many samples of a pixel.
+    pub(super) fn new(samples: u32, seed: u64) -> Self {
+        Self {
+            bits: samples.max(1).next_power_of_two().trailing_zeros(),
+            seed,
+        }
+    }
+
+    /// The numbers of a sample of a pixel.
+    pub(super) fn sample(&self, [x, y]: [u32; 2], sample: u32) -> Numbers {
+        // Along a curve that keeps neighbours together.
+        let along = spread(x) | spread(y) << 1;
+        Numbers {
+            first: along << self.bits,
+            sample,
+        }
+    }
+
+    /// The point of the unit square that a sample uses.
+    pub(super) fn point(&self, numbers: Numbers, used: Use) -> Vec2 {
+        let mut random = Random::new(self.seed, used as u64);
+        let index = numbers.first.wrapping_add(numbers.sample);
+        let order = shuffled(index, random.next_u32());
+        sobol_2d(order, [random.next_u32(), random.next_u32()])
+    }
+
+    /// Of so many shadow rays: the sequence of their pixel, and which of it they are.
+    pub(super) fn shadow(&self, numbers: Numbers, count: u32) -> (Range<u32>, Shuffle) {
+        let start = numbers.sample;
+        let of_pixel = Numbers {
+            sample: 0,
+            ..numbers
+        };
+        let shuffle = Shuffle {
+            shift: self.point(of_pixel, Use::Part),
+            scramble: 0,
+            offset: self.point(of_pixel, Use::Light).x,
+        };
+        (start..start.saturating_add(count), shuffle)
+    }
+}
+
+/// Which of the numbers belong to a sample.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Numbers {
+    /// The first one of its pixel.
+    first: u32,
+    sample: u32,
+}
+
+impl Numbers {
+    /// Those of a later sample of the pixel.
+    pub(super) fn after(self, count: u32) -> Self {
+        Self {
+            sample: self.sample.wrapping_add(count),
+            ..self
+        }
+    }
+}
+
+/// The lower 16 bits, each followed by a 0.
+fn spread(x: u32) -> u32 {
+    [
+        (8, 0x00ff_00ff),
+        (4, 0x0f0f_0f0f),
+        (2, 0x3333_3333),
+        (1, 0x5555_5555),
+    ]
+    .into_iter()
+    .fold(x & 0xffff, |x, (shift, mask)| (x | x << shift) & mask)
+}

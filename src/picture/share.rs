@@ -1,0 +1,256 @@
+//! Records of neighbouring pixels shared, so that few rays from each make a smooth picture.
+//!
+//! What direct and indirect light are more than the light stored at vertices is averaged over pixels whose surfaces are near
+//! and turned alike, as far as light changes slowly between them: indirect light over the lengths of its rays (Ward, Rubinstein
+//! and Clear, "A Ray Tracing Solution for Diffuse Interreflection", 1988), direct light over the width of its penumbrae
+//! (Mehta, Wang and Ramamoorthi, "Axis-Aligned Filtering for Interactive Sampled Soft Shadows", 2012).
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::record::{INDIRECT, KINDS, Record};
+use crate::solver::Cancel;
+
+/// Rounds of averages over 5 × 5 pixels, each twice as far apart as in the round before. Fewer leave noise; more change
+/// nothing.
+const ROUNDS: u32 = 5;
+
+/// Part of the distance over which direct light changes by most of itself, from which a record does not count. Larger blurs
+/// penumbrae; smaller leaves noise in them.
+const DIRECT_REACH: f32 = 0.1;
+
+/// The same for what indirect light is more than stored, of the lengths of its rays. Larger smooths contacts away; smaller
+/// leaves noise.
+const INDIRECT_REACH: f32 = 0.3;
+
+/// Angle of normals, in radians, from which records do not count for each other. Larger rounds edges off; smaller leaves
+/// noise on curved surfaces.
+const LARGEST_TURN: f32 = 0.4;
+
+/// Pixels over which records are shared however near their rays went. Fewer leave noise in corners; more smooth them away.
+const LEAST_PIXELS: f32 = 2.0;
+
+/// Rows on each side from which a pixel may share.
+pub(super) const SHARED_ROWS: u32 = 2 * ((1 << ROUNDS) - 1);
+
+/// The records of some rows of a picture, row by row; `None` where there is no surface.
+pub(super) struct Records {
+    pub(super) list: Vec<Option<Record>>,
+    pub(super) width: usize,
+    /// The first row.
+    pub(super) top: u32,
+}
+
+/// The mean of records about a pixel, and its variance.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shared {
+    mean: Vec3,
+    variance: f32,
+}
+
+/// Light shared between pixels.
+pub(super) struct SharedLight<'a> {
+    records: &'a Records,
+    list: Vec<Option<[Shared; KINDS]>>,
+}
+
+/// The part of the distance over which light of a kind changes, within which it is shared.
+fn reach(kind: usize) -> f32 {
+    match kind {
+        INDIRECT => INDIRECT_REACH,
+        _ => DIRECT_REACH,
+    }
+}
+
+impl Record {
+    /// How much another one counts here by its place, 0…1.
+    fn weights(&self, other: &Self) -> [f32; KINDS] {
+        let apart = other.position - self.position;
+        let fit = self.fit(apart, other.normal);
+        if fit <= 0.0 {
+            return [0.0; KINDS];
+        }
+        let apart = apart.length();
+        std::array::from_fn(|kind| {
+            let changes = self.changes[kind].max(other.changes[kind]);
+            (fit - apart * changes / reach(kind)).max(0.0)
+        })
+    }
+
+    /// How well a place so far away belongs to the same surface, 0…1.
+    fn fit(&self, apart: Vec3, normal: Vec3) -> f32 {
+        let height = apart.dot(self.normal).abs() / (LEAST_PIXELS * self.spacing);
+        // The cosine of a small angle is one less half of its square.
+        let turn = (2.0 - 2.0 * self.normal.dot(normal)).max(0.0).sqrt();
+        (1.0 - turn / LARGEST_TURN).max(0.0) * (1.0 - height).max(0.0)
+    }
+}
+
+impl Records {
+    /// Replace how fast the light of each record changes by the mean about it, since that of a few rays is noise, and bound
+    /// it for indirect light so that some pixels share always.
+    pub(super) fn smooth_changes(&mut self) {
+        let smoothed = |at: usize| -> Option<[f32; KINDS]> {
+            let own = self.list[at].as_ref()?;
+            let (mut sums, mut weights) = ([0.0; KINDS], [0.0; KINDS]);
+            for (other, bell) in self.around(at, 1) {
+                let Some(other) = self.list[other].as_ref() else {
+                    continue;
+                };
+                let weight = bell * own.fit(other.position - own.position, other.normal);
+                for kind in 0..KINDS {
+                    // Where nothing is blocked it is not known.
+                    if other.changes[kind] > 0.0 {
+                        sums[kind] += other.changes[kind] * weight;
+                        weights[kind] += weight;
+                    }
+                }
+            }
+            let mut changes: [f32; KINDS] = std::array::from_fn(|kind| match weights[kind] {
+                0.0 => 0.0,
+                weights => sums[kind] / weights,
+            });
+            changes[INDIRECT] =
+                changes[INDIRECT].min(INDIRECT_REACH / (LEAST_PIXELS * own.spacing));
+            Some(changes)
+        };
+        let all: Vec<Option<[f32; KINDS]>> =
+            (0..self.list.len()).into_par_iter().map(smoothed).collect();
+        for (record, changes) in self.list.iter_mut().zip(all) {
+            if let (Some(record), Some(changes)) = (record, changes) {
+                record.changes = changes;
+            }
+        }
+    }
+
+    /// Mean luminance of the irradiance stored.
+    pub(super) fn mean_stored(&self) -> f32 {
+        let stored = self.list.iter().flatten().map(|record| record.stored);
+        let (sum, count) = stored.fold((0.0, 0.0), |(sum, count), light| {
+            (sum + f64::from(light), count + 1.0)
+        });
+        if count > 0.0 {
+            (sum / count) as f32
+        } else {
+            0.0
+        }
+    }
+
+    /// Means over records, as far as they count; `None` when cancelled.
+    pub(super) fn shared(&self, cancel: &Cancel) -> Option<SharedLight<'_>> {
+        // The variance of a few rays is noise, too.
+        let own = |at: usize| -> Option<[Shared; KINDS]> {
+            let own = self.list[at].as_ref()?;
+            let (mut sums, mut weights) = ([0.0; KINDS], [f32::MIN_POSITIVE; KINDS]);
+            for (other, bell) in self.around(at, 1) {
+                let Some(other) = &self.list[other] else {
+                    continue;
+                };
+                let near = own.weights(other);
+                for kind in 0..KINDS {
+                    weights[kind] += bell * near[kind];
+                    sums[kind] += bell * near[kind] * other.light[kind].variance();
+                }
+            }
+            Some(std::array::from_fn(|kind| Shared {
+                mean: own.light[kind].mean,
+                variance: sums[kind] / weights[kind] / own.light[kind].count.max(1.0),
+            }))
+        };
+        let mut list: Vec<Option<[Shared; KINDS]>> =
+            (0..self.list.len()).into_par_iter().map(own).collect();
+        for round in 0..ROUNDS {
+            cancel.proceed()?;
+            let mean = |at: usize| self.mean(&list, at, 1 << round);
+            list = (0..self.list.len()).into_par_iter().map(mean).collect();
+        }
+        cancel.proceed()?;
+        Some(SharedLight {
+            records: self,
+            list,
+        })
+    }
+
+    /// The mean about a pixel over pixels so far apart.
+    fn mean(
+        &self,
+        list: &[Option<[Shared; KINDS]>],
+        at: usize,
+        step: usize,
+    ) -> Option<[Shared; KINDS]> {
+        let (record, own) = (self.list[at].as_ref()?, list[at]?);
+        let mut sums = [(Vec3::ZERO, 0.0, 0.0); KINDS];
+        for (other, bell) in self.around(at, step) {
+            let (Some(place), Some(others)) = (&self.list[other], &list[other]) else {
+                continue;
+            };
+            let near = record.weights(place);
+            for kind in 0..KINDS {
+                let (mean, weights, variance) = &mut sums[kind];
+                let weight = bell * near[kind];
+                *mean += others[kind].mean * weight;
+                *weights += weight;
+                *variance += others[kind].variance * weight * weight;
+            }
+        }
+        Some(std::array::from_fn(|kind| match sums[kind] {
+            (_, 0.0, _) => own[kind],
+            (mean, weights, variance) => Shared {
+                mean: mean / weights,
+                variance: variance / (weights * weights),
+            },
+        }))
+    }
+
+    /// The pixels about one, `step` apart, with weights of a bell.
+    fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, f32)> + use<> {
+        const BELL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
+        let (row, column) = ((at / self.width) as isize, (at % self.width) as isize);
+        let height = (self.list.len() / self.width) as isize;
+        let (width, step) = (self.width as isize, step as isize);
+        (0..25).filter_map(move |index| {
+            let (down, across) = (index / 5, index % 5);
+            let (row, column) = (row + (down - 2) * step, column + (across - 2) * step);
+            let is_inside = (0..height).contains(&row) && (0..width).contains(&column);
+            let weight = BELL[down as usize] * BELL[across as usize];
+            is_inside.then_some(((row * width + column) as usize, weight))
+        })
+    }
+}
+
+impl SharedLight<'_> {
+    /// Standard error at a pixel, relative to the irradiance there and a floor.
+    pub(super) fn relative_error(&self, at: usize, floor: f32) -> f32 {
+        let (Some(record), Some(shared)) = (&self.records.list[at], &self.list[at]) else {
+            return 0.0;
+        };
+        let light = record.stored + floor;
+        let variance: f32 = shared.iter().map(|shared| shared.variance).sum();
+        variance.sqrt() / light.max(f32::MIN_POSITIVE)
+    }
+
+    /// What irradiance is more than the indirect light stored at a place that is seen at a place of the picture in pixels, W/m²; `None` where no record is near.
+    pub(super) fn at(&self, seen: Vec2, position: Vec3, normal: Vec3) -> Option<Vec3> {
+        /// Of records beyond the four that are nearest, so that they count where those do not.
+        const FAR: f32 = 1e-3;
+        let records = self.records;
+        let height = records.list.len() / records.width;
+        let centre = seen - 0.5 - Vec2::new(0.0, records.top as f32);
+        let first = (centre.round() - 1.0).max(Vec2::ZERO).as_usizevec2();
+        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        for row in first.y..(first.y + 3).min(height) {
+            for column in first.x..(first.x + 3).min(records.width) {
+                let at = row * records.width + column;
+                let (Some(record), Some(shared)) = (&records.list[at], &self.list[at]) else {
+                    continue;
+                };
+                let apart = (centre - Vec2::new(column as f32, row as f32)).abs();
+                let tent = (1.0 - apart).max(Vec2::splat(FAR));
+                let weight = tent.x * tent.y * record.fit(position - record.position, normal);
+                sum += record.excess_of(shared.map(|shared| shared.mean)) * weight;
+                weights += weight;
+            }
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+}

@@ -1,0 +1,138 @@
+//! What rays of the picture meet: points of surfaces with their colours and the light stored about them.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::Vec3;
+
+use crate::{
+    geometry::{Hit, RayTree, barycentric},
+    metrics::{MeshLookup, MeshPlace, SidePoint},
+    scene::{Scene, TriangleId},
+    solver::{DirectLights, DisplayMesh, LitPoint, VertexLight},
+};
+
+/// A scene with light at the vertices of its mesh.
+pub(super) struct LitScene<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) rays: &'a RayTree,
+    pub(super) mesh: &'a DisplayMesh,
+    pub(super) light: &'a VertexLight,
+    /// Direct light at any point.
+    pub(super) lights: Option<&'a dyn DirectLights>,
+    pub(super) lookup: MeshLookup<'a>,
+}
+
+/// A point of a surface, seen from its lit side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface {
+    pub(super) triangle: TriangleId,
+    pub(super) position: Vec3,
+    /// Where its rays start: on the smooth surface that the normals describe, not below it.
+    pub(super) start: Vec3,
+    /// Unit normal of the triangle, towards the viewer.
+    pub(super) flat_normal: Vec3,
+    /// Unit normal of the smooth surface, likewise.
+    pub(super) normal: Vec3,
+    pub(super) reflectance: Vec3,
+    pub(super) emission: Vec3,
+    /// Its place among the vertices; `None` where the mesh has none.
+    pub(super) place: Option<MeshPlace>,
+}
+
+impl LitScene<'_> {
+    /// The unit normal of a triangle, towards the side that a ray comes from, and whether that is the back.
+    pub(super) fn side(&self, triangle: TriangleId, direction: Vec3) -> (Vec3, bool) {
+        let area = self.scene.surfaces[triangle.index()].area_vector;
+        let normal = area.normalize_or(-direction);
+        let is_back = normal.dot(direction) > 0.0;
+        (if is_back { -normal } else { normal }, is_back)
+    }
+
+    /// Whether a side of a triangle reflects and emits.
+    pub(super) fn is_lit(&self, triangle: TriangleId, is_back: bool) -> bool {
+        !is_back || self.scene.triangles[triangle.index()].two_sided
+    }
+
+    /// The surface that a ray meets; `None` at the back of a one-sided one.
+    pub(super) fn surface(&self, origin: Vec3, direction: Vec3, hit: Hit) -> Option<Surface> {
+        let triangle = hit.triangle;
+        let (flat_normal, is_back) = self.side(triangle, direction);
+        if !self.is_lit(triangle, is_back) {
+            return None;
+        }
+        let position = origin + direction * hit.distance;
+        let at = barycentric(position, self.scene.corners(triangle));
+        let material = self.scene.triangles[triangle.index()].material;
+        let own = self.scene.material(triangle);
+        let (reflectance, emission) = match self.mesh.appearances.get(material.index()) {
+            Some(appearance) => (appearance.reflectance, appearance.emission),
+            None => (own.reflectance, own.emission),
+        };
+        let place = self.lookup.place(&SidePoint {
+            triangle,
+            is_back,
+            barycentric: at,
+            position,
+        });
+        let (normal, start) = match place {
+            Some(place) => self.smooth(position, flat_normal, &place),
+            None => (flat_normal, position),
+        };
+        Some(Surface {
+            triangle,
+            position,
+            start,
+            flat_normal,
+            normal,
+            reflectance: self.scene.reflected_at(triangle, reflectance, at),
+            emission: self.scene.emitted_at(triangle, emission, at),
+            place,
+        })
+    }
+
+    /// The normal of the smooth surface, and the place on it: the point's projections onto the tangent planes of the
+    /// vertices, interpolated where they lie outside (Hanika, "Hacking the Shadow Terminator", 2021).
+    fn smooth(&self, position: Vec3, flat: Vec3, place: &MeshPlace) -> (Vec3, Vec3) {
+        let normals = &self.mesh.normals;
+        let corners = place.vertices.map(|vertex| vertex as usize);
+        let is_flat = |corner: usize| normals[corner].dot(flat) > 1.0 - 1e-6;
+        if corners.into_iter().all(is_flat) {
+            return (flat, position);
+        }
+        let normal = place.interpolate(normals).normalize_or(flat);
+        let mut outward = Vec3::ZERO;
+        for (corner, weight) in corners.into_iter().zip(place.weights.to_array()) {
+            let normal = normals[corner];
+            let height = (position - self.mesh.positions[corner]).dot(normal);
+            outward -= normal * (height.min(0.0) * weight);
+        }
+        (normal, position + outward)
+    }
+
+    /// Total and direct irradiance stored at a surface, W/m².
+    pub(super) fn stored(&self, surface: &Surface) -> [Vec3; 2] {
+        surface.place.map_or([Vec3::ZERO; 2], |place| {
+            [&self.light.irradiance, &self.light.direct].map(|values| place.interpolate(values))
+        })
+    }
+
+    /// Radiance that a surface sends to other surfaces beside what is direct light there.
+    pub(super) fn sent(&self, surface: &Surface) -> Vec3 {
+        let [irradiance, _] = self.stored(surface);
+        let emits = self.lights.is_none_or(|lights| !lights.has_emitters());
+        let emission = if emits { surface.emission } else { Vec3::ZERO };
+        emission + surface.reflectance * irradiance * FRAC_1_PI
+    }
+}
+
+impl Surface {
+    /// The point as direct light sees it.
+    pub(super) fn lit_point(&self, visible: Vec3) -> LitPoint {
+        LitPoint {
+            position: self.start,
+            normal: self.normal,
+            triangle: self.triangle,
+            visible,
+        }
+    }
+}

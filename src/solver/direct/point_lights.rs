@@ -1,0 +1,140 @@
+//! Direct light at points apart from the mesh, shared with pictures.
+
+use std::{
+    fmt::{self, Debug},
+    ops::Range,
+    sync::Arc,
+};
+
+use glam::{Vec3, Vec4};
+
+use super::{
+    fields::DirectFields,
+    lights::{Lights, Shot},
+    samples::DirectLight,
+};
+use crate::{
+    geometry::{RayTree, Shuffle},
+    hierarchy::Channels as _,
+    solver::{
+        output::{Arrived, DirectLights, LIGHT_KINDS, LightSampler, LitPoint},
+        places::Receiver,
+    },
+};
+
+/// The lights of a solve.
+struct PointLights {
+    lights: Vec<Arc<Lights>>,
+    rays: Arc<RayTree>,
+}
+
+impl DirectFields {
+    /// The light of all fields as it is now, with what shadows it.
+    pub(crate) fn shared(&self, rays: &Arc<RayTree>) -> Arc<dyn DirectLights> {
+        let lights = self.lights().cloned().collect();
+        let rays = rays.clone();
+        Arc::new(PointLights { lights, rays })
+    }
+}
+
+impl Debug for PointLights {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lights = &self.lights;
+        formatter
+            .debug_struct("PointLights")
+            .field("lights", lights)
+            .finish_non_exhaustive()
+    }
+}
+
+impl DirectLights for PointLights {
+    fn sampler(&self) -> Box<dyn LightSampler + '_> {
+        let shots = self
+            .lights
+            .iter()
+            .map(|lights| (&**lights, Shot::default()));
+        Box::new(Sampler {
+            rays: &self.rays,
+            parts: shots
+                .map(|(lights, shot)| Part {
+                    lights,
+                    shot,
+                    exact: Vec4::ZERO,
+                    normal: None,
+                })
+                .collect(),
+        })
+    }
+
+    fn has_emitters(&self) -> bool {
+        self.lights.iter().any(|lights| !lights.is_outside())
+    }
+}
+
+/// See [`LightSampler`].
+struct Sampler<'a> {
+    rays: &'a RayTree,
+    parts: Vec<Part<'a>>,
+}
+
+/// One kind of light, at the present point.
+struct Part<'a> {
+    lights: &'a Lights,
+    shot: Shot,
+    /// Unoccluded irradiance, and the normal that it is for.
+    exact: Vec4,
+    normal: Option<Vec3>,
+}
+
+impl LightSampler for Sampler<'_> {
+    fn unoccluded(&mut self, point: &LitPoint) -> Vec3 {
+        let receiver = receiver(point);
+        let mut sum = Vec3::ZERO;
+        for part in &mut self.parts {
+            // Light from outside depends on the normal alone.
+            let is_known = part.lights.is_outside() && part.normal == Some(point.normal);
+            if !is_known {
+                part.exact = part.lights.unoccluded(&receiver, None, &mut part.shot.cut);
+                part.normal = Some(point.normal);
+            }
+            sum += part.exact.color();
+        }
+        sum
+    }
+
+    fn arriving(
+        &mut self,
+        point: &LitPoint,
+        samples: Range<u32>,
+        shuffle: Shuffle,
+    ) -> [Arrived; LIGHT_KINDS] {
+        let receiver = receiver(point);
+        let mut all = [Arrived::default(); LIGHT_KINDS];
+        if self.rays.is_clear() {
+            return all;
+        }
+        let known = point.visible.extend(1.0);
+        for (arrived, part) in all.iter_mut().zip(&mut self.parts) {
+            let mut light = DirectLight::expected(part.exact);
+            let (shot, rays) = (&mut part.shot, samples.clone());
+            part.lights
+                .shoot_at(self.rays, &receiver, rays, shuffle, shot, &mut light);
+            let irradiance = light.irradiance_near(known, samples.len() as u32);
+            let blocked = &shot.blocked;
+            *arrived = Arrived {
+                missing: (part.exact - irradiance).color(),
+                variance: light.error().powi(2),
+                sharpness: blocked.sharpness / blocked.count.max(1) as f32,
+            };
+        }
+        all
+    }
+}
+
+fn receiver(point: &LitPoint) -> Receiver {
+    Receiver {
+        point: point.position,
+        normal: point.normal,
+        triangle: point.triangle,
+    }
+}
