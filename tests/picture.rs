@@ -23,8 +23,8 @@ const SIZE: [u32; 2] = [64, 48];
 
 /// A lens at a point that looks at another, with a width of the picture at the distance 1.
 fn lens(eye: Vec3, target: Vec3, width: f32) -> Lens {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(Vec3::Y).normalize();
+    let forward = (target - eye).normalize_or_zero();
+    let right = forward.cross(Vec3::Y).normalize_or_zero();
     Lens {
         origin: eye,
         forward,
@@ -106,7 +106,7 @@ fn sundial(diameter_degrees: f32) -> Arc<Scene> {
     Arc::new(scene.in_environment(Environment {
         sky: Sky::Dark,
         sun: Some(Sun {
-            direction: Vec3::new(1.0, 1.0, 0.0).normalize(),
+            direction: Vec3::new(1.0, 1.0, 0.0).normalize_or_zero(),
             irradiance: Vec3::splat(2.0),
             diameter: diameter_degrees.to_radians(),
         }),
@@ -268,9 +268,12 @@ fn pictures_agree_with_path_tracing() {
                 2.0 * (x as f32 + 0.5) / SIZE[0] as f32 - 1.0,
                 1.0 - 2.0 * (y as f32 + 0.5) / SIZE[1] as f32,
             );
-            let direction = (lens.forward + lens.right * place.x + lens.up * place.y).normalize();
+            let direction =
+                (lens.forward + lens.right * place.x + lens.up * place.y).normalize_or_zero();
             let hit = rays.closest(eye, direction, None)?;
-            let normal = scene.surfaces[hit.triangle.index()].area_vector.normalize();
+            let normal = scene.surfaces[hit.triangle.index()]
+                .area_vector
+                .normalize_or_zero();
             (normal.dot(direction) < 0.0).then_some((hit, eye + direction * hit.distance, normal))
         };
         let [x, y] = at;

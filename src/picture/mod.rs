@@ -77,6 +77,10 @@ const RAYS: u32 = 4;
 /// Most rays of a record. Fewer leave noise in corners; more take time there.
 const MOST_RAYS: u32 = 64;
 
+/// Standard error of the light at a pixel, relative to itself and a part of that of the picture, above which it gets more
+/// rays. Smaller takes time; larger leaves grain.
+const RECORD_NOISE: f32 = 0.02;
+
 /// Rays of a sample that no record is near. Fewer are noisy; more take time among leaves.
 const OWN_RAYS: u32 = 4;
 
@@ -208,7 +212,7 @@ impl<'a> Pass<'a> {
         let floor = OF_MEAN * records.mean_stored();
         let shared = records.shared(self.cancel)?;
         let more = |tools: &mut Tools<'a>, at: usize| {
-            let noise = shared.relative_error(at, floor) / NOISE;
+            let noise = shared.relative_error(at, floor) / RECORD_NOISE;
             let wanted = ((RAYS as f32 * noise * noise) as u32).min(MOST_RAYS);
             let more = wanted.checked_sub(RAYS).filter(|&more| more > 0)?;
             let at = [(at % width) as u32, records.top + (at / width) as u32];

@@ -1,6 +1,8 @@
 //! Light by rays from the surface of a pixel.
 
-use glam::{Vec2, Vec3};
+use std::f32::consts::PI;
+
+use glam::Vec3;
 
 use super::{
     sampler::{Numbers, Sampler, Use},
@@ -126,8 +128,7 @@ impl<'a> Recorder<'a> {
             }
         }
         let stored = (all - direct).max(Vec3::ZERO);
-        let square = |ray| sampler.point(numbers.after(ray), Use::Hemisphere);
-        let (indirect, nearness) = self.indirect(surface, stored, count, square);
+        let (indirect, nearness) = self.indirect(surface, stored, sampler, numbers, count);
         record.light[INDIRECT] = indirect;
         record.changes[INDIRECT] = nearness;
         record
@@ -135,33 +136,69 @@ impl<'a> Recorder<'a> {
 
     /// What indirect light is more than stored, and the inverse of the harmonic mean of the lengths of the rays.
     fn indirect(
-        &self,
+        &mut self,
         surface: &Surface,
         stored: Vec3,
+        sampler: &Sampler,
+        numbers: Numbers,
         count: u32,
-        square: impl Fn(u32) -> Vec2,
     ) -> (Estimate, f32) {
         let (mut light, mut nearness) = (Estimate::default(), 0.0);
-        for ray in 0..count {
-            let direction = cosine_direction(surface.normal, square(ray));
+        for numbers in (0..count).map(|ray| numbers.after(ray)) {
+            let square = sampler.point(numbers, Use::Hemisphere);
+            let direction = cosine_direction(surface.normal, square);
             if direction.dot(surface.flat_normal) <= 0.0 {
                 // Below the surface: as if it met what the others meet.
                 continue;
             }
-            let (start, from) = (surface.start, Some(surface.triangle));
-            let hit = self.lit.rays.closest(start, direction, from);
-            let met = hit.and_then(|hit| {
-                nearness += 1.0 / hit.distance.max(f32::MIN_POSITIVE);
-                self.lit.surface(start, direction, hit)
+            let (met, tint, distance) = self.meet(surface, direction);
+            nearness += 1.0 / distance.max(f32::MIN_POSITIVE);
+            let arriving = met.map_or(Vec3::ZERO, |met| {
+                let irradiance = match distance < self.lit.element_size(&met) {
+                    true => self.irradiance(&met, sampler, numbers),
+                    false => self.lit.stored(&met)[0],
+                };
+                tint * self.lit.sent(&met, irradiance)
             });
-            let sent = met.map_or(Vec3::ZERO, |met| {
-                self.lit.rays.tint(start, direction, from, hit)
-                    * self.lit.sent(&met)
-                    * std::f32::consts::PI
-            });
-            light.add(sent - stored);
+            light.add(arriving * PI - stored);
         }
         (light, nearness / count.max(1) as f32)
+    }
+
+    /// The surface that a ray from another one meets, the tint of its light, and its distance.
+    fn meet(&self, from: &Surface, direction: Vec3) -> (Option<Surface>, Vec3, f32) {
+        let (rays, start, own) = (self.lit.rays, from.start, Some(from.triangle));
+        match rays.closest(start, direction, own) {
+            None => (None, Vec3::ONE, f32::INFINITY),
+            Some(hit) => {
+                let met = self.lit.surface(start, direction, hit);
+                let tint = rays.tint(start, direction, own, Some(hit));
+                (met, tint, hit.distance)
+            }
+        }
+    }
+
+    /// Irradiance at a surface by a ray to each kind of light and one over the hemisphere.
+    fn irradiance(&mut self, surface: &Surface, sampler: &Sampler, numbers: Numbers) -> Vec3 {
+        let [all, stored] = self.lit.stored(surface);
+        let direct = match &mut self.direct {
+            None => stored,
+            Some(lights) => {
+                let mut point = surface.lit_point(Vec3::ZERO);
+                let unoccluded = lights.unoccluded(&point);
+                point.visible = visible(stored, unoccluded);
+                let (rays, shuffle) = sampler.shadow(numbers, 1);
+                let arrived = lights.arriving(&point, rays, shuffle);
+                unoccluded - arrived.iter().map(|arrived| arrived.missing).sum::<Vec3>()
+            }
+        };
+        let direction = cosine_direction(surface.normal, sampler.point(numbers, Use::Further));
+        let indirect = match self.meet(surface, direction) {
+            _ if direction.dot(surface.flat_normal) <= 0.0 => (all - stored).max(Vec3::ZERO),
+            (None, ..) => Vec3::ZERO,
+            (Some(met), tint, _) => tint * self.lit.sent(&met, self.lit.stored(&met)[0]) * PI,
+        };
+        direct + indirect
     }
 }
 

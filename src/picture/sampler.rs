@@ -15,6 +15,8 @@ pub(super) enum Use {
     Place,
     /// Direction over the hemisphere.
     Hemisphere,
+    /// The same from where the first one ends.
+    Further,
     /// Which light, and which part of it.
     Light,
     Part,

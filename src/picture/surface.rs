@@ -116,9 +116,16 @@ impl LitScene<'_> {
         })
     }
 
-    /// Radiance that a surface sends to other surfaces beside what is direct light there.
-    pub(super) fn sent(&self, surface: &Surface) -> Vec3 {
-        let [irradiance, _] = self.stored(surface);
+    /// The size of the element about a surface, frame units: nearer than that its interpolated light tells little.
+    pub(super) fn element_size(&self, surface: &Surface) -> f32 {
+        surface.place.map_or(0.0, |place| {
+            let [a, b, c] = place.vertices.map(|at| self.mesh.positions[at as usize]);
+            a.distance(b).max(b.distance(c)).max(c.distance(a))
+        })
+    }
+
+    /// Radiance that a surface of this irradiance sends to other surfaces beside what is direct light there.
+    pub(super) fn sent(&self, surface: &Surface, irradiance: Vec3) -> Vec3 {
         let emits = self.lights.is_none_or(|lights| !lights.has_emitters());
         let emission = if emits { surface.emission } else { Vec3::ZERO };
         emission + surface.reflectance * irradiance * FRAC_1_PI
