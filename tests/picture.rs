@@ -255,7 +255,8 @@ fn pictures_agree_with_path_tracing() {
     let eye = scene.frame.from_world(DVec3::new(278.0, 273.0, -800.0));
     let target = scene.frame.from_world(DVec3::new(180.0, 120.0, 280.0));
     let lens = lens(eye, target, 0.5);
-    let picture = picture(&scene, &draft(&scene), &lens, 16);
+    let snapshot = solve(&scene, SolveSettings::normal()).0.snapshot();
+    let picture = picture(&scene, &snapshot, &lens, 16);
     // What the middles of pixels show, each as far from its edges as its neighbours.
     let mut points = Vec::new();
     let mut shown = Vec::new();

@@ -250,6 +250,29 @@ mod tests {
     }
 
     #[test]
+    fn each_rectangle_has_one_of_as_many_points() {
+        const COUNT: u32 = 64;
+        for (scramble, order) in [([0, 0], 0), ([7, 0xdead_beef], 9)] {
+            for block in [0, 1, 1000] {
+                let points: Vec<Vec2> = (0..COUNT)
+                    .map(|index| sobol_2d(shuffled(block * COUNT + index, order), scramble))
+                    .collect();
+                for columns in [1, 2, 4, 8, 16, 32, 64] {
+                    let rows = COUNT / columns;
+                    let cell = |point: &Vec2| {
+                        let [column, row] =
+                            [point.x * columns as f32, point.y * rows as f32].map(|at| at as u32);
+                        row * columns + column
+                    };
+                    let mut cells: Vec<u32> = points.iter().map(cell).collect();
+                    cells.sort_unstable();
+                    assert!(cells.into_iter().eq(0..COUNT), "{columns} columns");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn random_numbers_are_uniform() {
         let mut random = Random::new(1, 2);
         let mut bins = [0_u32; 16];

@@ -75,14 +75,11 @@ const FIRST_SAMPLES: u32 = 4;
 const RAYS: u32 = 4;
 
 /// Most rays of a record. Fewer leave noise in corners; more take time there.
-const MOST_RAYS: u32 = 64;
+const MOST_RAYS: u32 = 128;
 
 /// Standard error of the light at a pixel, relative to itself and a part of that of the picture, above which it gets more
 /// rays. Smaller takes time; larger leaves grain.
-const RECORD_NOISE: f32 = 0.02;
-
-/// Rays of a sample that no record is near. Fewer are noisy; more take time among leaves.
-const OWN_RAYS: u32 = 4;
+const RECORD_NOISE: f32 = 0.01;
 
 /// By how much the number of samples grows from round to round where pixels are noisy.
 const GROWTH: u32 = 4;
@@ -191,7 +188,7 @@ impl<'a> Pass<'a> {
             |tools, (records, row)| {
                 for (column, record) in records.iter_mut().enumerate() {
                     let at = [column as u32, row];
-                    *record = self.record(tools, at, &sampler, RAYS);
+                    *record = self.record(tools, at, &sampler, [RAYS; 2]);
                 }
             },
         );
@@ -212,9 +209,14 @@ impl<'a> Pass<'a> {
         let floor = OF_MEAN * records.mean_stored();
         let shared = records.shared(self.cancel)?;
         let more = |tools: &mut Tools<'a>, at: usize| {
-            let noise = shared.relative_error(at, floor) / RECORD_NOISE;
-            let wanted = ((RAYS as f32 * noise * noise) as u32).min(MOST_RAYS);
-            let more = wanted.checked_sub(RAYS).filter(|&more| more > 0)?;
+            let more = shared.relative_errors(at, floor).map(|error| {
+                let noise = error / RECORD_NOISE;
+                let wanted = (RAYS as f32 * noise * noise) as u32;
+                wanted.min(MOST_RAYS).saturating_sub(RAYS)
+            });
+            if more == [0; 2] {
+                return None;
+            }
             let at = [(at % width) as u32, records.top + (at / width) as u32];
             self.record(tools, at, &sampler, more)
         };
@@ -233,13 +235,14 @@ impl<'a> Pass<'a> {
         Some(())
     }
 
-    /// The record of a pixel, of what is seen through its middle, by so many rays.
+    /// The record of a pixel, of what is seen through its middle, by so many rays to each kind of light and over the
+    /// hemisphere.
     fn record(
         &self,
         tools: &mut Tools<'a>,
         at: [u32; 2],
         sampler: &Sampler,
-        count: u32,
+        counts: [u32; 2],
     ) -> Option<Record> {
         self.cancel.proceed()?;
         let (origin, direction) = self.ray(at, Vec2::splat(0.5));
@@ -248,7 +251,7 @@ impl<'a> Pass<'a> {
         let surface = sight.main_surface()?;
         let spacing = self.lens.spacing(surface.position, self.exposure.size[1]);
         let numbers = sampler.sample(at, 0);
-        Some(recorder.record(surface, spacing, sampler, numbers, count))
+        Some(recorder.record(surface, spacing, sampler, numbers, counts))
     }
 
     /// Add samples to those of some rows of pixels that want them.
@@ -262,13 +265,11 @@ impl<'a> Pass<'a> {
     ) -> Option<()> {
         let width = self.exposure.size[0] as usize;
         let sampler = Sampler::new(samples.end, self.exposure.seed);
-        let own = Sampler::new(samples.end * OWN_RAYS, self.exposure.seed);
         let rows = pixels
             .par_chunks_mut(width)
             .zip(is_wanted.par_chunks(width));
-        rows.enumerate().for_each_init(
-            || self.tools(),
-            |Tools { sight, recorder }, (row, (pixels, is_wanted))| {
+        rows.enumerate()
+            .for_each_init(Sight::default, |sight, (row, (pixels, is_wanted))| {
                 let wanted = pixels.iter_mut().zip(is_wanted).enumerate();
                 for (column, (pixel, _)) in wanted.filter(|(_, (_, is_wanted))| **is_wanted) {
                     if self.cancel.is_cancelled() {
@@ -286,17 +287,11 @@ impl<'a> Pass<'a> {
                             }
                             let [all, direct] = self.lit.stored(surface);
                             let near = light.at(seen, surface.position, surface.normal);
-                            let more = near.unwrap_or_else(|| {
-                                let numbers = own.sample(at, sample * OWN_RAYS);
-                                let own = recorder.record(surface, 1.0, &own, numbers, OWN_RAYS);
-                                own.excess()
-                            });
-                            (all - direct).max(Vec3::ZERO) + more
+                            near.map_or(all, |more| (all - direct).max(Vec3::ZERO) + more)
                         });
                     }
                 }
-            },
-        );
+            });
         self.cancel.proceed()
     }
 

@@ -97,14 +97,14 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// So many rays over the hemisphere and to each kind of light; `numbers` are those of the first.
+    /// So many rays to each kind of light and over the hemisphere; `numbers` are those of the first.
     pub(super) fn record(
         &mut self,
         surface: &Surface,
         spacing: f32,
         sampler: &Sampler,
         numbers: Numbers,
-        count: u32,
+        counts: [u32; 2],
     ) -> Record {
         let [all, direct] = self.lit.stored(surface);
         let mut record = Record {
@@ -116,19 +116,22 @@ impl<'a> Recorder<'a> {
             changes: [0.0; KINDS],
             light: [Estimate::default(); KINDS],
         };
-        if let Some(lights) = &mut self.direct {
+        let [to_lights, over_hemisphere] = counts;
+        if let Some(lights) = self.direct.as_mut().filter(|_| to_lights > 0) {
             let mut point = surface.lit_point(Vec3::ZERO);
             record.unoccluded = lights.unoccluded(&point);
             point.visible = visible(direct, record.unoccluded);
-            let (rays, shuffle) = sampler.shadow(numbers, count);
+            let (rays, shuffle) = sampler.shadow(numbers, to_lights);
             let arrived = lights.arriving(&point, rays, shuffle);
             for (kind, arrived) in arrived.into_iter().enumerate() {
-                record.light[kind] = Estimate::of_mean(arrived.missing, arrived.variance, count);
+                record.light[kind] =
+                    Estimate::of_mean(arrived.missing, arrived.variance, to_lights);
                 record.changes[kind] = arrived.sharpness;
             }
         }
         let stored = (all - direct).max(Vec3::ZERO);
-        let (indirect, nearness) = self.indirect(surface, stored, sampler, numbers, count);
+        let (indirect, nearness) =
+            self.indirect(surface, stored, sampler, numbers, over_hemisphere);
         record.light[INDIRECT] = indirect;
         record.changes[INDIRECT] = nearness;
         record
@@ -203,11 +206,6 @@ impl<'a> Recorder<'a> {
 }
 
 impl Record {
-    /// By its own rays what is [`Self::excess_of`].
-    pub(super) fn excess(&self) -> Vec3 {
-        self.excess_of(self.light.map(|light| light.mean))
-    }
-
     /// What the irradiance is more than the indirect light stored there, from the light of each kind.
     pub(super) fn excess_of(&self, light: [Vec3; KINDS]) -> Vec3 {
         let missing: Vec3 = light[..INDIRECT].iter().sum();

@@ -102,3 +102,25 @@ fn spread(x: u32) -> u32 {
     .into_iter()
     .fold(x & 0xffff, |x, (shift, mask)| (x | x << shift) & mask)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_samples_of_a_square_of_pixels_are_spread_together() {
+        let sampler = Sampler::new(4, 5);
+        for corner in [[0, 0], [8, 4], [60, 12]] {
+            let pixels = (0..16).map(|at| [corner[0] + at % 4, corner[1] + at / 4]);
+            let samples = pixels.flat_map(|pixel| (0..4).map(move |sample| (pixel, sample)));
+            let mut cells: Vec<u32> = samples
+                .map(|(pixel, sample)| {
+                    let point = sampler.point(sampler.sample(pixel, sample), Use::Place);
+                    (point.y * 8.0) as u32 * 8 + (point.x * 8.0) as u32
+                })
+                .collect();
+            cells.sort_unstable();
+            assert!(cells.into_iter().eq(0..64));
+        }
+    }
+}

@@ -141,20 +141,20 @@ impl Records {
         // The variance of a few rays is noise, too.
         let own = |at: usize| -> Option<[Shared; KINDS]> {
             let own = self.list[at].as_ref()?;
-            let (mut sums, mut weights) = ([0.0; KINDS], [f32::MIN_POSITIVE; KINDS]);
+            let (mut sums, mut weights) = ([0.0; KINDS], f32::MIN_POSITIVE);
             for (other, bell) in self.around(at, 1) {
                 let Some(other) = &self.list[other] else {
                     continue;
                 };
-                let near = own.weights(other);
-                for kind in 0..KINDS {
-                    weights[kind] += bell * near[kind];
-                    sums[kind] += bell * near[kind] * other.light[kind].variance();
+                let weight = bell * own.fit(other.position - own.position, other.normal);
+                weights += weight;
+                for (sum, light) in sums.iter_mut().zip(&other.light) {
+                    *sum += weight * light.variance();
                 }
             }
             Some(std::array::from_fn(|kind| Shared {
                 mean: own.light[kind].mean,
-                variance: sums[kind] / weights[kind] / own.light[kind].count.max(1.0),
+                variance: sums[kind] / weights / own.light[kind].count.max(1.0),
             }))
         };
         let mut list: Vec<Option<[Shared; KINDS]>> =
@@ -164,6 +164,8 @@ impl Records {
             let mean = |at: usize| self.mean(&list, at, 1 << round);
             list = (0..self.list.len()).into_par_iter().map(mean).collect();
         }
+        let bounded = |at: usize| self.bounded(&list, at);
+        let list = (0..list.len()).into_par_iter().map(bounded).collect();
         cancel.proceed()?;
         Some(SharedLight {
             records: self,
@@ -202,6 +204,29 @@ impl Records {
         }))
     }
 
+    /// The light of a pixel within that of its neighbours on the same surface: where few pixels share, one of the rare rays
+    /// that meet something bright would make a speck.
+    fn bounded(&self, list: &[Option<[Shared; KINDS]>], at: usize) -> Option<[Shared; KINDS]> {
+        let (record, mut own) = (self.list[at].as_ref()?, list[at]?);
+        let mut bounds = [(Vec3::INFINITY, Vec3::NEG_INFINITY); KINDS];
+        for (other, _) in self.around(at, 1).filter(|&(other, _)| other != at) {
+            let (Some(place), Some(others)) = (&self.list[other], &list[other]) else {
+                continue;
+            };
+            if record.fit(place.position - record.position, place.normal) > 0.0 {
+                for ((low, high), other) in bounds.iter_mut().zip(others) {
+                    (*low, *high) = (low.min(other.mean), high.max(other.mean));
+                }
+            }
+        }
+        for (own, (low, high)) in own.iter_mut().zip(bounds) {
+            if low.cmple(high).all() {
+                own.mean = own.mean.clamp(low, high);
+            }
+        }
+        Some(own)
+    }
+
     /// The pixels about one, `step` apart, with weights of a bell.
     fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, f32)> + use<> {
         const BELL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
@@ -219,14 +244,17 @@ impl Records {
 }
 
 impl SharedLight<'_> {
-    /// Standard error at a pixel, relative to the irradiance there and a floor.
-    pub(super) fn relative_error(&self, at: usize, floor: f32) -> f32 {
+    /// Standard errors of direct and indirect light at a pixel, relative to the irradiance there and a floor.
+    pub(super) fn relative_errors(&self, at: usize, floor: f32) -> [f32; 2] {
         let (Some(record), Some(shared)) = (&self.records.list[at], &self.list[at]) else {
-            return 0.0;
+            return [0.0; 2];
         };
-        let light = record.stored + floor;
-        let variance: f32 = shared.iter().map(|shared| shared.variance).sum();
-        variance.sqrt() / light.max(f32::MIN_POSITIVE)
+        let light = (record.stored + floor).max(f32::MIN_POSITIVE);
+        let (direct, indirect) = shared.split_at(INDIRECT);
+        [direct, indirect].map(|shared| {
+            let variance: f32 = shared.iter().map(|shared| shared.variance).sum();
+            variance.sqrt() / light
+        })
     }
 
     /// What irradiance is more than the indirect light stored at a place that is seen at a place of the picture in pixels, W/m²; `None` where no record is near.

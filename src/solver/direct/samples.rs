@@ -329,6 +329,28 @@ mod tests {
     }
 
     #[test]
+    fn few_rays_have_no_bias_whatever_is_believed_visible() {
+        // Half of the light is red and hidden, the other half is green and seen.
+        let exact = Vec4::new(1.0, 2.0, 0.0, 0.0);
+        let power = luminance(exact);
+        let colors = [Vec4::new(1.0, 0.0, 0.0, 0.0), Vec4::new(0.0, 2.0, 0.0, 0.0)];
+        for known in [0.0, 0.4, 1.0] {
+            let mut mean = Vec4::ZERO;
+            for (color, passing) in colors.into_iter().zip([Vec3::ZERO, Vec3::ONE]) {
+                let mut bundle = Bundle {
+                    rays: 1,
+                    ..Bundle::default()
+                };
+                bundle.count(1.0, 1.0, color / luminance(color), passing);
+                let mut light = DirectLight::expected(exact);
+                light.count(&bundle);
+                mean += light.irradiance_near(Vec4::splat(known), 1) * (luminance(color) / power);
+            }
+            assert!(mean.abs_diff_eq(colors[1], 1e-5), "{mean} for {known}");
+        }
+    }
+
+    #[test]
     fn the_noise_of_rays_without_a_pattern_is_that_of_independent_ones() {
         let mut random = Random::new(1, 0);
         for part in [0.1, 0.5, 0.8] {
