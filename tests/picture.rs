@@ -34,16 +34,19 @@ fn lens(eye: Vec3, target: Vec3, width: f32) -> Lens {
     }
 }
 
-fn exposure(samples: u32) -> Exposure {
-    Exposure {
-        size: SIZE,
-        samples,
-        seed: 1,
-    }
-}
-
 /// The picture of a lit scene.
 fn picture(scene: &Scene, snapshot: &Snapshot, lens: &Lens, samples: u32) -> Vec<Developed> {
+    picture_unless(&Cancel::default(), scene, snapshot, lens, samples).unwrap()
+}
+
+/// The same; `None` when cancelled.
+fn picture_unless(
+    cancel: &Cancel,
+    scene: &Scene,
+    snapshot: &Snapshot,
+    lens: &Lens,
+    samples: u32,
+) -> Option<Vec<Developed>> {
     let rays = RayTree::new(scene);
     let subject = Subject {
         scene,
@@ -53,7 +56,12 @@ fn picture(scene: &Scene, snapshot: &Snapshot, lens: &Lens, samples: u32) -> Vec
         shows_backs: false,
         is_unlit: false,
     };
-    trace(&subject, lens, &exposure(samples), &Cancel::default()).unwrap()
+    let exposure = Exposure {
+        size: SIZE,
+        samples,
+        seed: 1,
+    };
+    trace(&subject, lens, &exposure, cancel)
 }
 
 fn draft(scene: &Arc<Scene>) -> Snapshot {
@@ -114,13 +122,18 @@ fn sundial(diameter_degrees: f32) -> Arc<Scene> {
     }))
 }
 
-/// The place on the plane y = 0 of the file that a pixel shows the middle of.
-fn on_floor(scene: &Scene, lens: &Lens, [x, y]: [u32; 2]) -> Vec2 {
+/// The direction through the middle of a pixel.
+fn through(lens: &Lens, [x, y]: [u32; 2]) -> Vec3 {
     let place = Vec2::new(
         2.0 * (x as f32 + 0.5) / SIZE[0] as f32 - 1.0,
         1.0 - 2.0 * (y as f32 + 0.5) / SIZE[1] as f32,
     );
-    let direction = lens.forward + lens.right * place.x + lens.up * place.y;
+    lens.forward + lens.right * place.x + lens.up * place.y
+}
+
+/// The place on the plane y = 0 of the file that a pixel shows the middle of.
+fn on_floor(scene: &Scene, lens: &Lens, at: [u32; 2]) -> Vec2 {
+    let direction = through(lens, at);
     let floor = scene.frame.from_world(DVec3::ZERO);
     let at = lens.origin + direction * ((floor.y - lens.origin.y) / direction.y);
     let at = scene.frame.to_world(at);
@@ -264,13 +277,8 @@ fn pictures_agree_with_path_tracing() {
         .step_by(3)
         .flat_map(|y| (2..SIZE[0] - 2).step_by(3).map(move |x| [x, y]))
     {
-        let hit = |[x, y]: [u32; 2]| {
-            let place = Vec2::new(
-                2.0 * (x as f32 + 0.5) / SIZE[0] as f32 - 1.0,
-                1.0 - 2.0 * (y as f32 + 0.5) / SIZE[1] as f32,
-            );
-            let direction =
-                (lens.forward + lens.right * place.x + lens.up * place.y).normalize_or_zero();
+        let hit = |at: [u32; 2]| {
+            let direction = through(&lens, at).normalize_or_zero();
             let hit = rays.closest(eye, direction, None)?;
             let normal = scene.surfaces[hit.triangle.index()]
                 .area_vector
@@ -330,17 +338,8 @@ fn pictures_are_the_same_on_any_number_of_threads() {
 fn a_cancelled_picture_is_none() {
     let scene = sundial(1.0);
     let snapshot = draft(&scene);
-    let rays = RayTree::new(&scene);
-    let subject = Subject {
-        scene: &scene,
-        rays: &rays,
-        snapshot: &snapshot,
-        hidden: None,
-        shows_backs: false,
-        is_unlit: false,
-    };
     let lens = lens(Vec3::Y * 100.0, Vec3::X, 1.0);
     let cancel = Cancel::default();
     cancel.cancel();
-    assert!(trace(&subject, &lens, &exposure(16), &cancel).is_none());
+    assert!(picture_unless(&cancel, &scene, &snapshot, &lens, 16).is_none());
 }

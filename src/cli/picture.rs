@@ -261,7 +261,7 @@ impl PictureFlags {
     }
 }
 
-/// Most pixels of a traced picture. More take more than 16 GiB of memory.
+/// Most pixels of a traced picture: they take about 6 GiB of memory.
 const MOST_TRACED_PIXELS: u64 = 1 << 26;
 
 /// How a picture is made.

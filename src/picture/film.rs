@@ -27,7 +27,7 @@ pub(super) struct Unlit {
 /// Sums over the samples of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pixel {
-    pub(super) count: f32,
+    count: f32,
     /// Of the samples that show surfaces, and of those that show sources.
     radiance: [Vec3; 2],
     counts: [f32; 2],

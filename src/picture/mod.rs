@@ -91,7 +91,7 @@ const NOISE: f32 = 0.01;
 /// The part of the mean light of the picture that noise is relative to beside the pixel's own.
 const OF_MEAN: f32 = 0.1;
 
-/// Pixels that are made at once, about. Fewer share less work; more take more memory: about 400 bytes for each.
+/// Pixels that are made at once, about. Fewer share less work; more take more memory: about 500 bytes for each.
 const BAND: u32 = 1 << 21;
 
 /// A picture, row by row from the top; `None` when cancelled.
@@ -163,8 +163,10 @@ impl<'a> Pass<'a> {
         let most = self.exposure.samples;
         let (mut done, mut wanted) = (0, FIRST_SAMPLES.min(most));
         while done < wanted {
+            if done > 0 {
+                is_wanted = noisy(&pixels, width as usize);
+            }
             self.expose(&light, rows.start, done..wanted, &is_wanted, &mut pixels)?;
-            is_wanted = noisy(&pixels, width as usize);
             (done, wanted) = (wanted, (wanted * GROWTH).min(most));
         }
         Some(pixels)
@@ -175,13 +177,6 @@ impl<'a> Pass<'a> {
         let width = self.exposure.size[0] as usize;
         let sampler = Sampler::new(RAYS, self.exposure.seed);
         let mut list: Vec<Option<Record>> = vec![None; width * rows.len()];
-        if self.subject.is_unlit {
-            return Some(Records {
-                list,
-                width,
-                top: rows.start,
-            });
-        }
         let by_row = list.par_chunks_mut(width).zip(rows.clone().into_par_iter());
         by_row.for_each_init(
             || self.tools(),
@@ -245,6 +240,9 @@ impl<'a> Pass<'a> {
         counts: [u32; 2],
     ) -> Option<Record> {
         self.cancel.proceed()?;
+        if self.subject.is_unlit {
+            return None;
+        }
         let (origin, direction) = self.ray(at, Vec2::splat(0.5));
         let Tools { sight, recorder } = tools;
         sight.follow(self.subject, self.lit, origin, direction);

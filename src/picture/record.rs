@@ -118,15 +118,12 @@ impl<'a> Recorder<'a> {
         };
         let [to_lights, over_hemisphere] = counts;
         if let Some(lights) = self.direct.as_mut().filter(|_| to_lights > 0) {
-            let mut point = surface.lit_point(Vec3::ZERO);
-            record.unoccluded = lights.unoccluded(&point);
-            point.visible = visible(direct, record.unoccluded);
             let (rays, shuffle) = sampler.shadow(numbers, to_lights);
-            let arrived = lights.arriving(&point, rays, shuffle);
-            for (kind, arrived) in arrived.into_iter().enumerate() {
-                record.light[kind] =
-                    Estimate::of_mean(arrived.missing, arrived.variance, to_lights);
-                record.changes[kind] = arrived.sharpness;
+            let light = lights.light(&surface.lit_point(direct), rays, shuffle);
+            record.unoccluded = light.unoccluded;
+            for (kind, shadow) in light.shadows.into_iter().enumerate() {
+                record.light[kind] = Estimate::of_mean(shadow.missing, shadow.variance, to_lights);
+                record.changes[kind] = shadow.sharpness;
             }
         }
         let stored = (all - direct).max(Vec3::ZERO);
@@ -187,12 +184,14 @@ impl<'a> Recorder<'a> {
         let direct = match &mut self.direct {
             None => stored,
             Some(lights) => {
-                let mut point = surface.lit_point(Vec3::ZERO);
-                let unoccluded = lights.unoccluded(&point);
-                point.visible = visible(stored, unoccluded);
                 let (rays, shuffle) = sampler.shadow(numbers, 1);
-                let arrived = lights.arriving(&point, rays, shuffle);
-                unoccluded - arrived.iter().map(|arrived| arrived.missing).sum::<Vec3>()
+                let light = lights.light(&surface.lit_point(stored), rays, shuffle);
+                light.unoccluded
+                    - light
+                        .shadows
+                        .map(|shadow| shadow.missing)
+                        .iter()
+                        .sum::<Vec3>()
             }
         };
         let direction = cosine_direction(surface.normal, sampler.point(numbers, Use::Further));
@@ -211,20 +210,4 @@ impl Record {
         let missing: Vec3 = light[..INDIRECT].iter().sum();
         (self.unoccluded - missing).max(Vec3::ZERO) + light[INDIRECT]
     }
-}
-
-/// The part of the unoccluded light that is visible by the direct light stored about a point, by colour, 0…1.
-fn visible(direct: Vec3, unoccluded: Vec3) -> Vec3 {
-    let part = |direct: f32, all: f32| {
-        if all > 0.0 {
-            (direct / all).clamp(0.0, 1.0)
-        } else {
-            1.0
-        }
-    };
-    Vec3::new(
-        part(direct.x, unoccluded.x),
-        part(direct.y, unoccluded.y),
-        part(direct.z, unoccluded.z),
-    )
 }

@@ -93,10 +93,7 @@ impl Records {
         let smoothed = |at: usize| -> Option<[f32; KINDS]> {
             let own = self.list[at].as_ref()?;
             let (mut sums, mut weights) = ([0.0; KINDS], [0.0; KINDS]);
-            for (other, bell) in self.around(at, 1) {
-                let Some(other) = self.list[other].as_ref() else {
-                    continue;
-                };
+            for (_, other, bell) in self.around(at, 1) {
                 let weight = bell * own.fit(other.position - own.position, other.normal);
                 for kind in 0..KINDS {
                     // Where nothing is blocked it is not known.
@@ -142,10 +139,7 @@ impl Records {
         let own = |at: usize| -> Option<[Shared; KINDS]> {
             let own = self.list[at].as_ref()?;
             let (mut sums, mut weights) = ([0.0; KINDS], f32::MIN_POSITIVE);
-            for (other, bell) in self.around(at, 1) {
-                let Some(other) = &self.list[other] else {
-                    continue;
-                };
+            for (_, other, bell) in self.around(at, 1) {
                 let weight = bell * own.fit(other.position - own.position, other.normal);
                 weights += weight;
                 for (sum, light) in sums.iter_mut().zip(&other.light) {
@@ -182,10 +176,8 @@ impl Records {
     ) -> Option<[Shared; KINDS]> {
         let (record, own) = (self.list[at].as_ref()?, list[at]?);
         let mut sums = [(Vec3::ZERO, 0.0, 0.0); KINDS];
-        for (other, bell) in self.around(at, step) {
-            let (Some(place), Some(others)) = (&self.list[other], &list[other]) else {
-                continue;
-            };
+        for (other, place, bell) in self.around(at, step) {
+            let Some(others) = &list[other] else { continue };
             let near = record.weights(place);
             for kind in 0..KINDS {
                 let (mean, weights, variance) = &mut sums[kind];
@@ -209,10 +201,8 @@ impl Records {
     fn bounded(&self, list: &[Option<[Shared; KINDS]>], at: usize) -> Option<[Shared; KINDS]> {
         let (record, mut own) = (self.list[at].as_ref()?, list[at]?);
         let mut bounds = [(Vec3::INFINITY, Vec3::NEG_INFINITY); KINDS];
-        for (other, _) in self.around(at, 1).filter(|&(other, _)| other != at) {
-            let (Some(place), Some(others)) = (&self.list[other], &list[other]) else {
-                continue;
-            };
+        for (other, place, _) in self.around(at, 1).filter(|&(other, ..)| other != at) {
+            let Some(others) = &list[other] else { continue };
             if record.fit(place.position - record.position, place.normal) > 0.0 {
                 for ((low, high), other) in bounds.iter_mut().zip(others) {
                     (*low, *high) = (low.min(other.mean), high.max(other.mean));
@@ -227,8 +217,8 @@ impl Records {
         Some(own)
     }
 
-    /// The pixels about one, `step` apart, with weights of a bell.
-    fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, f32)> + use<> {
+    /// The records of the pixels about one, `step` apart: their indices, and weights of a bell.
+    fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, &Record, f32)> {
         const BELL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
         let (row, column) = ((at / self.width) as isize, (at % self.width) as isize);
         let height = (self.list.len() / self.width) as isize;
@@ -237,8 +227,9 @@ impl Records {
             let (down, across) = (index / 5, index % 5);
             let (row, column) = (row + (down - 2) * step, column + (across - 2) * step);
             let is_inside = (0..height).contains(&row) && (0..width).contains(&column);
+            let at = is_inside.then_some((row * width + column) as usize)?;
             let weight = BELL[down as usize] * BELL[across as usize];
-            is_inside.then_some(((row * width + column) as usize, weight))
+            Some((at, self.list[at].as_ref()?, weight))
         })
     }
 }
@@ -257,7 +248,8 @@ impl SharedLight<'_> {
         })
     }
 
-    /// What irradiance is more than the indirect light stored at a place that is seen at a place of the picture in pixels, W/m²; `None` where no record is near.
+    /// What irradiance is more than the indirect light stored at a place, W/m², that is `seen` at a place of the picture in
+    /// pixels; `None` where no record is near.
     pub(super) fn at(&self, seen: Vec2, position: Vec3, normal: Vec3) -> Option<Vec3> {
         /// Of records beyond the four that are nearest, so that they count where those do not.
         const FAR: f32 = 1e-3;

@@ -133,13 +133,13 @@ impl LitScene<'_> {
 }
 
 impl Surface {
-    /// The point as direct light sees it.
-    pub(super) fn lit_point(&self, visible: Vec3) -> LitPoint {
+    /// The point as direct light sees it, where this irradiance is expected.
+    pub(super) fn lit_point(&self, expected: Vec3) -> LitPoint {
         LitPoint {
             position: self.start,
             normal: self.normal,
             triangle: self.triangle,
-            visible,
+            expected,
         }
     }
 }

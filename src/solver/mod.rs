@@ -31,9 +31,9 @@ mod vertices;
 pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
-    Arrived, ClusterBox, DirectLights, DisplayMesh, ErrorPoint, EstimatedError, InspectedLink,
-    Inspection, LIGHT_KINDS, LightSampler, LitPoint, Note, Obstacle, Omitted, PathNode, Phase,
-    PhaseObserver, PhaseTimes, Place, Relit, Snapshot, StepReport, Subject, VertexLight,
+    ClusterBox, DirectLights, DisplayMesh, ErrorPoint, EstimatedError, InspectedLink, Inspection,
+    LIGHT_KINDS, LightSampler, LitPoint, Note, Obstacle, Omitted, PathNode, Phase, PhaseObserver,
+    PhaseTimes, Place, Relit, SampledLight, Shadow, Snapshot, StepReport, Subject, VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

@@ -1,12 +1,11 @@
 //! Traced pictures as the window shows them: exposed, tone-mapped, over the background.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use image::{Rgb, Rgb32FImage, Rgba, Rgba32FImage, RgbaImage};
 
 use super::{
     camera::Camera,
     exposure,
-    first_look::Interior,
     headless::{HeadlessPicture, Subject},
     render::{Cutout, Metered},
     theme,
@@ -31,9 +30,9 @@ pub struct Traced {
 }
 
 /// The rays of a camera for a picture of this width over its height.
-pub fn lens(camera: &Camera, aspect: f32) -> Lens {
+fn lens(camera: &Camera, aspect: f32) -> Lens {
     let half = 0.5 * camera.height_at_pivot();
-    let (origin, forward) = camera.ray(glam::Vec2::ZERO, aspect);
+    let (origin, forward) = camera.ray(Vec2::ZERO, aspect);
     let [_, right, up] = camera.rays(aspect);
     match camera.orthographic {
         false => Lens {
@@ -67,10 +66,8 @@ pub fn trace(
     let looked_into = subject
         .interior
         .filter(|room| room.is_looked_into(camera, view));
-    let hides = looked_into.map(|room| {
-        let camera = *camera;
-        move |point: Vec3, normal: Vec3| hides(&room, &camera, point, normal)
-    });
+    let hides =
+        looked_into.map(|room| move |point: Vec3, normal: Vec3| room.hides(camera, point, normal));
     let traced = picture::Subject {
         scene: subject.scene,
         rays,
@@ -96,17 +93,6 @@ pub fn trace(
         to_display,
         tone_map,
     })
-}
-
-/// Whether a surface stands before a room that is looked into. `normal` points to the camera.
-fn hides(room: &Interior, camera: &Camera, point: Vec3, normal: Vec3) -> bool {
-    let (origin, direction) = match camera.orthographic {
-        true => (point + camera.backward() * 1e5, -camera.backward()),
-        false => (camera.eye(), (point - camera.eye()).normalize_or_zero()),
-    };
-    let entered = room.entered(origin, direction);
-    let is_before = entered.is_some_and(|entered| entered >= (point - origin).length());
-    is_before && !room.is_wall(point, normal)
 }
 
 /// Luminances of the pixels that show light.

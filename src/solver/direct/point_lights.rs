@@ -17,7 +17,7 @@ use crate::{
     geometry::{RayTree, Shuffle},
     hierarchy::Channels as _,
     solver::{
-        output::{Arrived, DirectLights, LIGHT_KINDS, LightSampler, LitPoint},
+        output::{DirectLights, LightSampler, LitPoint, SampledLight, Shadow},
         places::Receiver,
     },
 };
@@ -49,20 +49,15 @@ impl Debug for PointLights {
 
 impl DirectLights for PointLights {
     fn sampler(&self) -> Box<dyn LightSampler + '_> {
-        let shots = self
-            .lights
-            .iter()
-            .map(|lights| (&**lights, Shot::default()));
+        let parts = self.lights.iter().map(|lights| Part {
+            lights,
+            shot: Shot::default(),
+            exact: Vec4::ZERO,
+            normal: None,
+        });
         Box::new(Sampler {
             rays: &self.rays,
-            parts: shots
-                .map(|(lights, shot)| Part {
-                    lights,
-                    shot,
-                    exact: Vec4::ZERO,
-                    normal: None,
-                })
-                .collect(),
+            parts: parts.collect(),
         })
     }
 
@@ -87,9 +82,13 @@ struct Part<'a> {
 }
 
 impl LightSampler for Sampler<'_> {
-    fn unoccluded(&mut self, point: &LitPoint) -> Vec3 {
-        let receiver = receiver(point);
-        let mut sum = Vec3::ZERO;
+    fn light(&mut self, point: &LitPoint, samples: Range<u32>, shuffle: Shuffle) -> SampledLight {
+        let receiver = Receiver {
+            point: point.position,
+            normal: point.normal,
+            triangle: point.triangle,
+        };
+        let mut light = SampledLight::default();
         for part in &mut self.parts {
             // Light from outside depends on the normal alone.
             let is_known = part.lights.is_outside() && part.normal == Some(point.normal);
@@ -97,44 +96,41 @@ impl LightSampler for Sampler<'_> {
                 part.exact = part.lights.unoccluded(&receiver, None, &mut part.shot.cut);
                 part.normal = Some(point.normal);
             }
-            sum += part.exact.color();
+            light.unoccluded += part.exact.color();
         }
-        sum
-    }
-
-    fn arriving(
-        &mut self,
-        point: &LitPoint,
-        samples: Range<u32>,
-        shuffle: Shuffle,
-    ) -> [Arrived; LIGHT_KINDS] {
-        let receiver = receiver(point);
-        let mut all = [Arrived::default(); LIGHT_KINDS];
         if self.rays.is_clear() {
-            return all;
+            return light;
         }
-        let known = point.visible.extend(1.0);
-        for (arrived, part) in all.iter_mut().zip(&mut self.parts) {
+        let visible = visible(point.expected, light.unoccluded).extend(1.0);
+        for (shadow, part) in light.shadows.iter_mut().zip(&mut self.parts) {
             let mut light = DirectLight::expected(part.exact);
             let (shot, rays) = (&mut part.shot, samples.clone());
             part.lights
                 .shoot_at(self.rays, &receiver, rays, shuffle, shot, &mut light);
-            let irradiance = light.irradiance_near(known, samples.len() as u32);
+            let irradiance = light.irradiance_near(visible, samples.len() as u32);
             let blocked = &shot.blocked;
-            *arrived = Arrived {
+            *shadow = Shadow {
                 missing: (part.exact - irradiance).color(),
                 variance: light.error().powi(2),
                 sharpness: blocked.sharpness / blocked.count.max(1) as f32,
             };
         }
-        all
+        light
     }
 }
 
-fn receiver(point: &LitPoint) -> Receiver {
-    Receiver {
-        point: point.position,
-        normal: point.normal,
-        triangle: point.triangle,
-    }
+/// The part of the unoccluded light that is visible where this much is expected, by colour, 0…1.
+fn visible(expected: Vec3, unoccluded: Vec3) -> Vec3 {
+    let part = |expected: f32, all: f32| {
+        if all > 0.0 {
+            (expected / all).clamp(0.0, 1.0)
+        } else {
+            1.0
+        }
+    };
+    Vec3::new(
+        part(expected.x, unoccluded.x),
+        part(expected.y, unoccluded.y),
+        part(expected.z, unoccluded.z),
+    )
 }

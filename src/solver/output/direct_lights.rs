@@ -15,9 +15,8 @@ pub struct LitPoint {
     pub normal: Vec3,
     /// The triangle that the point lies on.
     pub triangle: TriangleId,
-    /// The part of the unoccluded light that is believed to be visible, by colour, 0…1: any, but noise is less where it is
-    /// right.
-    pub visible: Vec3,
+    /// The irradiance that is believed to arrive there, W/m²: any, but noise is less where it is right.
+    pub expected: Vec3,
 }
 
 /// The light straight from emitters and from outside, as far as the solve samples it.
@@ -31,30 +30,30 @@ pub trait DirectLights: Debug + Send + Sync {
 
 /// Computes direct light at points.
 pub trait LightSampler {
-    /// Unoccluded irradiance, W/m².
-    fn unoccluded(&mut self, point: &LitPoint) -> Vec3;
+    /// The light at a point by shadow rays of these numbers in a sequence to each kind of light.
+    fn light(&mut self, point: &LitPoint, rays: Range<u32>, shuffle: Shuffle) -> SampledLight;
+}
 
-    /// What arrives of each kind of light, at most [`LIGHT_KINDS`], by shadow rays of these numbers in a sequence; to follow
-    /// [`Self::unoccluded`] of the same point.
-    fn arriving(
-        &mut self,
-        point: &LitPoint,
-        rays: Range<u32>,
-        shuffle: Shuffle,
-    ) -> [Arrived; LIGHT_KINDS];
+/// Direct light at a point by a few shadow rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SampledLight {
+    /// Unoccluded irradiance of all kinds, W/m².
+    pub unoccluded: Vec3,
+    /// What shadows take of each kind.
+    pub shadows: [Shadow; LIGHT_KINDS],
 }
 
 /// Kinds of light that have shadow rays of their own: emitters, the sky, the sun.
 pub const LIGHT_KINDS: usize = 3;
 
-/// Direct light of one kind by a few shadow rays.
+/// What is missing of the direct light of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Arrived {
+pub struct Shadow {
     /// What is missing of the unoccluded irradiance, W/m²; without bias, so that it may be negative.
     pub missing: Vec3,
     /// Variance of its luminance, as far as the rays tell.
     pub variance: f32,
-    /// How fast its shadow changes, 0 where none was met: the inverse of the distance, in frame units, over which the point has
+    /// How fast it changes, 0 where nothing was met: the inverse of the distance, in frame units, over which the point has
     /// to move until it sees another part of what blocks before all of the light.
     pub sharpness: f32,
 }

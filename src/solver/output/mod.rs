@@ -10,7 +10,7 @@ mod relit;
 mod snapshot;
 mod step_report;
 
-pub use direct_lights::{Arrived, DirectLights, LIGHT_KINDS, LightSampler, LitPoint};
+pub use direct_lights::{DirectLights, LIGHT_KINDS, LightSampler, LitPoint, SampledLight, Shadow};
 pub use estimated_error::{ErrorPoint, EstimatedError};
 pub use inspection::{InspectedLink, Inspection, PathNode, Place, Subject};
 pub use note::{Note, Obstacle};

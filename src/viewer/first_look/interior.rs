@@ -89,4 +89,16 @@ impl Interior {
         let entered = a.min(b).max_element().max(0.0);
         (entered <= a.max(b).min_element()).then_some(entered)
     }
+
+    /// Whether a surface at a point is not drawn, since it stands before the room on the way from a camera that looks into
+    /// it. `normal` points towards the viewer.
+    pub fn hides(&self, camera: &Camera, point: Vec3, normal: Vec3) -> bool {
+        let (origin, direction) = match camera.orthographic {
+            true => (point + camera.backward() * 1e5, -camera.backward()),
+            false => (camera.eye(), (point - camera.eye()).normalize_or_zero()),
+        };
+        let entered = self.entered(origin, direction);
+        let is_before = entered.is_some_and(|entered| entered >= (point - origin).length());
+        is_before && !self.is_wall(point, normal)
+    }
 }
