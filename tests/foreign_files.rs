@@ -243,6 +243,8 @@ fn transparency_and_gloss_are_told_once_and_for_which_materials() {
         ("Pane", "Tr 0.9"),
         ("Unused", "d 0.1"),
         ("Plain", "illum 2\nd 1\nTr 0"),
+        ("Coat", "Pc 0.5\nmap_Bump a.png"),
+        ("Bottle", "illum 7\nNi 1.5"),
     ];
     let mut obj = format!("mtllib a.mtl\n{SQUARE}");
     let mut mtl = String::new();
@@ -255,8 +257,8 @@ fn transparency_and_gloss_are_told_once_and_for_which_materials() {
     }
     let scene = read(&folder(&[("scene.obj", &obj), ("a.mtl", &mtl)], &[]));
     let expected = [
-        "a.mtl:1: transparent materials: 'Glass' (d 0.3), 'Pane' (Tr 0.9)",
-        "a.mtl:4: gloss and relief are not computed, so these surfaces are matt and flat: 'Wall', 'Floor' (illum 4)",
+        "a.mtl:1: transparent materials: 'Glass' (d 0.3), 'Pane' (Tr 0.9), 'Bottle' (illum 7)",
+        "a.mtl:23: gloss and relief of these kinds are not computed: 'Coat' (Pc, map_Bump)",
     ];
     assert_eq!(said(&scene), expected);
     for (name, opacity) in [("Glass", 0.3), ("Wall", 1.0), ("Pane", 0.1)] {

@@ -55,6 +55,12 @@ pub struct SceneFlags {
     /// most half of the materials have it: many programs write it into opaque ones. illum alone makes nothing transparent.
     #[arg(long, help_heading = "Scene")]
     pub opaque: bool,
+    /// Treat mirrors, gloss and glass as matt
+    ///
+    /// Otherwise Ks reflects beside Kd: illum 3, 5 or 8, or Ns of 1000 and more, is a mirror, else gloss whose width Ns or Pr
+    /// tells; Pm makes metal. illum 6 and 7 are solid glass of index Ni, 4 and 9 panes, where d or Ni say so.
+    #[arg(long, help_heading = "Scene")]
+    pub matt: bool,
     /// Up axis of the scene
     #[arg(
         long,
@@ -86,6 +92,7 @@ impl SceneFlags {
             max_reflectance: self.max_reflectance.unwrap_or(default.max_reflectance),
             mtl_color_is_srgb: self.mtl_color == MtlColorFlag::Srgb,
             is_opaque: self.opaque,
+            is_matt: self.matt,
             up: self.up.axis(),
         }
     }

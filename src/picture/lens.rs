@@ -28,12 +28,12 @@ impl Lens {
         (origin, direction.normalize_or(Vec3::NEG_Z))
     }
 
-    /// Distance between neighbouring pixels of a picture of this height, on a surface square to the ray through a point.
-    pub(super) fn spacing(&self, point: Vec3, height: u32) -> f32 {
+    /// Distance between neighbouring pixels of a picture of this height, on a surface square to a ray of this length.
+    pub(super) fn spacing(&self, length: f32, height: u32) -> f32 {
         let step = 2.0 * self.up.length() / height.max(1) as f32;
         match self.is_parallel {
             true => step,
-            false => step * (point - self.origin).length() / self.forward.length(),
+            false => step * length / self.forward.length(),
         }
     }
 }

@@ -12,6 +12,7 @@ mod sampler;
 mod shade;
 mod share;
 mod surface;
+mod turn;
 
 pub use film::Developed;
 pub use lens::Lens;
@@ -24,6 +25,7 @@ use rayon::prelude::*;
 use crate::{
     geometry::RayTree,
     metrics::MeshLookup,
+    sampling::Emitters,
     scene::Scene,
     solver::{Cancel, Snapshot},
 };
@@ -31,7 +33,7 @@ use crate::{
 use film::Pixel;
 use record::{Record, Recorder};
 use sampler::{Sampler, Use};
-use shade::Sight;
+use shade::{Seen, Sight};
 use share::{Records, SHARED_ROWS, SharedLight};
 use surface::{LitScene, Surface};
 
@@ -109,6 +111,7 @@ pub fn trace(
         light: &snapshot.light,
         lights: snapshot.lights.as_deref(),
         lookup: MeshLookup::new(subject.scene, &snapshot.mesh),
+        emitters: Emitters::new(subject.scene),
     };
     cancel.proceed()?;
     let pass = Pass {
@@ -245,10 +248,10 @@ impl<'a> Pass<'a> {
         }
         let (origin, direction) = self.ray(at, Vec2::splat(0.5));
         let Tools { sight, recorder } = tools;
-        sight.follow(self.subject, self.lit, origin, direction);
-        let surface = sight.main_surface()?;
-        let spacing = self.lens.spacing(surface.position, self.exposure.size[1]);
         let numbers = sampler.sample(at, 0);
+        sight.follow(self.seen(), origin, direction, sampler.chances(numbers));
+        let (surface, length) = sight.main_surface()?;
+        let spacing = self.lens.spacing(length, self.exposure.size[1]);
         Some(recorder.record(surface, spacing, sampler, numbers, counts))
     }
 
@@ -275,11 +278,12 @@ impl<'a> Pass<'a> {
                     }
                     let at = [column as u32, top + row as u32];
                     for sample in samples.clone() {
-                        let within = sampler.point(sampler.sample(at, sample), Use::Place);
+                        let numbers = sampler.sample(at, sample);
+                        let within = sampler.point(numbers, Use::Place);
                         let (origin, direction) = self.ray(at, within);
-                        sight.follow(self.subject, self.lit, origin, direction);
+                        sight.follow(self.seen(), origin, direction, sampler.chances(numbers));
                         let seen = Vec2::new(at[0] as f32, at[1] as f32) + within;
-                        *pixel += sight.sample(|surface| {
+                        *pixel += sight.sample(self.seen(), |surface| {
                             if self.subject.is_unlit {
                                 return Vec3::splat(beside_eye(surface, direction));
                             }
@@ -291,6 +295,14 @@ impl<'a> Pass<'a> {
                 }
             });
         self.cancel.proceed()
+    }
+
+    /// What rays from the eye meet.
+    fn seen(&self) -> Seen<'_> {
+        Seen {
+            subject: self.subject,
+            lit: self.lit,
+        }
     }
 
     /// The ray through a point of a pixel.

@@ -20,6 +20,8 @@ pub(super) enum Use {
     /// Which light, and which part of it.
     Light,
     Part,
+    /// Direction of gloss.
+    Gloss,
 }
 
 /// The numbers of a picture.
@@ -57,6 +59,15 @@ impl Sampler {
         sobol_2d(order, [random.next_u32(), random.next_u32()])
     }
 
+    /// The numbers of a ray from the eye beside its place.
+    pub(super) fn chances(&self, numbers: Numbers) -> Chances {
+        let index = u64::from(numbers.first.wrapping_add(numbers.sample));
+        Chances {
+            first: Some(self.point(numbers, Use::Gloss)),
+            random: Random::new(self.seed, index << 32 | u64::from(u32::MAX)),
+        }
+    }
+
     /// Of so many shadow rays: the sequence of their pixel, and which of it they are.
     pub(super) fn shadow(&self, numbers: Numbers, count: u32) -> (Range<u32>, Shuffle) {
         let start = numbers.sample;
@@ -88,6 +99,29 @@ impl Numbers {
             sample: self.sample.wrapping_add(count),
             ..self
         }
+    }
+}
+
+/// What a ray from the eye meets by chance.
+#[derive(Clone, Debug)]
+pub(super) struct Chances {
+    /// The first point, spread evenly over neighbouring pixels.
+    first: Option<Vec2>,
+    random: Random,
+}
+
+impl Chances {
+    /// The next point of the unit square.
+    pub(super) fn square(&mut self) -> Vec2 {
+        self.first
+            .take()
+            .unwrap_or_else(|| self.random.uniform_2d())
+    }
+
+    /// A point of the unit square, and a number in 0…1.
+    pub(super) fn choice(&mut self) -> (f64, Vec2) {
+        let number = f64::from(self.random.next_u32()) / 4_294_967_296.0;
+        (number, self.random.uniform_2d())
     }
 }
 

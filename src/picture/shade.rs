@@ -1,4 +1,4 @@
-//! Rays from the eye, through what they pass, to what they show.
+//! Rays from the eye, through what they pass and over mirrors, gloss and glass, to what they show.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -7,11 +7,13 @@ use glam::Vec3;
 use super::{
     Subject,
     film::{Sample, Unlit},
+    sampler::Chances,
     surface::{LitScene, Surface},
+    turn::Lobe,
 };
 use crate::{
     geometry::Hit,
-    scene::{Sky, TriangleId, luminance},
+    scene::{Sky, Specular, TriangleId, luminance},
 };
 
 /// Surfaces that a ray passes through at most. Fewer, and leaves behind leaves are black; more take time.
@@ -20,82 +22,248 @@ const MOST_PASSED: u32 = 64;
 /// What passes below which a ray ends. Larger is seen behind many panes; smaller takes time.
 const LEAST_PASSING: f32 = 1e-3;
 
+/// What arrives below which one of several rays goes on by chance, for all of them. Larger is noisy in glass; smaller follows
+/// many rays that show little.
+const BY_CHANCE: f32 = 0.05;
+
+/// Mirrors, gloss and glass on the way of a ray at most; the last one counts as diffuse. Fewer darken facing mirrors and what
+/// lies behind glass; more take time there.
+const MOST_TURNS: u32 = 24;
+
+/// Gloss on the way of a ray at most. Fewer blur what gloss shows of gloss; more are noisy.
+const MOST_BLURS: u32 = 2;
+
+/// A surface that a ray from the eye shows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shown {
+    pub(super) surface: Surface,
+    /// The part of its radiance that arrives, by channel.
+    part: Vec3,
+    /// The part of its emission that counts of that: gloss samples emitters as well.
+    emitting: f32,
+    /// Length of the way from the eye.
+    length: f32,
+    /// Whether gloss lies between.
+    is_blurred: bool,
+    /// Whether what it reflects in other ways counts as diffuse.
+    is_matt: bool,
+}
+
 /// What a ray from the eye shows.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sight {
-    /// The surfaces that it meets, and the part of their radiance that arrives.
-    pub(super) surfaces: Vec<(Surface, Vec3)>,
+    surfaces: Vec<Shown>,
     /// Radiance from outside that arrives.
     outside: Vec3,
+    /// Radiance of lamps and the sun that gloss reflects.
+    highlights: Vec3,
     unlit: Unlit,
+    /// Rays that are still to be followed.
+    pending: Vec<Leg>,
+}
+
+/// A ray of a way from the eye.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    origin: Vec3,
+    direction: Vec3,
+    from: Option<TriangleId>,
+    passing: Vec3,
+    length: f32,
+    turns: u32,
+    blurs: u32,
+    /// Density with which gloss chose its direction, 1/sr.
+    density: Option<f32>,
 }
 
 /// What a ray meets, as the eye sees it.
-enum Seen {
+enum Met {
     /// It is looked through.
     Nothing,
     Back,
     Surface(Surface),
 }
 
+/// What rays from the eye see.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub(super) subject: &'a Subject<'a>,
+    pub(super) lit: &'a LitScene<'a>,
+}
+
 impl Sight {
     /// Follow a ray.
     pub(super) fn follow(
         &mut self,
-        subject: &Subject<'_>,
-        lit: &LitScene<'_>,
+        seen: Seen<'_>,
         origin: Vec3,
         direction: Vec3,
+        mut chances: Chances,
     ) {
         self.surfaces.clear();
-        (self.outside, self.unlit) = (Vec3::ZERO, Unlit::default());
-        let (mut passing, mut origin, mut from) = (Vec3::ONE, origin, None);
-        for _ in 0..MOST_PASSED {
-            let mean = passing.element_sum() / 3.0;
-            let Some(hit) = lit.rays.closest_shown(origin, direction, from) else {
-                match outside(lit, direction) {
-                    Some(radiance) => self.outside = passing * radiance,
-                    None => self.unlit.background = mean,
-                }
-                break;
-            };
-            match seen(subject, lit, origin, direction, hit) {
-                Seen::Nothing => {}
-                Seen::Back => {
-                    self.unlit.back = mean;
-                    break;
-                }
-                Seen::Surface(surface) => {
-                    let passed = passed(lit, hit.triangle);
-                    let part = passing * (1.0 - passed.element_sum() / 3.0);
-                    self.surfaces.push((surface, part));
-                    passing *= passed;
-                    if passing.max_element() < LEAST_PASSING {
-                        break;
-                    }
-                }
-            }
-            (origin, from) = (origin + direction * hit.distance, Some(hit.triangle));
+        (self.outside, self.highlights) = (Vec3::ZERO, Vec3::ZERO);
+        self.unlit = Unlit::default();
+        self.pending.clear();
+        self.pending.push(Leg {
+            origin,
+            direction,
+            from: None,
+            passing: Vec3::ONE,
+            length: 0.0,
+            turns: 0,
+            blurs: 0,
+            density: None,
+        });
+        while let Some(leg) = self.pending.pop() {
+            self.follow_leg(seen, leg, &mut chances);
         }
     }
 
-    /// The surface of which most arrives that is reflected.
-    pub(super) fn main_surface(&self) -> Option<&Surface> {
-        let weight = |(surface, part): &(Surface, Vec3)| luminance(surface.reflectance * part);
-        let shown = self.surfaces.iter().filter(|shown| weight(shown) > 0.0);
-        let main = shown.max_by(|a, b| weight(a).total_cmp(&weight(b)));
-        main.map(|(surface, _)| surface)
+    /// Follow a ray to where it ends or turns.
+    fn follow_leg(&mut self, seen: Seen<'_>, mut leg: Leg, chances: &mut Chances) {
+        for _ in 0..MOST_PASSED {
+            let mean = leg.passing.element_sum() / 3.0;
+            let rays = seen.lit.rays;
+            let Some(hit) = rays.closest_shown(leg.origin, leg.direction, leg.from) else {
+                match seen.outside(leg.direction) {
+                    Some(radiance) => self.outside += leg.passing * radiance,
+                    None => self.unlit.background += mean,
+                }
+                return;
+            };
+            leg.length += hit.distance;
+            match seen.met(&leg, hit) {
+                Met::Nothing => {}
+                Met::Back => {
+                    self.unlit.back += mean;
+                    return;
+                }
+                Met::Surface(surface) => {
+                    if !self.show(seen, &mut leg, surface, hit, chances) {
+                        return;
+                    }
+                }
+            }
+            leg.origin += leg.direction * hit.distance;
+            leg.from = Some(hit.triangle);
+        }
+    }
+
+    /// Show a surface on the way of a ray. Whether something passes straight on.
+    fn show(
+        &mut self,
+        seen: Seen<'_>,
+        leg: &mut Leg,
+        surface: Surface,
+        hit: Hit,
+        chances: &mut Chances,
+    ) -> bool {
+        let passed = seen.passed(hit.triangle);
+        let part = leg.passing * (1.0 - passed.element_sum() / 3.0);
+        let specular = surface.specular.filter(|_| {
+            leg.turns < MOST_TURNS && !seen.subject.is_unlit
+        });
+        let is_blurred = leg.blurs > 0;
+        let specular = specular.filter(|specular| {
+            leg.blurs < MOST_BLURS || !matches!(specular, Specular::Gloss { .. })
+        });
+        let emitting = leg.density.map_or(1.0, |density| {
+            seen.share_of_ray(&surface, leg.direction, hit, density)
+        });
+        self.surfaces.push(Shown {
+            surface,
+            part,
+            emitting,
+            length: leg.length,
+            is_blurred,
+            is_matt: specular.is_none(),
+        });
+        let material = seen.lit.scene.material(hit.triangle);
+        let mut onward = *leg;
+        (onward.origin, onward.from) = (surface.position, Some(hit.triangle));
+        onward.turns += 1;
+        onward.density = None;
+        let color = part * material.share_of_met();
+        match specular {
+            None => {}
+            Some(Specular::Mirror { reflectance }) => {
+                onward.direction = surface.mirrored(leg.direction);
+                onward.passing = color * reflectance;
+                self.go_on(onward, chances);
+            }
+            Some(Specular::Gloss {
+                reflectance,
+                roughness,
+            }) => {
+                let lobe = surface.lobe(roughness, leg.direction);
+                let color = color * reflectance;
+                self.highlights += color * seen.highlights(&surface, &lobe, chances);
+                if let Some((direction, weight, density)) = lobe.sample(chances.square()) {
+                    onward.direction = direction;
+                    onward.passing = color * weight;
+                    onward.blurs += 1;
+                    onward.density = Some(density);
+                    self.go_on(onward, chances);
+                }
+            }
+            Some(Specular::Glass { index, is_thin }) => {
+                let glass = leg.passing * (1.0 - material.opacity);
+                let ways = surface.through_glass(leg.direction, index, is_thin, material.filter);
+                for (direction, part) in ways {
+                    onward.direction = direction;
+                    onward.passing = glass * part;
+                    self.go_on(onward, chances);
+                }
+                return false;
+            }
+        }
+        leg.passing *= passed;
+        leg.passing.max_element() >= LEAST_PASSING
+    }
+
+    /// Follow a ray later; by chance where little of it arrives.
+    fn go_on(&mut self, mut leg: Leg, chances: &mut Chances) {
+        let most = leg.passing.max_element();
+        if most <= 0.0 {
+            return;
+        }
+        if most < BY_CHANCE {
+            let chance = most / BY_CHANCE;
+            if chances.choice().0 as f32 >= chance {
+                return;
+            }
+            leg.passing /= chance;
+        }
+        self.pending.push(leg);
+    }
+
+    /// The surface of which most arrives that is reflected, and the length of the way to it.
+    pub(super) fn main_surface(&self) -> Option<(&Surface, f32)> {
+        let weight = |shown: &&Shown| luminance(shown.surface.reflectance * shown.part);
+        let sharp = self.surfaces.iter().filter(|shown| !shown.is_blurred);
+        let lit = sharp.filter(|shown| weight(shown) > 0.0);
+        let main = lit.max_by(|a, b| weight(a).total_cmp(&weight(b)));
+        main.map(|shown| (&shown.surface, shown.length))
     }
 
     /// What is seen where the surfaces get this irradiance.
-    pub(super) fn sample(&self, mut irradiance: impl FnMut(&Surface) -> Vec3) -> Sample {
-        let (mut reflected, mut emitted) = (Vec3::ZERO, self.outside);
-        for (surface, part) in &self.surfaces {
-            if surface.reflectance != Vec3::ZERO {
-                let radiance = surface.reflectance * FRAC_1_PI * irradiance(surface);
-                reflected += part * radiance.max(Vec3::ZERO);
+    pub(super) fn sample(
+        &self,
+        seen: Seen<'_>,
+        mut irradiance: impl FnMut(&Surface) -> Vec3,
+    ) -> Sample {
+        let (mut reflected, mut emitted) = (self.highlights, self.outside);
+        for shown in &self.surfaces {
+            let surface = &shown.surface;
+            let reflectance = match shown.is_matt {
+                true => seen.lit.reflectance(surface),
+                false => surface.reflectance,
+            };
+            if reflectance != Vec3::ZERO {
+                let radiance = reflectance * FRAC_1_PI * irradiance(surface);
+                reflected += shown.part * radiance.max(Vec3::ZERO);
             }
-            emitted += part * surface.emission;
+            emitted += shown.part * surface.emission * shown.emitting;
         }
         Sample {
             radiance: reflected + emitted,
@@ -105,40 +273,89 @@ impl Sight {
     }
 }
 
-/// Radiance from outside; `None` where the background is seen instead.
-fn outside(lit: &LitScene<'_>, direction: Vec3) -> Option<Vec3> {
-    let environment = &lit.scene.environment;
-    match &environment.sky {
-        Sky::Dark => None,
-        _ if environment.is_default => None,
-        sky => Some(sky.radiance(direction)),
+impl Seen<'_> {
+    /// Radiance from outside; `None` where the background is seen instead.
+    fn outside(&self, direction: Vec3) -> Option<Vec3> {
+        let environment = &self.lit.scene.environment;
+        match &environment.sky {
+            Sky::Dark => None,
+            _ if environment.is_default => None,
+            sky => Some(sky.radiance(direction)),
+        }
     }
-}
 
-/// What the eye sees of what a ray meets.
-fn seen(
-    subject: &Subject<'_>,
-    lit: &LitScene<'_>,
-    origin: Vec3,
-    direction: Vec3,
-    hit: Hit,
-) -> Seen {
-    let (normal, is_back) = lit.side(hit.triangle, direction);
-    let position = origin + direction * hit.distance;
-    if subject.hidden.is_some_and(|hides| hides(position, normal)) {
-        return Seen::Nothing;
+    /// What the eye sees of what a ray meets. What it looks through itself, mirrors show.
+    fn met(&self, leg: &Leg, hit: Hit) -> Met {
+        let (normal, is_back) = self.lit.side(hit.triangle, leg.direction);
+        let position = leg.origin + leg.direction * hit.distance;
+        let hidden = self.subject.hidden.filter(|_| leg.turns == 0);
+        if hidden.is_some_and(|hides| hides(position, normal)) {
+            return Met::Nothing;
+        }
+        match self.lit.surface(leg.origin, leg.direction, hit) {
+            Some(surface) => Met::Surface(surface),
+            None if is_back && !self.subject.shows_backs => Met::Nothing,
+            None => Met::Back,
+        }
     }
-    match lit.surface(origin, direction, hit) {
-        Some(surface) => Seen::Surface(surface),
-        None if is_back && !subject.shows_backs => Seen::Nothing,
-        None => Seen::Back,
-    }
-}
 
-/// The part of the light that passes through a triangle where it is not cut out.
-fn passed(lit: &LitScene<'_>, triangle: TriangleId) -> Vec3 {
-    match lit.rays.is_see_through(triangle) {
-        true => lit.scene.material(triangle).transmission(),
-        false => Vec3::ZERO,
+    /// The part of the light that passes through a triangle where it is not cut out.
+    fn passed(&self, triangle: TriangleId) -> Vec3 {
+        match self.lit.rays.is_see_through(triangle) {
+            true => self.lit.scene.material(triangle).transmission(),
+            false => Vec3::ZERO,
+        }
+    }
+
+    /// The share of the emission of a surface that counts where a ray of gloss meets it; the rest counts where gloss samples
+    /// emitters (the balance heuristic of Veach and Guibas, 1995).
+    fn share_of_ray(&self, surface: &Surface, direction: Vec3, hit: Hit, density: f32) -> f32 {
+        let by_ray = density * -surface.flat_normal.dot(direction);
+        let of_emitters = self.lit.emitters.density(hit.triangle);
+        let by_point = of_emitters * hit.distance * hit.distance;
+        if by_ray > 0.0 { by_ray / (by_ray + by_point) } else { 0.0 }
+    }
+
+    /// What gloss reflects straight from the sun, and from a point of an emitter, as radiance; its colour apart.
+    fn highlights(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
+        self.emitter_highlight(surface, lobe, chances) + self.sun_highlight(surface, lobe, chances)
+    }
+
+    fn emitter_highlight(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
+        let (choice, square) = chances.choice();
+        let lit = self.lit;
+        let Some(point) = lit.emitters.sample(lit.scene, choice, square) else {
+            return Vec3::ZERO;
+        };
+        let separation = point.position - surface.start;
+        let direction = separation.normalize_or_zero();
+        let toward = lobe.toward(direction);
+        let (normal, is_back) = lit.side(point.triangle, direction);
+        let source_cosine = -normal.dot(direction);
+        let is_lit = lit.is_lit(point.triangle, is_back) && point.triangle != surface.triangle;
+        if toward.value <= 0.0 || source_cosine <= 0.0 || !is_lit {
+            return Vec3::ZERO;
+        }
+        let density = lit.emitters.density(point.triangle) * separation.length_squared();
+        let ends = [Some(surface.triangle), Some(point.triangle)];
+        let mut passing = lit.rays.transmittance(surface.start, point.position, ends);
+        passing *= lit.scene.opacity_at(point.triangle, point.barycentric);
+        let weight = toward.value * source_cosine / (density + source_cosine * toward.density);
+        lit.emitted(&point) * weight * passing
+    }
+
+    fn sun_highlight(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
+        let Some(sun) = self.lit.scene.environment.sun else {
+            return Vec3::ZERO;
+        };
+        let (direction, weight) = sun.sample(chances.choice().1);
+        let value = lobe.toward(direction).value;
+        if value <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let rays = self.lit.rays;
+        let own = Some(surface.triangle);
+        let passing = rays.transmittance_outward(surface.start, direction, own);
+        sun.irradiance * (value * weight) * passing
     }
 }

@@ -7,7 +7,8 @@ use glam::Vec3;
 use crate::{
     geometry::{Hit, RayTree, barycentric},
     metrics::{MeshLookup, MeshPlace, SidePoint},
-    scene::{Scene, TriangleId},
+    sampling::{EmitterPoint, Emitters},
+    scene::{Appearance, Scene, Specular, TriangleId},
     solver::{DirectLights, DisplayMesh, LitPoint, VertexLight},
 };
 
@@ -20,6 +21,8 @@ pub(super) struct LitScene<'a> {
     /// Direct light at any point.
     pub(super) lights: Option<&'a dyn DirectLights>,
     pub(super) lookup: MeshLookup<'a>,
+    /// Points of emitters, for what gloss shows of them.
+    pub(super) emitters: Emitters,
 }
 
 /// A point of a surface, seen from its lit side.
@@ -35,6 +38,10 @@ pub(super) struct Surface {
     pub(super) normal: Vec3,
     pub(super) reflectance: Vec3,
     pub(super) emission: Vec3,
+    /// What it sends in preferred directions, of what rays meet.
+    pub(super) specular: Option<Specular>,
+    /// Whether it is seen from the back of its triangle.
+    pub(super) is_back: bool,
     /// Its place among the vertices; `None` where the mesh has none.
     pub(super) place: Option<MeshPlace>,
 }
@@ -53,20 +60,24 @@ impl LitScene<'_> {
         !is_back || self.scene.triangles[triangle.index()].two_sided
     }
 
-    /// The surface that a ray meets; `None` at the back of a one-sided one.
+    /// The surface that a ray meets; `None` at the back of a one-sided one that is no glass.
     pub(super) fn surface(&self, origin: Vec3, direction: Vec3, hit: Hit) -> Option<Surface> {
         let triangle = hit.triangle;
         let (flat_normal, is_back) = self.side(triangle, direction);
-        if !self.is_lit(triangle, is_back) {
+        let material = self.scene.material(triangle);
+        let is_lit = self.is_lit(triangle, is_back);
+        if !is_lit && !material.is_glass() {
             return None;
         }
         let position = origin + direction * hit.distance;
         let at = barycentric(position, self.scene.corners(triangle));
-        let material = self.scene.triangles[triangle.index()].material;
-        let own = self.scene.material(triangle);
-        let (reflectance, emission) = match self.mesh.appearances.get(material.index()) {
-            Some(appearance) => (appearance.reflectance, appearance.emission),
-            None => (own.reflectance, own.emission),
+        let shown = if is_lit {
+            self.appearance(triangle)
+        } else {
+            Appearance {
+                reflectance: Vec3::ZERO,
+                emission: Vec3::ZERO,
+            }
         };
         let place = self.lookup.place(&SidePoint {
             triangle,
@@ -84,10 +95,40 @@ impl LitScene<'_> {
             start,
             flat_normal,
             normal,
-            reflectance: self.scene.reflected_at(triangle, reflectance, at),
-            emission: self.scene.emitted_at(triangle, emission, at),
+            reflectance: self.scene.reflected_at(triangle, shown.reflectance, at),
+            emission: self.scene.emitted_at(triangle, shown.emission, at),
+            specular: material.specular,
+            is_back,
             place,
         })
+    }
+
+    /// The present appearance of the material of a triangle.
+    fn appearance(&self, triangle: TriangleId) -> Appearance {
+        let material = self.scene.triangles[triangle.index()].material;
+        let shown = self.mesh.appearances.get(material.index()).copied();
+        shown.unwrap_or_else(|| Appearance::of(self.scene.material(triangle)))
+    }
+
+    /// Radiance that a point of an emitter sends, W·sr⁻¹·m⁻².
+    pub(super) fn emitted(&self, point: &EmitterPoint) -> Vec3 {
+        let emission = self.appearance(point.triangle).emission;
+        self.scene
+            .emitted_at(point.triangle, emission, point.barycentric)
+    }
+
+    /// What a surface reflects of light from all directions, in whatever directions.
+    pub(super) fn reflectance(&self, surface: &Surface) -> Vec3 {
+        let Some(specular) = surface.specular else {
+            return surface.reflectance;
+        };
+        let material = self.scene.material(surface.triangle);
+        let part = match material.is_glass() {
+            true => (1.0 - material.opacity) / material.met_share().max(f32::MIN_POSITIVE),
+            false => material.share_of_met(),
+        };
+        let all = surface.reflectance + specular.mean_reflectance() * part;
+        all.min(Vec3::splat(self.scene.max_reflectance))
     }
 
     /// The normal of the smooth surface, and the place on it: the point's projections onto the tangent planes of the
@@ -128,7 +169,7 @@ impl LitScene<'_> {
     pub(super) fn sent(&self, surface: &Surface, irradiance: Vec3) -> Vec3 {
         let emits = self.lights.is_none_or(|lights| !lights.has_emitters());
         let emission = if emits { surface.emission } else { Vec3::ZERO };
-        emission + surface.reflectance * irradiance * FRAC_1_PI
+        emission + self.reflectance(surface) * irradiance * FRAC_1_PI
     }
 }
 

@@ -39,6 +39,8 @@ pub struct BakePoint {
 pub struct VertexBake<'a> {
     scene: &'a Scene,
     rays: &'a RayTree,
+    /// The rays of a scene with glass: paths bend in it, where the rays of others pass straight on.
+    bending: Option<RayTree>,
     emitters: Emitters,
     outside: Outside,
     starts: Vec<Place>,
@@ -55,6 +57,7 @@ impl<'a> VertexBake<'a> {
         Self {
             scene,
             rays,
+            bending: scene.with_solid_glass().map(|solid| RayTree::new(&solid)),
             emitters: Emitters::new(scene),
             outside: Outside::new(scene),
             starts: points.iter().map(|point| inset(scene, point)).collect(),
@@ -108,7 +111,9 @@ impl<'a> VertexBake<'a> {
 
     /// Bytes in use, with the ray tree.
     pub fn memory_bytes(&self) -> usize {
+        let bending = self.bending.as_ref().map_or(0, RayTree::memory_bytes);
         self.rays.memory_bytes()
+            + bending
             + size_of_val(self.starts.as_slice())
             + size_of_val(self.sums.as_slice())
     }
@@ -117,7 +122,7 @@ impl<'a> VertexBake<'a> {
     fn sample(&self, index: usize, start: Place, samples: std::ops::Range<u32>) -> (DVec3, u64) {
         let estimator = Estimator {
             scene: self.scene,
-            rays: self.rays,
+            rays: self.bending.as_ref().unwrap_or(self.rays),
             emitters: &self.emitters,
             outside: &self.outside,
         };

@@ -3,13 +3,16 @@
 //! `E(x) = D(x) + ρ(y) E(y)` with y met by a cosine-weighted ray from x. The light D that comes straight from
 //! emitters is sampled twice, by points of emitters and by that same ray, and both are weighted by the balance
 //! heuristic (Veach & Guibas 1995), so that neither a near nor a small emitter leaves spikes. Light from outside likewise:
-//! see [`Outside`].
+//! see [`Outside`]. From a mirror, gloss or glass the path goes on in one direction until it comes to a diffuse reflection.
 
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::outside::{Outside, OutsideSquares, Place};
+use super::{
+    outside::{Outside, OutsideSquares, Place},
+    scatter::{Scatter, Turn, turned},
+};
 use crate::{
     geometry::{Hit, Random, RayTree, barycentric, cosine_direction},
     sampling::Emitters,
@@ -60,9 +63,20 @@ pub(super) struct Estimator<'a> {
     pub(super) outside: &'a Outside,
 }
 
-/// A hit on a side that reflects.
+/// The ray by which a path arrives.
+#[derive(Clone, Copy)]
+struct Flight {
+    from: Place,
+    direction: Vec3,
+    /// Density with which its direction was chosen, 1/sr; `None` where no other was possible, so that no point of an emitter
+    /// could have stood for it.
+    density: Option<f32>,
+}
+
+/// A hit on a surface.
 struct Arrival {
     point: Place,
+    /// Of its diffuse part.
     reflectance: Vec3,
     /// Emitted radiance, weighted by the balance heuristic.
     emission: Vec3,
@@ -84,22 +98,23 @@ impl Estimator<'_> {
         let (mut sum, mut throughput, mut ray_count) = (Vec3::ZERO, Vec3::ONE, 0);
         let (mut at, mut bounce) = (start, first);
         for depth in 0..MAX_BOUNCES {
-            ray_count += 1 + u32::from(!self.emitters.is_empty()) + self.outside.ray_count();
-            sum += throughput * self.emitter_share(at, bounce);
-            sum += throughput * self.outside.share(self.rays, at, bounce.outside);
+            ray_count += self.ray_count();
+            let diffuse = Scatter::Diffuse(at.normal);
+            sum += throughput * self.emitter_share(at, diffuse, bounce);
+            sum += throughput * self.outside.share(self.rays, at, diffuse, bounce.outside);
             let direction = cosine_direction(at.normal, bounce.direction);
-            let start = Some(at.triangle);
-            let hit = self.rays.closest(at.position, direction, start);
-            throughput *= self.rays.tint(at.position, direction, start, hit);
-            let Some(hit) = hit else {
-                sum += throughput * self.outside.by_ray(at.normal, direction);
+            let flight = Flight {
+                from: at,
+                direction,
+                density: Some(diffuse.toward(direction).density),
+            };
+            let (light, rays, next) = self.fly(flight, random);
+            ray_count += rays;
+            sum += throughput * light * PI;
+            let Some((point, reflectance)) = next else {
                 break;
             };
-            let Some(arrival) = self.arrive(at, direction, hit) else {
-                break;
-            };
-            sum += throughput * arrival.emission * PI;
-            throughput *= arrival.reflectance;
+            throughput *= reflectance;
             if depth + 1 >= SURE_BOUNCES {
                 let survival = throughput.max_element().min(1.0);
                 if random.uniform() >= survival {
@@ -109,14 +124,81 @@ impl Estimator<'_> {
             } else if throughput == Vec3::ZERO {
                 break;
             }
-            at = arrival.point;
+            at = point;
             bounce = Bounce::random(random, self.outside);
         }
         (sum, ray_count)
     }
 
+    /// Rays of one reflection.
+    fn ray_count(&self) -> u32 {
+        1 + u32::from(!self.emitters.is_empty()) + self.outside.ray_count()
+    }
+
+    /// Follow a ray over mirrors, gloss and glass to a diffuse reflection: the radiance that arrives beside what is reflected
+    /// there, the further rays that it took, and the place with the part of its irradiance that arrives as radiance times π.
+    fn fly(&self, mut flight: Flight, random: &mut Random) -> (Vec3, u32, Option<(Place, Vec3)>) {
+        let (mut sum, mut throughput, mut ray_count) = (Vec3::ZERO, Vec3::ONE, 0);
+        for turns in 0..MAX_BOUNCES {
+            let Flight {
+                from, direction, ..
+            } = flight;
+            let start = Some(from.triangle);
+            let hit = self.rays.closest(from.position, direction, start);
+            throughput *= self.rays.tint(from.position, direction, start, hit);
+            let Some(hit) = hit else {
+                sum += throughput * self.outside.by_ray(direction, flight.density);
+                break;
+            };
+            let turn = turned(self.scene, hit.triangle, direction, random);
+            let Some(arrival) = self.arrive(flight, hit, turn.is_some()) else {
+                break;
+            };
+            sum += throughput * arrival.emission;
+            let Some(turn) = turn else {
+                return (sum, ray_count, Some((arrival.point, throughput * arrival.reflectance)));
+            };
+            let at = arrival.point;
+            let (onward, weight, density) = match turn {
+                Turn::Diffuse { chance } => {
+                    let reflected = throughput * arrival.reflectance / chance;
+                    return (sum, ray_count, Some((at, reflected)));
+                }
+                Turn::Onward { direction, weight } => (direction, weight, None),
+                Turn::Gloss { scatter, weight } => {
+                    ray_count += self.ray_count() - 1;
+                    let bounce = Bounce::random(random, self.outside);
+                    let direct = self.emitter_share(at, scatter, bounce)
+                        + self.outside.share(self.rays, at, scatter, bounce.outside);
+                    sum += throughput * weight * direct;
+                    let Some((onward, part)) = scatter.sample(bounce.direction) else {
+                        break;
+                    };
+                    (onward, weight * part, Some(scatter.toward(onward).density))
+                }
+            };
+            ray_count += 1;
+            throughput *= weight;
+            if turns >= SURE_BOUNCES {
+                let survival = throughput.max_element().min(1.0);
+                if random.uniform() >= survival {
+                    break;
+                }
+                throughput /= survival;
+            } else if throughput == Vec3::ZERO {
+                break;
+            }
+            flight = Flight {
+                from: at,
+                direction: onward,
+                density,
+            };
+        }
+        (sum, ray_count, None)
+    }
+
     /// The weighted share of direct light by a point of an emitter.
-    fn emitter_share(&self, at: Place, bounce: Bounce) -> Vec3 {
+    fn emitter_share(&self, at: Place, scatter: Scatter, bounce: Bounce) -> Vec3 {
         let sample = self
             .emitters
             .sample(self.scene, bounce.choice, bounce.emitter);
@@ -125,9 +207,9 @@ impl Estimator<'_> {
         };
         let separation = sample.position - at.position;
         let direction = separation.normalize_or_zero();
-        let cosine = at.normal.dot(direction);
+        let toward = scatter.toward(direction);
         let source_cosine = self.lit_cosine(sample.triangle, direction);
-        if cosine <= 0.0 || source_cosine <= 0.0 || sample.triangle == at.triangle {
+        if toward.value <= 0.0 || source_cosine <= 0.0 || sample.triangle == at.triangle {
             return Vec3::ZERO;
         }
         let density = self.emitters.density(sample.triangle) * separation.length_squared();
@@ -138,31 +220,36 @@ impl Estimator<'_> {
             return Vec3::ZERO;
         }
         // Both densities times the cosine at the source, so that nothing is divided by a vanishing cosine.
-        let weight = cosine * source_cosine / (density + source_cosine * cosine * FRAC_1_PI);
+        let weight = toward.value * source_cosine / (density + source_cosine * toward.density);
         self.scene.emission_at(sample.triangle, sample.barycentric) * weight * passing
     }
 
-    /// The surface at a hit, if that side reflects or emits.
-    fn arrive(&self, from: Place, direction: Vec3, hit: Hit) -> Option<Arrival> {
+    /// The surface at a hit, if that side reflects or emits, or the path turns there.
+    fn arrive(&self, flight: Flight, hit: Hit, turns: bool) -> Option<Arrival> {
+        let direction = flight.direction;
         let source_cosine = self.lit_cosine(hit.triangle, direction);
-        if source_cosine <= 0.0 {
+        if source_cosine <= 0.0 && !turns {
             return None;
         }
         let corners = self.scene.corners(hit.triangle);
         // The point is put back on the triangle: along the ray it is off by the rounding of the distance.
-        let place = barycentric(from.position + direction * hit.distance, corners);
+        let place = barycentric(flight.from.position + direction * hit.distance, corners);
         let position = corners[0] * place.x + corners[1] * place.y + corners[2] * place.z;
         let front = self.normal(hit.triangle);
         let mut emission = self.scene.emission_at(hit.triangle, place);
         if emission != Vec3::ZERO {
-            let by_ray = from.normal.dot(direction).max(0.0) * FRAC_1_PI * source_cosine;
-            let by_point = self.emitters.density(hit.triangle) * hit.distance * hit.distance;
-            emission *= if by_ray > 0.0 {
-                by_ray / (by_ray + by_point)
-            } else {
-                0.0
+            emission *= match flight.density.map(|density| density * source_cosine) {
+                None if source_cosine > 0.0 => 1.0,
+                Some(by_ray) if by_ray > 0.0 => {
+                    let by_point = self.emitters.density(hit.triangle) * hit.distance * hit.distance;
+                    by_ray / (by_ray + by_point)
+                }
+                _ => 0.0,
             };
         }
+        // Of glass, rays always meet something.
+        let material = self.scene.material(hit.triangle);
+        let met = if material.is_glass() { material.met_share() } else { 1.0 };
         Some(Arrival {
             point: Place {
                 position,
@@ -173,8 +260,8 @@ impl Estimator<'_> {
                 },
                 triangle: hit.triangle,
             },
-            reflectance: self.scene.reflectance_at(hit.triangle, place),
-            emission,
+            reflectance: self.scene.reflectance_at(hit.triangle, place) * met,
+            emission: emission * met,
         })
     }
 

@@ -14,6 +14,7 @@ mod matrix;
 mod outside;
 mod path_trace;
 mod point;
+mod scatter;
 
 pub use bake::{BakePoint, VertexBake, bake};
 pub use jacobi::{JacobiSettings, StochasticJacobi};

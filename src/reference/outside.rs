@@ -1,12 +1,13 @@
 //! Light from outside as the references sample it: the sky by its luminance, the sun by its disc.
 
 use std::{
-    f32::consts::{FRAC_1_PI, PI},
+    f32::consts::PI,
     sync::Arc,
 };
 
 use glam::{Vec2, Vec3};
 
+use super::scatter::Scatter;
 use crate::{
     geometry::{RayTree, cosine_direction, low_discrepancy_2d},
     scene::{Environment, Scene, Sky, SkyPicture, TriangleId, luminance},
@@ -85,20 +86,30 @@ impl Outside {
 
     /// Irradiance straight from outside by directions chosen for sky and sun; what a cosine-weighted ray adds is
     /// [`Self::by_ray`].
-    pub(super) fn share(&self, rays: &RayTree, at: Place, squares: OutsideSquares) -> Vec3 {
-        self.sky_share(rays, at, squares.sky) + self.sun_share(rays, at, squares.sun)
+    pub(super) fn share(
+        &self,
+        rays: &RayTree,
+        at: Place,
+        scatter: Scatter,
+        squares: OutsideSquares,
+    ) -> Vec3 {
+        self.sky_share(rays, at, scatter, squares.sky)
+            + self.sun_share(rays, at, scatter, squares.sun)
     }
 
-    /// Irradiance by a cosine-weighted ray that left the scene, weighted against [`Self::share`] by the balance heuristic.
-    pub(super) fn by_ray(&self, normal: Vec3, direction: Vec3) -> Vec3 {
+    /// Radiance by a ray that left the scene, weighted against [`Self::share`] by the balance heuristic where its direction
+    /// was chosen with a density.
+    pub(super) fn by_ray(&self, direction: Vec3, density: Option<f32>) -> Vec3 {
         let radiance = self.environment.sky.radiance(direction);
-        let by_ray = normal.dot(direction).max(0.0) * FRAC_1_PI;
+        let Some(by_ray) = density else {
+            return radiance;
+        };
         let by_table = self
             .table
             .as_ref()
             .map_or(0.0, |table| table.density(direction));
         if by_ray > 0.0 {
-            radiance * (PI * by_ray / (by_ray + by_table))
+            radiance * (by_ray / (by_ray + by_table))
         } else {
             Vec3::ZERO
         }
@@ -112,45 +123,42 @@ impl Outside {
         toward: Vec2,
         squares: OutsideSquares,
     ) -> Vec3 {
-        let mut sum = self.share(rays, at, squares);
+        let diffuse = Scatter::Diffuse(at.normal);
+        let mut sum = self.share(rays, at, diffuse, squares);
         if !self.environment.sky.is_dark() {
             let direction = cosine_direction(at.normal, toward);
-            sum += self.by_ray(at.normal, direction) * passing(rays, at, direction);
+            let density = Some(diffuse.toward(direction).density);
+            sum += self.by_ray(direction, density) * PI * passing(rays, at, direction);
         }
         sum
     }
 
-    fn sky_share(&self, rays: &RayTree, at: Place, square: Vec2) -> Vec3 {
+    fn sky_share(&self, rays: &RayTree, at: Place, scatter: Scatter, square: Vec2) -> Vec3 {
         let Some(table) = &self.table else {
             return Vec3::ZERO;
         };
         let direction = table.direction(square);
-        let cosine = at.normal.dot(direction);
-        if cosine <= 0.0 {
+        let toward = scatter.toward(direction);
+        if toward.value <= 0.0 {
             return Vec3::ZERO;
         }
-        let density = table.density(direction) + cosine * FRAC_1_PI;
+        let density = table.density(direction) + toward.density;
         let radiance = self.environment.sky.radiance(direction);
-        radiance * (cosine / density) * passing(rays, at, direction)
+        radiance * (toward.value / density) * passing(rays, at, direction)
     }
 
     /// By a point of the disc, uniform as a surface sees it that faces its centre. Rays that meet the disc by chance count
     /// nothing.
-    fn sun_share(&self, rays: &RayTree, at: Place, square: Vec2) -> Vec3 {
+    fn sun_share(&self, rays: &RayTree, at: Place, scatter: Scatter, square: Vec2) -> Vec3 {
         let Some(sun) = self.environment.sun else {
             return Vec3::ZERO;
         };
-        let sine = (0.5 * sun.diameter).sin() * square.x.sqrt();
-        let height = (1.0 - sine * sine).max(0.0).sqrt();
-        let (across, up) = (square.y * 2.0 * PI).sin_cos();
-        let (tangent, bitangent) = sun.direction.any_orthonormal_pair();
-        let direction = (tangent * up + bitangent * across) * sine + sun.direction * height;
-        let cosine = at.normal.dot(direction);
-        if cosine <= 0.0 {
+        let (direction, weight) = sun.sample(square);
+        let toward = scatter.toward(direction);
+        if toward.value <= 0.0 {
             return Vec3::ZERO;
         }
-        let weight = cosine / height.max(f32::MIN_POSITIVE);
-        sun.irradiance * weight * passing(rays, at, direction)
+        sun.irradiance * (toward.value * weight) * passing(rays, at, direction)
     }
 }
 

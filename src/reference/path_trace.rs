@@ -84,6 +84,11 @@ impl PathTracer {
     /// Choose the points. `rays` is the ray tree of the scene.
     pub fn new(scene: Arc<Scene>, rays: Arc<RayTree>, settings: PathSettings) -> Self {
         let (points, surfaces) = sample_points(&scene, &rays, settings.point_count, settings.seed);
+        // Paths bend in glass, where the rays of others pass straight on.
+        let rays = match scene.with_solid_glass() {
+            Some(solid) => Arc::new(RayTree::new(&solid)),
+            None => rays,
+        };
         let points: Vec<ReferencePoint> = points.into_iter().map(ReferencePoint::from).collect();
         Self {
             emitters: Emitters::new(&scene),

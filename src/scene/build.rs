@@ -132,6 +132,9 @@ impl SceneBuilder {
             if options.is_opaque {
                 (material.opacity, material.cutout) = (1.0, None);
             }
+            if options.is_matt || options.is_opaque && material.is_glass() {
+                material.specular = None;
+            }
         }
     }
 
@@ -143,7 +146,7 @@ impl SceneBuilder {
                 .push(Material::plain("", Vec3::splat(0.5), Vec3::ZERO));
         }
         let max = options.reflectance_limit();
-        let mut corrected = Vec::new();
+        let (mut corrected, mut scaled) = (Vec::new(), Vec::new());
         for material in &mut self.materials {
             let reflectance = limited_reflectance(material.reflectance, max);
             let emission = material.emission.map(finite_non_negative);
@@ -159,8 +162,15 @@ impl SceneBuilder {
             }
             material.reflectance = reflectance;
             material.emission = emission;
+            if material.limit_specular() {
+                scaled.push(material.name.clone());
+            }
         }
         for (names, what) in [
+            (
+                scaled,
+                "diffuse and specular reflectance (Kd and Ks) that add to more than 1 were scaled to 1".to_owned(),
+            ),
             (
                 clamped,
                 format!(

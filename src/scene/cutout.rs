@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Material, Scene, TriangleId, ranges::finite_non_negative};
+use super::{Material, Scene, Specular, TriangleId, ranges::{finite_non_negative, limited_reflectance}};
 
 /// Alpha below which a pixel is cut out.
 pub(super) const LEAST_ALPHA: f32 = 0.5;
@@ -90,8 +90,16 @@ pub struct SeeThrough<'a> {
 
 impl Material {
     /// Part of the light that passes straight through where the material is not cut out, by channel, 0…1.
+    /// What glass reflects does not pass; here it is the same from all directions.
     pub fn transmission(&self) -> Vec3 {
-        (1.0 - self.opacity) * self.filter
+        let specular = self.specular.as_ref();
+        let clear = specular.map_or(1.0, Specular::mean_transmittance);
+        (1.0 - self.opacity) * clear * self.filter
+    }
+
+    /// Whether it is glass.
+    pub fn is_glass(&self) -> bool {
+        matches!(self.specular, Some(Specular::Glass { .. }))
     }
 
     /// The part of all rays that meet the material where it is not cut out, 0…1: those that do not pass, averaged over
@@ -116,6 +124,20 @@ impl Material {
     pub fn share_of_met(&self) -> f32 {
         let met = self.met_share();
         if met > 0.0 { self.opacity / met } else { 0.0 }
+    }
+
+    /// Bring what mirrors and gloss reflect into its range: with the diffuse part at most 1 in each channel, both scaled alike.
+    /// Whether that changed the diffuse part.
+    pub(super) fn limit_specular(&mut self) -> bool {
+        let Some(specular) = self.specular.filter(|_| !self.is_glass()) else {
+            return false;
+        };
+        let color = limited_reflectance(specular.color(), 1.0);
+        let most = (self.reflectance + color).max_element().max(1.0);
+        self.reflectance /= most;
+        let color = color / most;
+        self.specular = (color != Vec3::ZERO).then(|| specular.with_color(color));
+        most > 1.0
     }
 
     /// Bring opacity and filter into their range; what is not finite lets nothing pass.
@@ -153,6 +175,18 @@ impl Scene {
             Some(see_through) if !see_through.has_at(barycentric) => 0.0,
             Some(_) => self.material(triangle).met_share(),
         }
+    }
+
+    /// A copy whose glass lets nothing pass; `None` where there is no glass.
+    pub fn with_solid_glass(&self) -> Option<Self> {
+        if !self.materials.iter().any(Material::is_glass) {
+            return None;
+        }
+        let mut copy = self.clone();
+        for material in copy.materials.iter_mut().filter(|material| material.is_glass()) {
+            material.opacity = 1.0;
+        }
+        Some(copy)
     }
 
     /// Whether light passes straight through some surface.

@@ -3,7 +3,10 @@
 //! Both are infinitely far away, so that their light depends on the direction alone. Directions are those of the scene's
 //! coordinates and point from the scene to the light.
 
-use std::{f32::consts::PI, sync::Arc};
+use std::{
+    f32::consts::{PI, TAU},
+    sync::Arc,
+};
 
 use glam::{Mat3, Vec2, Vec3};
 
@@ -60,6 +63,19 @@ pub struct Sun {
     pub irradiance: Vec3,
     /// Angular diameter, radians; above 0 and below π.
     pub diameter: f32,
+}
+
+impl Sun {
+    /// A direction to the disc, uniform as a surface sees it that faces its centre, and the inverse of the cosine between
+    /// both. The irradiance of another surface is that of this one times its cosine with the direction, times the inverse.
+    pub fn sample(&self, square: Vec2) -> (Vec3, f32) {
+        let sine = (0.5 * self.diameter).sin() * square.x.sqrt();
+        let height = (1.0 - sine * sine).max(0.0).sqrt();
+        let (across, up) = (square.y * TAU).sin_cos();
+        let (tangent, bitangent) = self.direction.any_orthonormal_pair();
+        let direction = (tangent * up + bitangent * across) * sine + self.direction * height;
+        (direction, 1.0 / height.max(f32::MIN_POSITIVE))
+    }
 }
 
 /// Radiance of a small part of the sky.

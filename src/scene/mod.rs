@@ -7,6 +7,7 @@
 
 mod ahead;
 mod appearance;
+mod bsdf;
 mod build;
 mod builder;
 pub mod builtin;
@@ -31,6 +32,7 @@ mod lines;
 mod locate;
 mod means;
 mod mtl;
+mod mtl_specular;
 mod nesting;
 mod obj;
 mod omitted_textures;
@@ -61,6 +63,7 @@ mod whole;
 mod write;
 
 pub use appearance::Appearance;
+pub use bsdf::{Gloss, LobeValue, Specular, reflected, reflected_by_pane, refracted};
 pub use builder::{BuildError, Face, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use cutout::{Cutout, SeeThrough};
@@ -155,6 +158,9 @@ pub struct Material {
     pub filter: Vec3,
     /// Where the surface is cut out: `map_d`, or the alpha of `map_Kd`.
     pub cutout: Option<CutoutId>,
+    /// What it sends in preferred directions. Glass is the part that is not opaque; mirrors and gloss are beside the diffuse
+    /// part, with which they reflect at most all light.
+    pub specular: Option<Specular>,
 }
 
 impl Material {
@@ -169,6 +175,7 @@ impl Material {
             opacity: 1.0,
             filter: Vec3::ONE,
             cutout: None,
+            specular: None,
         }
     }
 }

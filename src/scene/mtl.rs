@@ -1,6 +1,7 @@
 //! Materials of an MTL file, statement by statement: what cannot be used is skipped and named with its line.
 //!
-//! Used are `Kd`, `Ke`, `map_Kd`, `map_Ke`, `d`, `Tr`, `Tf` and `map_d`; what makes surfaces gloss or uneven is named.
+//! Used are `Kd`, `Ke`, `Ks`, `Ns`, `illum`, `Ni`, `Pr`, `Pm`, `map_Kd`, `map_Ke`, `d`, `Tr`, `Tf` and `map_d`; what else makes
+//! surfaces gloss or uneven is named.
 //! `Ka` is never light.
 
 use std::io::BufRead;
@@ -34,6 +35,18 @@ pub(super) struct MtlMaterial {
     pub(super) filter: Option<Vec3>,
     /// `map_d`.
     pub(super) dissolve_map: Option<TextureStatement>,
+    /// `Ks`.
+    pub(super) specular: Option<Vec3>,
+    /// `Ns`: exponent of the highlight.
+    pub(super) exponent: Option<f32>,
+    /// `illum`: the model of illumination.
+    pub(super) model: Option<u8>,
+    /// `Ni`: index of refraction.
+    pub(super) index: Option<f32>,
+    /// `Pr`: roughness as painted, the square root of that of the lobe.
+    pub(super) roughness: Option<f32>,
+    /// `Pm`: part that is metal.
+    pub(super) metalness: Option<f32>,
     /// Statements that ask for gloss or relief, each once, in the order of the file.
     pub(super) uncomputed: Vec<String>,
 }
@@ -122,12 +135,12 @@ fn statement(material: &mut MtlMaterial, keyword: &[u8], rest: &[u8]) -> Result<
         b"d" => material.dissolve = Some(last_number(rest)?),
         b"tr" => material.transparency = Some(last_number(rest)?),
         b"tf" => material.filter = Some(colour(rest)?),
-        b"illum" => {
-            let model = illumination(rest).ok_or(Number::Malformed)?;
-            if model >= LEAST_MIRRORING {
-                material.note_uncomputed(format!("illum {model}"));
-            }
-        }
+        b"illum" => material.model = Some(illumination(rest).ok_or(Number::Malformed)?),
+        b"ks" => material.specular = Some(colour(rest)?),
+        b"ns" => material.exponent = Some(first_number(rest)?),
+        b"ni" => material.index = Some(first_number(rest)?),
+        b"pr" => material.roughness = Some(first_number(rest)?),
+        b"pm" => material.metalness = Some(first_number(rest)?),
         b"map_kd" => material.diffuse_map = Some(texture()?),
         b"map_ke" | b"map_emissive" => material.emissive_map = Some(texture()?),
         b"map_d" => material.dissolve_map = Some(texture()?),
@@ -142,13 +155,10 @@ fn statement(material: &mut MtlMaterial, keyword: &[u8], rest: &[u8]) -> Result<
     Ok(())
 }
 
-/// The first illumination model with mirrors or glass.
-const LEAST_MIRRORING: u8 = 3;
-
-/// Statements that ask for gloss or relief. Roughness and exponents mean nothing without them.
-const UNCOMPUTED: [&str; 18] = [
-    "Ks", "Pm", "Ps", "Pc", "Pr", "Pcr", "aniso", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Ps",
-    "map_Pc", "refl", "norm", "bump", "map_Bump", "disp",
+/// Statements that ask for gloss or relief of kinds that are not computed.
+const UNCOMPUTED: [&str; 15] = [
+    "Ps", "Pc", "Pcr", "aniso", "map_Ks", "map_Ns", "map_Pr", "map_Pm", "map_Ps", "map_Pc", "refl",
+    "norm", "bump", "map_Bump", "disp",
 ];
 
 /// One of these by its name in lower case.
@@ -175,6 +185,11 @@ fn colour(rest: &[u8]) -> Result<Vec3, Number> {
 /// A number of any size; what is not finite is cured later.
 fn number(word: &[u8]) -> Result<f32, Number> {
     decode(word).parse().map_err(|_| Number::of(word))
+}
+
+/// The first word if it is a number.
+fn first_number(rest: &[u8]) -> Result<f32, Number> {
+    number(words(rest).next().ok_or(Number::Malformed)?)
 }
 
 /// The last word if it is a number: `d -halo 0.5` has an option before it.
@@ -275,10 +290,10 @@ mod tests {
     #[test]
     fn gloss_and_relief_are_named_unless_they_are_off() {
         let (materials, warnings) = read(
-            b"newmtl a\nKs 0 0 0\nPm 0\nPr 0.4\nillum 2\nNs 250\nnewmtl b\nillum 5\nks 1 1 1\nKs 1\nmap_bump -bm 1 a.png\n",
+            b"newmtl a\nPs 0\nPc 0.4\nNs 250\nnewmtl b\nillum 5\nmap_ks a.png\nmap_Ks b.png\nmap_bump -bm 1 a.png\n",
         );
-        assert_eq!(materials[0].uncomputed, ["Pr"]);
-        assert_eq!(materials[1].uncomputed, ["illum 5", "Ks", "map_Bump"]);
+        assert_eq!(materials[0].uncomputed, ["Pc"]);
+        assert_eq!(materials[1].uncomputed, ["map_Ks", "map_Bump"]);
         assert!(warnings.is_empty());
     }
 

@@ -171,6 +171,16 @@ struct Import<'a> {
     default_slot: Option<Slot>,
 }
 
+/// The part of glass that is opaque: nothing, where it does not say that it lets light pass.
+fn glass_opacity(defined: &Defined, remarks: &mut Remarks) -> f64 {
+    let model = defined.material.model.unwrap_or_default();
+    remarks.see_through.add(format!("illum {model}"), defined);
+    defined
+        .material
+        .opacity()
+        .map_or(0.0, |(_, opacity)| opacity)
+}
+
 /// Materials of which the same is to be said.
 #[derive(Default)]
 struct Groups {
@@ -339,7 +349,7 @@ impl Import<'_> {
             (WarningKind::SeeThrough, "treated as solid:", &remarks.solid),
             (
                 WarningKind::Unsupported,
-                "gloss and relief are not computed, so these surfaces are matt and flat:",
+                "gloss and relief of these kinds are not computed:",
                 &remarks.matt,
             ),
         ] {
@@ -485,7 +495,13 @@ impl Import<'_> {
             cutting.as_ref(),
             remarks,
         );
-        let opacity = self.opacity(defined, shown, remarks);
+        let glass = defined.material.glass().filter(|_| {
+            shown.has_faces && !self.options.is_opaque && !self.options.is_matt
+        });
+        let opacity = match glass {
+            None => self.opacity(defined, shown, remarks),
+            Some(_) => glass_opacity(defined, remarks),
+        };
         if self.options.is_opaque {
             cutout = None;
         }
@@ -508,15 +524,22 @@ impl Import<'_> {
         };
         let id_of =
             |texture: &Option<Placed>| texture.as_ref().and_then(|placed| placed.texture.id);
+        let reflectance = color(diffuse, &reflecting, DEFAULT_REFLECTANCE);
+        let shine = defined.material.shine(match &reflecting {
+            Some(placed) => reflectance * self.mean_color(placed),
+            None => reflectance,
+        });
+        let shine = shine.filter(|_| glass.is_none() && !self.options.is_matt);
         let material = Material {
             name: name.clone(),
-            reflectance: color(diffuse, &reflecting, DEFAULT_REFLECTANCE),
+            reflectance: reflectance * shine.map_or(1.0, |shine| shine.diffuse),
             emission: color(emissive, &emitting, Vec3::ZERO),
             reflectance_texture: id_of(&reflecting),
             emission_texture: id_of(&emitting),
             opacity: opacity as f32,
             filter: defined.material.filter.unwrap_or(Vec3::ONE),
             cutout,
+            specular: glass.or(shine.map(|shine| shine.specular)),
         };
         let cutting = cutting.filter(|_| cutout.is_some());
         let mapping = self.mapping([reflecting, emitting, cutting], defined);
@@ -587,6 +610,15 @@ impl Import<'_> {
         };
         remarks.solid.add(written + why, defined);
         1.0
+    }
+
+    /// Mean colour of a texture.
+    fn mean_color(&self, placed: &Placed) -> Vec3 {
+        let texture = placed.texture.id.map(|id| &self.builder.textures[id.index()]);
+        texture.map_or(Vec3::ONE, |texture| {
+            let sum: Vec3 = texture.pixels.iter().sum();
+            sum / texture.pixels.len().max(1) as f32
+        })
     }
 
     /// How the material's textures lie; all share the coordinates of a face.

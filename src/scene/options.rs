@@ -25,6 +25,8 @@ pub struct SceneOptions {
     pub mtl_color_is_srgb: bool,
     /// Whether nothing lets light pass, whatever the materials say.
     pub is_opaque: bool,
+    /// Whether nothing mirrors, glosses or refracts, whatever the materials say.
+    pub is_matt: bool,
     /// The axis that points up; `None` recognises it.
     pub up: Option<UpAxis>,
 }
@@ -36,6 +38,7 @@ impl Default for SceneOptions {
             max_reflectance: DEFAULT_MAX_REFLECTANCE,
             mtl_color_is_srgb: false,
             is_opaque: false,
+            is_matt: false,
             up: None,
         }
     }

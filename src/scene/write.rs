@@ -14,7 +14,8 @@ use glam::{DVec3, Vec3};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb32FImage, RgbImage};
 
 use super::{
-    Cutout, Frame, Material, Scene, SceneOptions, Texture, TextureId, builtin, srgb_byte,
+    Cutout, Frame, Material, Scene, SceneOptions, Specular, Texture, TextureId, builtin,
+    mtl_specular::MIRROR_EXPONENT, srgb_byte,
     whole::write_whole,
 };
 
@@ -186,7 +187,7 @@ fn material_text(material: &Material, name: &str, [textures, cutouts]: [&[String
     if material.emission != Vec3::ZERO {
         text += &format!("Ke {}\n", triple(material.emission));
     }
-    if material.opacity < 1.0 {
+    if material.opacity < 1.0 && !(material.is_glass() && material.opacity <= 0.0) {
         text += &format!("d {}\n", material.opacity);
     }
     if material.filter != Vec3::ONE {
@@ -202,7 +203,30 @@ fn material_text(material: &Material, name: &str, [textures, cutouts]: [&[String
     };
     map("map_Kd", material.reflectance_texture);
     map("map_Ke", material.emission_texture);
-    text + "illum 1\n\n"
+    text + &specular_text(material.specular)
+}
+
+/// The statements of a mirror, gloss or glass, and the model of illumination.
+fn specular_text(specular: Option<Specular>) -> String {
+    let Some(specular) = specular else {
+        return "illum 1\n\n".to_owned();
+    };
+    let Vec3 { x, y, z } = specular.color();
+    match specular {
+        Specular::Mirror { .. } => format!("Ks {x} {y} {z}\nillum 3\n\n"),
+        Specular::Gloss { roughness, .. } => {
+            let exponent = 2.0 / (roughness * roughness) - 2.0;
+            // Larger exponents mean mirrors.
+            let width = match exponent < MIRROR_EXPONENT {
+                true => format!("Ns {}", exponent.max(0.0)),
+                false => format!("Pr {}", roughness.sqrt()),
+            };
+            format!("Ks {x} {y} {z}\n{width}\nillum 2\n\n")
+        }
+        Specular::Glass { index, is_thin } => {
+            format!("Ni {index}\nillum {}\n\n", if is_thin { 4 } else { 7 })
+        }
+    }
 }
 
 /// One word for each material, all different: readers cut names at blanks.

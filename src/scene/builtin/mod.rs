@@ -8,6 +8,7 @@ mod courtyard;
 pub mod exact;
 mod furnace;
 mod gallery;
+mod glossy;
 mod interiors;
 mod palette;
 mod pictures;
@@ -98,7 +99,7 @@ const fn view(position: [f64; 3], target: [f64; 3]) -> Viewpoint {
     }
 }
 
-static BUILTINS: [Builtin; 16] = [
+static BUILTINS: [Builtin; 17] = [
     Builtin {
         name: "gallery",
         summary: "a hall with columns, a staircase, furniture and pictures, lit by windows and warm spots",
@@ -146,6 +147,13 @@ static BUILTINS: [Builtin; 16] = [
         summary: "a small room with textures: floor tiles, a poster and a patterned light",
         viewpoint: view([2.6, 1.5, 0.25], [1.1, 1.0, 3.0]),
         faces: tiled_room::tiled_room,
+        environment: None,
+    },
+    Builtin {
+        name: "glossy",
+        summary: "a room with a mirror as one wall, a polished floor, a sphere of glass and leaves in a pot of brass",
+        viewpoint: view([3.3, 1.55, 0.25], [1.35, 0.9, 3.0]),
+        faces: glossy::glossy,
         environment: None,
     },
     Builtin {
