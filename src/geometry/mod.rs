@@ -2,6 +2,7 @@
 //! Everything here is in frame units and knows nothing of light.
 
 mod lanes;
+mod mirrors;
 mod panes;
 mod polygon;
 mod rays;
@@ -9,6 +10,7 @@ mod sampling;
 mod wide;
 
 pub use lanes::Vectors4;
+pub use mirrors::{Followed, Image, Mirrors};
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};
 pub use rays::{Hit, Passage, RAY_OFFSET, RayTree};
 pub use sampling::{

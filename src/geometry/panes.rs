@@ -119,7 +119,7 @@ pub(super) fn mean(transmission: Vec3) -> f32 {
 }
 
 /// A number in 0…1 for a ray and a triangle.
-fn chance(origin: Vec3, direction: Vec3, triangle: u32) -> f32 {
+pub(super) fn chance(origin: Vec3, direction: Vec3, triangle: u32) -> f32 {
     let bits = origin.to_array().into_iter().chain(direction.to_array());
     let hash = bits
         .map(f32::to_bits)

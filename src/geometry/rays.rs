@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{
+    mirrors::{Followed, Mirrors},
     panes::{self, Panes},
     wide::{Ray, Reach, Tree},
 };
@@ -47,6 +48,8 @@ pub struct RayTree {
     crossings: f32,
     /// Nothing where all triangles are opaque.
     panes: Option<Box<Panes>>,
+    /// Nothing where there is no plane mirror.
+    mirrors: Option<Box<Mirrors>>,
 }
 
 impl RayTree {
@@ -56,6 +59,7 @@ impl RayTree {
             tree: Tree::new(&[]),
             crossings: 0.0,
             panes: None,
+            mirrors: None,
         }
     }
 
@@ -72,6 +76,7 @@ impl RayTree {
             tree: Tree::new(&triangles),
             crossings: crossings(&triangles),
             panes: Panes::of(scene),
+            mirrors: Mirrors::of(scene),
         }
     }
 
@@ -79,6 +84,33 @@ impl RayTree {
     /// lie beside each other; as many as there are where all lie across each other.
     pub fn crossings(&self) -> f32 {
         self.crossings
+    }
+
+    /// The plane mirrors, if there are any.
+    pub fn mirrors(&self) -> Option<&Mirrors> {
+        self.mirrors.as_deref()
+    }
+
+    /// As [`Self::closest`], over the plane mirrors on the way, with the tint of the light that comes along.
+    pub fn followed(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Followed {
+        match self.mirrors() {
+            Some(mirrors) => mirrors.follow(self, origin, direction, from),
+            None => {
+                let hit = self.closest(origin, direction, from);
+                Followed {
+                    hit,
+                    origin,
+                    direction,
+                    tint: self.tint(origin, direction, from, hit),
+                    is_mirrored: false,
+                }
+            }
+        }
+    }
+
+    /// Whether rays to surfaces may lose some of their light, by colour, on the way.
+    pub fn has_tints(&self) -> bool {
+        self.has_coloured_panes() || self.mirrors.is_some()
     }
 
     /// Whether light passes through a triangle.
@@ -263,7 +295,9 @@ impl RayTree {
 
     /// Bytes that the tree holds.
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes() + self.panes.as_ref().map_or(0, |panes| panes.memory_bytes())
+        let panes = self.panes.as_ref().map_or(0, |panes| panes.memory_bytes());
+        let mirrors = self.mirrors().map_or(0, Mirrors::memory_bytes);
+        self.tree.memory_bytes() + panes + mirrors
     }
 }
 

@@ -58,11 +58,23 @@ impl ElementColors {
 }
 
 impl Hierarchy {
-    /// Mean reflectance of an element.
-    pub fn reflectance_of(&self, element: usize) -> Vec3 {
+    /// Mean diffuse reflectance of an element.
+    pub fn diffuse_reflectance_of(&self, element: usize) -> Vec3 {
         match self.colors.of(element) {
             Some(varied) => varied.shown.reflectance,
             None => self.patch_of(element).reflectance,
+        }
+    }
+
+    /// Mean reflectance of an element with what mirrors, gloss and glass reflect as if it were diffuse.
+    pub fn reflectance_of(&self, element: usize) -> Vec3 {
+        let diffuse = self.diffuse_reflectance_of(element);
+        match self.diffused.get(self.mesh.elements[element].patch as usize) {
+            Some(&diffused) if diffused != Vec3::ZERO => {
+                let most = Vec3::splat(self.max_reflectance);
+                (diffuse + diffused * self.opacity_of(element)).min(most)
+            }
+            _ => diffuse,
         }
     }
 
@@ -87,7 +99,10 @@ impl Hierarchy {
         let patches = self.patches.par_iter().map(|patch| patch.reflectance);
         let varied = self.colors.varied.par_iter();
         let all = patches.chain(varied.map(|varied| varied.shown.reflectance));
-        all.map(Vec3::max_element).reduce(|| 0.0, f32::max)
+        let diffuse = all.map(Vec3::max_element).reduce(|| 0.0, f32::max);
+        let with_specular = (0..self.diffused.len()).into_par_iter();
+        let with_specular = with_specular.map(|patch| self.reflectance_of(patch).max_element());
+        diffuse.max(with_specular.reduce(|| 0.0, f32::max))
     }
 
     /// Means of the textures over an element.

@@ -78,8 +78,11 @@ impl PatchTree {
     pub fn lit(&self, scene: &Scene, active: &ActiveMaterials) -> Vec<bool> {
         let material = |patch: &Patch| scene.triangles[patch.triangle.index()].material;
         let emits = |patch: &Patch| patch.emission != Vec3::ZERO || active.emits(material(patch));
-        let reflects =
-            |patch: &Patch| patch.reflectance != Vec3::ZERO || active.reflects(material(patch));
+        let reflects = |patch: &Patch| {
+            patch.reflectance != Vec3::ZERO
+                || active.reflects(material(patch))
+                || scene.materials[material(patch).index()].specular.is_some()
+        };
         let all = self.marked(|_| true);
         let mut lit: Vec<bool> = self
             .patches

@@ -29,7 +29,7 @@ pub use tables::Tables;
 
 use glam::Vec3;
 
-use crate::scene::{Scene, TriangleId};
+use crate::scene::{Material, Scene, TriangleId};
 use colors::ElementColors;
 
 /// Tasks that work over the patches is shared into, where there are as many. Fewer, and threads wait for the last one; more,
@@ -167,6 +167,10 @@ pub struct Hierarchy {
     sides: Vec<[u32; 2]>,
     /// Where elements differ from their patch.
     colors: ElementColors,
+    /// By patch, what mirrors, gloss and glass reflect of what rays meet and is counted as diffuse; empty where nothing is.
+    diffused: Vec<Vec3>,
+    /// Reflectances are at most this.
+    max_reflectance: f32,
 }
 
 impl Hierarchy {
@@ -211,7 +215,23 @@ impl Hierarchy {
             importance,
             sides,
             colors: ElementColors::default(),
+            diffused: Vec::new(),
+            max_reflectance: scene.max_reflectance,
         })
+    }
+
+    /// Count as diffuse what mirrors, gloss and glass reflect, but for the triangles whose images in mirrors are followed.
+    pub fn diffuse_specular(&mut self, scene: &Scene, is_followed: impl Fn(TriangleId) -> bool) {
+        let materials = scene.materials.iter();
+        let by_material: Vec<Vec3> = materials.map(Material::diffused_specular).collect();
+        if by_material.iter().all(|&diffused| diffused == Vec3::ZERO) {
+            return;
+        }
+        let of = |patch: &Patch| match is_followed(patch.triangle) {
+            true => Vec3::ZERO,
+            false => by_material[scene.triangles[patch.triangle.index()].material.index()],
+        };
+        self.diffused = self.patches.iter().map(of).collect();
     }
 
     /// The root cluster.

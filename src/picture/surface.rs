@@ -119,16 +119,11 @@ impl LitScene<'_> {
 
     /// What a surface reflects of light from all directions, in whatever directions.
     pub(super) fn reflectance(&self, surface: &Surface) -> Vec3 {
-        let Some(specular) = surface.specular else {
+        if surface.specular.is_none() {
             return surface.reflectance;
-        };
-        let material = self.scene.material(surface.triangle);
-        let part = match material.is_glass() {
-            true => (1.0 - material.opacity) / material.met_share().max(f32::MIN_POSITIVE),
-            false => material.share_of_met(),
-        };
-        let all = surface.reflectance + specular.mean_reflectance() * part;
-        all.min(Vec3::splat(self.scene.max_reflectance))
+        }
+        let diffused = self.scene.material(surface.triangle).diffused_specular();
+        (surface.reflectance + diffused).min(Vec3::splat(self.scene.max_reflectance))
     }
 
     /// The normal of the smooth surface, and the place on it: the point's projections onto the tangent planes of the

@@ -126,6 +126,19 @@ impl Material {
         if met > 0.0 { self.opacity / met } else { 0.0 }
     }
 
+    /// What mirrors, gloss and glass reflect of light from all directions, of what rays meet, by channel, 0…1.
+    pub fn diffused_specular(&self) -> Vec3 {
+        let Some(specular) = self.specular else {
+            return Vec3::ZERO;
+        };
+        let part = match self.is_glass() {
+            // What glass reflects is met, as what it lets pass is not.
+            true => (1.0 - self.opacity) / self.met_share().max(f32::MIN_POSITIVE),
+            false => self.share_of_met(),
+        };
+        (specular.mean_reflectance() * part).min(Vec3::ONE)
+    }
+
     /// Bring what mirrors and gloss reflect into its range: with the diffuse part at most 1 in each channel, both scaled alike.
     /// Whether that changed the diffuse part.
     pub(super) fn limit_specular(&mut self) -> bool {
@@ -175,6 +188,13 @@ impl Scene {
             Some(see_through) if !see_through.has_at(barycentric) => 0.0,
             Some(_) => self.material(triangle).met_share(),
         }
+    }
+
+    /// Whether some surface mirrors, glosses or refracts.
+    pub fn has_specular(&self) -> bool {
+        self.materials
+            .iter()
+            .any(|material| material.specular.is_some())
     }
 
     /// A copy whose glass lets nothing pass; `None` where there is no glass.

@@ -102,7 +102,8 @@ impl Plan {
         let is_clear = || {
             let is_clear_outside =
                 is_dark_outside || tree.is_enclosed(scene) || tree.is_open(scene);
-            is_clear_outside && tree.is_clear(scene)
+            // Mirrors show what no surface faces.
+            is_clear_outside && !scene.has_specular() && tree.is_clear(scene)
         };
         if may_omit(Omission::Rays) && is_clear() {
             // The paper's methods are chosen to be studied, so nothing of them is omitted.

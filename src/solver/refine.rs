@@ -18,10 +18,10 @@ use super::{
     vertices::LeafLight,
 };
 use crate::{
-    geometry::{Random, RayTree},
+    geometry::{Image, Random, RayTree},
     hierarchy::{Channels as _, Hierarchy, NodeId, luminance},
     transport::{
-        Estimate, Judge, Link, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement, Refiner,
+        Estimate, Judge, Kernel, Link, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement, Refiner,
     },
 };
 
@@ -91,7 +91,7 @@ impl Refining<'_> {
         while passes < MOST_PASSES {
             let is_first = linked.links.is_empty();
             let surfaces = Surfaces::new(hierarchy, direct);
-            let found = self.pass(surfaces, linked, judged, refined.epsilon);
+            let found = self.pass(surfaces, linked, None, judged, refined.epsilon);
             self.cancel.proceed()?;
             // Where links do not fit, start again with fewer, or leave the present ones.
             if !found.fits {
@@ -125,10 +125,38 @@ impl Refining<'_> {
             refined.ray_count += direct.sample(self.rays, hierarchy, self.limits, self.cancel)?;
             linked.pull(Surfaces::new(hierarchy, direct));
         }
+        self.refine_images(Surfaces::new(hierarchy, direct), linked, &mut refined)?;
         if self.rays.has_coloured_panes() {
             refined.ray_count += self.tint_links(hierarchy, linked)?;
         }
         Some(refined)
+    }
+
+    /// Refine the links over mirrors to the same threshold, without division of elements. Where they do not fit into memory,
+    /// the present ones stay. `None` when cancelled.
+    fn refine_images(
+        &self,
+        surfaces: Surfaces<'_>,
+        linked: &mut LinkedLight,
+        refined: &mut Refined,
+    ) -> Option<()> {
+        for number in 0..linked.images.len() {
+            let image = linked.images[number].image.clone();
+            // What mirrors take, they take of errors, too.
+            let epsilon = refined.epsilon / image.reflectance().max_element();
+            let seen = (&*image, &linked.images[number].links);
+            let found = self.pass(surfaces, linked, Some(seen), None, epsilon);
+            self.cancel.proceed()?;
+            if !found.fits {
+                refined.is_full = true;
+                continue;
+            }
+            refined.ray_count += found.ray_count;
+            let node_count = surfaces.hierarchy.node_count();
+            linked.images[number].links =
+                LinkStore::from_runs(node_count, &found.runs, &found.links);
+        }
+        Some(())
     }
 
     /// Estimate what coloured panes make of the light of each link. Returns the rays shot; `None` when cancelled.
@@ -141,6 +169,7 @@ impl Refining<'_> {
             areas: &areas,
             powers: &powers,
             rays: self.rays,
+            image: None,
         };
         let links = &linked.links;
         let found: Vec<(Vec3, u32)> = (0..hierarchy.node_count() as u32)
@@ -164,12 +193,13 @@ impl Refining<'_> {
         Some(rays.into_iter().map(u64::from).sum())
     }
 
-    /// Judge all links and replace those whose errors exceed the threshold. `judged` is the number of nodes when they
-    /// were last judged by it. Incomplete when cancelled.
+    /// Judge all links, or those from an image in mirrors, and replace those whose errors exceed the threshold. `judged` is
+    /// the number of nodes when they were last judged by it. Incomplete when cancelled.
     fn pass(
         &self,
         surfaces: Surfaces<'_>,
         linked: &LinkedLight,
+        seen: Option<(&Image, &LinkStore)>,
         judged: Option<usize>,
         epsilon: f32,
     ) -> Refinement {
@@ -183,9 +213,14 @@ impl Refining<'_> {
         let areas = PatchSums::of_area(hierarchy, &linked.power);
         let powers = PatchSums::of_power(hierarchy, &linked.power);
         // The judge of pairs, and the walk over all of them.
+        let image = seen.map(|(image, _)| image);
+        let links = seen.map_or(&linked.links, |(_, links)| links);
         let refiner = Refiner {
             judge: Judge {
-                kernel: linked.kernel(hierarchy, settings.method.reading()),
+                kernel: Kernel {
+                    image,
+                    ..linked.kernel(hierarchy, settings.method.reading())
+                },
                 estimate: match settings.oracle {
                     Oracle::Interval => Estimate::Interval,
                     Oracle::Samples => Estimate::Samples(settings.samples),
@@ -197,9 +232,10 @@ impl Refining<'_> {
                     areas: &areas,
                     powers: &powers,
                     rays: self.rays,
+                    image,
                 },
             },
-            links_of: |node| linked.links.of(node),
+            links_of: |node| links.of(node),
             judged,
             threshold: epsilon * self.mean_irradiance,
             min_area: self.limits.min_area,
@@ -210,7 +246,7 @@ impl Refining<'_> {
             follows_light: self.plan.follows_light,
             spreads: &spreads,
         };
-        refiner.refine(linked.links.is_empty())
+        refiner.refine(links.is_empty())
     }
 
     /// By element, the variation of the radiosity of a leaf (half the range of its corners, luminance), from the

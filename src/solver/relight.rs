@@ -38,9 +38,20 @@ impl Solver {
             hierarchy: &self.hierarchy,
             tables,
             reading: self.settings.method.reading(),
+            image: None,
         };
         let (surfaces, links) = (self.surfaces(), &self.linked.links);
-        vertices::gather_leaves(kernel, surfaces, links, &self.coverage, cancel)
+        let coverage = Some(&self.coverage);
+        let mut leaves = vertices::gather_leaves(kernel, surfaces, links, coverage, cancel)?;
+        for image in &self.linked.images {
+            let kernel = Kernel {
+                image: Some(&image.image),
+                ..kernel
+            };
+            let seen = vertices::gather_leaves(kernel, surfaces, &image.links, None, cancel)?;
+            vertices::add_mirrored(&mut leaves, &seen, image.image.reflectance());
+        }
+        Some(leaves)
     }
 
     /// Factors of the linked light by vertex, as precise as a step of this threshold scale needs them.
@@ -76,7 +87,8 @@ impl Solver {
         cancel.proceed()?;
         let appearances = self.scene.allowed(wished);
         let active = self.scene.active_materials(&appearances);
-        let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
+        let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active)
+            || !self.linked.images.is_empty();
         // Store the present light before it changes. Light from outside stays as it is.
         let has_outside = self.direct.brightest_outside() != Vec4::ZERO;
         let factor =

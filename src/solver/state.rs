@@ -105,7 +105,10 @@ impl Solver {
                 None => Arc::new(RayTree::new(&scene)),
             },
         );
-        let hierarchy = hierarchy?;
+        let mut hierarchy = hierarchy?;
+        hierarchy.diffuse_specular(&scene, |triangle| {
+            rays.mirrors().is_some_and(|mirrors| mirrors.has(triangle))
+        });
         cancel.proceed()?;
         let ray_count = plan.probe_outside(&scene, &hierarchy, &rays, &settings);
         cancel.proceed()?;
@@ -150,7 +153,10 @@ impl Solver {
         painted.divide(&mut self.hierarchy, limits.min_area, limits.most_elements);
         self.linked.extend(&self.hierarchy);
         let sees_outside = self.plan.sees_outside;
-        self.direct = DirectFields::new(&self.scene, &self.hierarchy, &self.settings, sees_outside);
+        let (scene, rays) = (&self.scene, &self.rays);
+        self.direct =
+            DirectFields::new(scene, &self.hierarchy, &self.settings, sees_outside, rays);
+        self.linked.show_images(rays);
         cancel.proceed()?;
         // Divide large elements and contact elements.
         let limits = self.limits(1.0);

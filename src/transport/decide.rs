@@ -2,14 +2,14 @@
 //! nodes.
 
 use super::{
-    Judgement, Link, element_form_factor, element_form_factors, is_too_near_for_tables,
+    Judgement, Kernel, Link,
     kernel::inner_points,
     link::LEAST_RAYS,
     refiner::{Decision, Refinement, Refiner},
 };
 use crate::{
     geometry::Vectors4,
-    hierarchy::{Channels as _, Hierarchy, Kind, NodeId},
+    hierarchy::{Channels as _, Kind, NodeId},
 };
 
 /// Most visibility rays of a link. Fewer, and strong links are noisy; more cost time.
@@ -58,7 +58,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if let Some(decision) = self.decide_by_plan(source, receiver, known, weight, out) {
             return decision;
         }
-        if source == receiver {
+        if self.is_own(source, receiver) {
             return self.decide_self(source, weight, known, out);
         }
         let mut random = self.random(source, receiver);
@@ -82,7 +82,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
                 self.link(source, receiver, error, ray_count, out)
             }
         };
-        if is_too_near_for_tables(self.hierarchy(), source, receiver) {
+        if self.judge.kernel.is_too_near_for_tables(source, receiver) {
             // A few rays must not decide: among pairs of low visibility, only those without any hit would stay.
             return Decision::Keep(link.with_error(bound));
         }
@@ -191,7 +191,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let mut random = self.random(source, receiver);
         let hierarchy = self.hierarchy();
         let sampler = self.judge.sampler;
-        let (visibility, of_area) = if is_too_near_for_tables(self.hierarchy(), source, receiver) {
+        let (visibility, of_area) = if self.judge.kernel.is_too_near_for_tables(source, receiver) {
             let ray_count = (2 * ray_count).clamp(*NEAR_RAYS.start(), *NEAR_RAYS.end());
             out.ray_count += u64::from(ray_count);
             let seen = sampler.seen_fraction(source, receiver, ray_count, &mut random);
@@ -208,7 +208,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         };
         match (hierarchy.kind(source), hierarchy.kind(receiver)) {
             (Kind::Element(from), Kind::Element(to)) => {
-                let form_factor = visibility * area_form_factor(hierarchy, from, to);
+                let form_factor = visibility * area_form_factor(self.judge.kernel, from, to);
                 Link::between_elements(source, visibility, form_factor, error)
             }
             _ => Link::over_tables(source, visibility, of_area, error),
@@ -217,25 +217,29 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
 }
 
 /// Unoccluded form factor from a receiving element to a source, 0…1; averaged over the receiver where they are near.
-fn area_form_factor(hierarchy: &Hierarchy, source: usize, receiver: usize) -> f32 {
+fn area_form_factor(kernel: Kernel<'_>, source: usize, receiver: usize) -> f32 {
+    let hierarchy = kernel.hierarchy;
     let (from, to) = (
         &hierarchy.mesh.elements[source],
         &hierarchy.mesh.elements[receiver],
     );
     let normal = hierarchy.patch_of(receiver).normal;
-    let distance = from.centroid.distance(to.centroid);
+    let distance = kernel.seen_at(from.centroid).distance(to.centroid);
     if distance > 2.0 * (from.radius + to.radius) {
-        return element_form_factor(hierarchy, source, to.centroid, normal);
+        return kernel.element_form_factor(source, to.centroid, normal);
     }
     let points = inner_points(hierarchy.mesh.corners(receiver));
     let normals = Vectors4::splat(normal);
-    element_form_factors(hierarchy, source, &points, &normals).element_sum() * 0.25
+    kernel.element_form_factors(source, &points, &normals).element_sum() * 0.25
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{SceneOptions, Sides, builtin};
+    use crate::{
+        hierarchy::{Hierarchy, Tables},
+        scene::{SceneOptions, Sides, builtin},
+    };
 
     #[test]
     fn form_factors_of_plates_are_those_of_closed_forms() {
@@ -249,13 +253,19 @@ mod tests {
                 let leaves: Vec<u32> = hierarchy.mesh.leaves().map(|leaf| leaf as u32).collect();
                 hierarchy.mesh.divide(&leaves);
             }
+            let kernel = Kernel {
+                hierarchy: &hierarchy,
+                tables: &Tables::default(),
+                reading: None,
+                image: None,
+            };
             let emits = |leaf: &usize| hierarchy.patch_of(*leaf).emission.x > 0.0;
             let (sources, receivers): (Vec<usize>, Vec<usize>) =
                 hierarchy.mesh.leaves().partition(emits);
             let sum: f32 = receivers
                 .iter()
                 .flat_map(|&receiver| sources.iter().map(move |&source| (source, receiver)))
-                .map(|(source, receiver)| area_form_factor(&hierarchy, source, receiver))
+                .map(|(source, receiver)| area_form_factor(kernel, source, receiver))
                 .sum();
             let mean = sum / receivers.len() as f32;
             assert!(

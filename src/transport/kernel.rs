@@ -8,7 +8,7 @@ use std::f32::consts::PI;
 use glam::{Vec3, Vec4};
 
 use crate::{
-    geometry::{Vectors4, centroid, irradiance_vector, point_irradiance, point_irradiances},
+    geometry::{Image, Vectors4, centroid, irradiance_vector, point_irradiance, point_irradiances},
     hierarchy::{Channels as _, Hierarchy, Kind, Moments, NodeId, Quantity as _, Reading, Tables},
 };
 
@@ -98,6 +98,9 @@ pub struct Kernel<'a> {
     pub tables: &'a Tables,
     /// How moments are read; `None` sums over the patches of a cluster (eq. 3).
     pub reading: Option<Reading>,
+    /// The image of the sources that receivers see instead of them, without what mirrors take of its light. A mirrored source
+    /// has the same tables, read in mirrored directions.
+    pub image: Option<&'a Image>,
 }
 
 impl Kernel<'_> {
@@ -138,13 +141,48 @@ impl Kernel<'_> {
         sum
     }
 
+    /// The place of a source that a place of receivers stands for.
+    pub(super) fn source_of(&self, place: Vec3) -> Vec3 {
+        self.image.map_or(place, |image| image.source_of(place))
+    }
+
+    /// The same of directions.
+    pub(super) fn source_direction(&self, direction: Vec3) -> Vec3 {
+        self.image
+            .map_or(direction, |image| image.source_direction(direction))
+    }
+
+    /// Where receivers see a place of a source.
+    pub(super) fn seen_at(&self, point: Vec3) -> Vec3 {
+        self.image.map_or(point, |image| image.place(point))
+    }
+
+    /// In which direction they see one.
+    pub(super) fn seen_direction(&self, direction: Vec3) -> Vec3 {
+        self.image
+            .map_or(direction, |image| image.direction(direction))
+    }
+
+    /// Points or normals of receivers as sources see them.
+    fn sources_of(&self, values: &Vectors4, of: impl Fn(&Image, Vec3) -> Vec3) -> Vectors4 {
+        match self.image {
+            None => *values,
+            Some(image) => Vectors4::new(values.to_array().map(|value| of(image, value))),
+        }
+    }
+
+    /// Where receivers see the centre of the power of a cluster.
+    pub fn centre(&self, cluster: usize) -> Vec3 {
+        self.seen_at(self.tables.centres[cluster])
+    }
+
     /// A cluster as seen from a point.
     pub fn sight(&self, cluster: usize, point: Vec3) -> Sight {
-        let centre = self.tables.centres[cluster];
+        let centre = self.centre(cluster);
         let extent = self.extent(self.hierarchy.clusters[cluster].radius);
         let separation = point - centre;
         let squared = separation.length_squared();
-        let unit = separation / squared.sqrt();
+        let unit = self.source_direction(separation / squared.sqrt());
         let spread = spread(extent, squared);
         let power = if squared <= 0.0 || !unit.is_finite() {
             Vec4::ZERO
@@ -175,12 +213,13 @@ impl Kernel<'_> {
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => self.sight(index, point).incident(point),
             Kind::Element(index) => {
+                let point = self.source_of(point);
                 let squared = point.distance_squared(self.tables.centre(self.hierarchy, source));
                 let spread = spread(self.extent(self.hierarchy.radius(source)), squared);
                 let vector = element_vector(self.hierarchy, index, point);
                 let length = vector.length();
                 let towards_source = if length > 0.0 {
-                    vector / length
+                    self.seen_direction(vector / length)
                 } else {
                     Vec3::ZERO
                 };
@@ -226,8 +265,7 @@ impl Kernel<'_> {
         match self.hierarchy.kind(source) {
             Kind::Cluster(_) => self.vector_irradiance(source, point).on_face(normal),
             Kind::Element(index) => {
-                self.tables.elements[index]
-                    * element_form_factor(self.hierarchy, index, point, normal)
+                self.tables.elements[index] * self.element_form_factor(index, point, normal)
             }
         }
     }
@@ -243,7 +281,7 @@ impl Kernel<'_> {
                 })
             }
             Kind::Element(index) => {
-                let factors = element_form_factors(self.hierarchy, index, points, normals);
+                let factors = self.element_form_factors(index, points, normals);
                 let radiosity = self.tables.elements[index];
                 // Written out: a `map` compiles to a call for every link.
                 [
@@ -254,6 +292,37 @@ impl Kernel<'_> {
                 ]
             }
         }
+    }
+}
+
+impl Kernel<'_> {
+    /// As the function of this name.
+    pub(super) fn element_form_factor(&self, source: usize, point: Vec3, normal: Vec3) -> f32 {
+        let (point, normal) = (self.source_of(point), self.source_direction(normal));
+        element_form_factor(self.hierarchy, source, point, normal)
+    }
+
+    /// As the function of this name.
+    pub(super) fn element_form_factors(
+        &self,
+        source: usize,
+        points: &Vectors4,
+        normals: &Vectors4,
+    ) -> Vec4 {
+        let points = self.sources_of(points, Image::source_of);
+        let normals = self.sources_of(normals, Image::source_direction);
+        element_form_factors(self.hierarchy, source, &points, &normals)
+    }
+
+    /// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is undetermined,
+    /// and the tables say nothing.
+    pub fn is_too_near_for_tables(&self, source: NodeId, receiver: NodeId) -> bool {
+        let hierarchy = self.hierarchy;
+        let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
+        let is_element = |&node: &NodeId| matches!(hierarchy.kind(node), Kind::Element(_));
+        let centre = self.seen_at(hierarchy.centroid(source));
+        !([source, receiver].iter().all(is_element))
+            && centre.distance(hierarchy.centroid(receiver)) <= reach
     }
 }
 

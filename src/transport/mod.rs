@@ -18,7 +18,7 @@ pub use bounds::Interval;
 pub use kernel::{Incident, Kernel, Sight, element_form_factor, element_form_factors};
 pub use link::{Link, LinkStore, TintedLink, TintedLinks};
 pub(crate) use oracle::self_irradiance;
-pub use oracle::{Estimate, Judge, Judgement, is_too_near_for_tables};
+pub use oracle::{Estimate, Judge, Judgement};
 pub use patch_sums::PatchSums;
 pub use refiner::{LinkBudget, Refinement, Refiner};
 pub use sights::Sights;

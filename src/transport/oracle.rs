@@ -82,7 +82,10 @@ impl Judge<'_> {
 
     /// Whether some point of each node can face the other.
     pub(super) fn face_each_other(&self, source: NodeId, receiver: NodeId) -> bool {
-        self.can_face(source, receiver) && self.can_face(receiver, source)
+        let kernel = self.kernel;
+        let as_source = |point: Vec3| kernel.source_of(point);
+        let as_seen = |point: Vec3| kernel.seen_at(point);
+        self.can_face(source, receiver, as_source) && self.can_face(receiver, source, as_seen)
     }
 
     /// Luminance of a quantity of light, with the ambient radiosity added.
@@ -100,8 +103,8 @@ impl Judge<'_> {
         luminance(self.tables().brightest(self.hierarchy(), node))
     }
 
-    /// Whether any face of `from` can face any point of `to`.
-    fn can_face(&self, from: NodeId, to: NodeId) -> bool {
+    /// Whether any face of `from` can face any point of `to`, which it sees where `place` puts it.
+    fn can_face(&self, from: NodeId, to: NodeId, place: impl Fn(Vec3) -> Vec3) -> bool {
         let hierarchy = self.hierarchy();
         match hierarchy.kind(from) {
             // Some corner of the other node, or of its box, must stand above the plane of the element.
@@ -109,7 +112,7 @@ impl Judge<'_> {
                 let element = &hierarchy.mesh.elements[index];
                 let normal = hierarchy.patch_of(index).normal;
                 let least = IN_PLANE * (element.radius + hierarchy.radius(to));
-                let height_of = |point: Vec3| (point - element.centroid).dot(normal);
+                let height_of = |point: Vec3| (place(point) - element.centroid).dot(normal);
                 match hierarchy.kind(to) {
                     // Some corner is at least as high as the centroid, which is cheaper to read.
                     Kind::Element(other) => {
@@ -122,16 +125,17 @@ impl Judge<'_> {
                     }
                     Kind::Cluster(other) => {
                         let cluster = &hierarchy.clusters[other];
-                        let middle = (cluster.min + cluster.max) * 0.5;
-                        let half = (cluster.max - cluster.min) * 0.5;
-                        height_of(middle) + half.dot(normal.abs()) > least
+                        let (min, max) = placed((cluster.min, cluster.max), &place);
+                        let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
+                        let height = (middle - element.centroid).dot(normal);
+                        height + half.dot(normal.abs()) > least
                     }
                 }
             }
             // Along some axis the cluster must have projected area towards a part of the other node's box.
             Kind::Cluster(index) => {
                 let cluster = &hierarchy.clusters[index];
-                let (min, max) = hierarchy.bounds(to);
+                let (min, max) = placed(hierarchy.bounds(to), &place);
                 let (least, most) = (min - cluster.max, max - cluster.min);
                 let faces = self.tables().clusters[index]
                     .six_faces()
@@ -149,7 +153,8 @@ impl Judge<'_> {
     fn interval(&self, source: NodeId, receiver: NodeId) -> Judgement {
         let hierarchy = self.hierarchy();
         let brightest = self.judged_brightest(source);
-        let (from, to) = (hierarchy.centroid(source), hierarchy.centroid(receiver));
+        let to = self.kernel.source_of(hierarchy.centroid(receiver));
+        let from = hierarchy.centroid(source);
         let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
         let distance = from.distance(to);
         if distance <= reach {
@@ -186,7 +191,7 @@ impl Judge<'_> {
         let brightest = self.brightest(source);
         let (from, to) = (
             self.tables().centre(hierarchy, source),
-            hierarchy.centroid(receiver),
+            self.kernel.source_of(hierarchy.centroid(receiver)),
         );
         // The centre of power need not be that of the sphere about the source.
         let offset = from.distance(hierarchy.centroid(source));
@@ -222,6 +227,7 @@ impl Judge<'_> {
         for _ in 0..count {
             let (from, _) = self.sampler.point_on(source, random);
             let (to, _) = self.sampler.point_on(receiver, random);
+            let to = self.kernel.source_of(to);
             let irradiance = self
                 .transferred(source, receiver, to - from, area)
                 .min(brightest);
@@ -244,20 +250,19 @@ impl Judge<'_> {
             return f32::INFINITY;
         }
         let power = self.judged(self.kernel.projected_power(source, unit));
-        power * self.kernel.projected_power(receiver, -unit).area() / (PI * squared * area)
+        let toward_source = self.kernel.seen_direction(-unit);
+        let turned = self.kernel.projected_power(receiver, toward_source).area();
+        power * turned / (PI * squared * area)
     }
 }
 
-/// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is undetermined,
-/// and the tables say nothing.
-pub fn is_too_near_for_tables(hierarchy: &Hierarchy, source: NodeId, receiver: NodeId) -> bool {
-    let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
-    let is_element = |&node: &NodeId| matches!(hierarchy.kind(node), Kind::Element(_));
-    !([source, receiver].iter().all(is_element))
-        && hierarchy
-            .centroid(source)
-            .distance(hierarchy.centroid(receiver))
-            <= reach
+/// The box about a box whose points are moved by an isometry.
+fn placed((min, max): (Vec3, Vec3), place: &impl Fn(Vec3) -> Vec3) -> (Vec3, Vec3) {
+    let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
+    let centre = place(middle);
+    let along = |axis: Vec3| (place(middle + axis) - centre).abs();
+    let reach = along(Vec3::X * half.x) + along(Vec3::Y * half.y) + along(Vec3::Z * half.z);
+    (centre - reach, centre + reach)
 }
 
 /// Mean irradiance of a cluster that received all of this power itself.

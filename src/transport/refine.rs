@@ -175,7 +175,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             Decision::DivideSource => {
                 pending.extend(self.hierarchy().children(source).rev().map(NodeId));
             }
-            Decision::DivideReceiver if source == receiver => {
+            Decision::DivideReceiver if self.is_own(source, receiver) => {
                 down.extend(self.hierarchy().children(receiver).map(NodeId));
             }
             Decision::DivideReceiver => {
@@ -233,6 +233,7 @@ mod tests {
                     hierarchy: &hierarchy,
                     tables: &tables,
                     reading: Some(Reading::Bounded),
+                    image: None,
                 },
                 estimate: Estimate::Interval,
                 ambient: 0.0,
@@ -242,6 +243,7 @@ mod tests {
                     areas: &areas,
                     powers: &powers,
                     rays: &rays,
+                    image: None,
                 },
             },
             links_of: |node| none.of(node),

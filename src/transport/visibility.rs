@@ -12,7 +12,7 @@ use glam::{Vec3, Vec4};
 use super::{luminance, patch_sums::PatchSums};
 use crate::{
     geometry::{
-        Random, RayTree, Vectors4, barycentric_in_plane, cosine_direction, point_irradiances,
+        Followed, Image, Random, RayTree, Vectors4, barycentric_in_plane, cosine_direction, point_irradiances,
         triangle_point,
     },
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Tables},
@@ -152,6 +152,8 @@ pub struct PairSampler<'a> {
     pub powers: &'a PatchSums,
     /// The occluders.
     pub rays: &'a RayTree,
+    /// The image of the sources that receivers see instead of them.
+    pub image: Option<&'a Image>,
 }
 
 impl PairSampler<'_> {
@@ -322,7 +324,7 @@ impl PairSampler<'_> {
         for _ in 0..CANDIDATES {
             let candidate = self.sample_source(source, random);
             let to = self.sample(receiver, random);
-            let weight = transfer(&candidate.from, &to);
+            let weight = self.transfer(&candidate.from, &to);
             sum += weight;
             if chosen.is_none() || random.uniform() * sum < weight {
                 chosen = Some((candidate, to));
@@ -331,8 +333,29 @@ impl PairSampler<'_> {
         let (candidate, to) = chosen?;
         let from = candidate.from;
         let ends = [Some(to.triangle), Some(from.triangle)];
-        let passing = self.rays.transmittance(to.point, from.point, ends);
+        let passing = match self.image {
+            None => self.rays.transmittance(to.point, from.point, ends),
+            Some(image) => {
+                let passage = image.passage(self.rays, to.point, from.point, ends);
+                passage.transmittance
+            }
+        };
         Some((candidate, sum, passing))
+    }
+
+    /// Unoccluded transfer between two points for a radiosity of 1, up to a factor common to all pairs of points.
+    fn transfer(&self, from: &Sample, to: &Sample) -> f32 {
+        match self.image {
+            None => transfer(from, to),
+            Some(image) => {
+                let to = Sample {
+                    point: image.source_of(to.point),
+                    normal: image.source_direction(to.normal),
+                    ..*to
+                };
+                transfer(from, &to)
+            }
+        }
     }
 
     /// Mean form factor from a receiver to a source, occlusion included, by cosine-weighted rays from random points of
@@ -353,20 +376,40 @@ impl PairSampler<'_> {
         for _ in 0..ray_count {
             let from = self.sample(&receiver, random);
             let direction = cosine_direction(from.normal, random.uniform_2d());
-            let start = Some(from.triangle);
-            let hit = self.rays.closest(from.point, direction, start);
-            let is_met = hit.is_some_and(|hit| {
-                let point = from.point + direction * hit.distance;
+            let Some(end) = self.end_of(&from, direction) else {
+                continue;
+            };
+            let is_met = end.hit.is_some_and(|hit| {
+                let point = end.origin + end.direction * hit.distance;
                 self.hierarchy
-                    .patch_met(hit.triangle, direction)
+                    .patch_met(hit.triangle, end.direction)
                     .is_some_and(|patch| self.holds(source, patch, point))
             });
             if is_met {
-                let tint = self.rays.tint(from.point, direction, start, hit);
-                met += tint.element_sum() / 3.0;
+                met += end.tint.element_sum() / 3.0;
             }
         }
         met / ray_count.max(1) as f32
+    }
+
+    /// The end of a ray from a receiver, behind the mirrors of the image; `None` where it misses them.
+    fn end_of(&self, from: &Sample, direction: Vec3) -> Option<Followed> {
+        let start = Some(from.triangle);
+        if let Some(image) = self.image {
+            return image.met(self.rays, from.point, direction, start);
+        }
+        let hit = self.rays.closest(from.point, direction, start);
+        Some(Followed {
+            hit,
+            origin: from.point,
+            direction,
+            // Of what meets nothing there is no light.
+            tint: match hit {
+                Some(_) => self.rays.tint(from.point, direction, start, hit),
+                None => Vec3::ONE,
+            },
+            is_mirrored: false,
+        })
     }
 
     /// The part of the area of a cluster that rays meet, above 0: its radiosity is a mean over all of the area.
@@ -414,7 +457,7 @@ impl PairSampler<'_> {
     }
 }
 
-/// Unoccluded transfer between two points for a radiosity of 1, up to a factor common to all pairs of points.
+/// See [`PairSampler::transfer`].
 fn transfer(from: &Sample, to: &Sample) -> f32 {
     let separation = to.point - from.point;
     let squared = separation.length_squared();

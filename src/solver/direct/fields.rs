@@ -9,7 +9,7 @@ use glam::Vec4;
 
 use super::{field::DirectField, lights::Lights, samples::DirectLight, scale::Surroundings};
 use crate::{
-    geometry::RayTree,
+    geometry::{Mirrors, RayTree},
     hierarchy::{Channels as _, Hierarchy},
     scene::Scene,
     solver::{
@@ -21,7 +21,7 @@ use crate::{
     },
 };
 
-/// The fields of direct light of a scene; none if nothing is sampled.
+/// The fields of direct light of a scene, those over mirrors last; none if nothing is sampled.
 #[derive(Default)]
 pub(crate) struct DirectFields {
     fields: Vec<DirectField>,
@@ -51,6 +51,7 @@ impl DirectFields {
         hierarchy: &Hierarchy,
         settings: &SolveSettings,
         sees_outside: bool,
+        rays: &RayTree,
     ) -> Self {
         let reading = match settings.direct {
             Direct::Linked => settings.method.reading(),
@@ -64,12 +65,13 @@ impl DirectFields {
             [Lights::of_sky(&environment.sky, reading), sun]
         });
         let outside = outside.into_iter().flatten().flatten();
+        let mut lights: Vec<Lights> = emitters.into_iter().chain(outside).collect();
+        let images = rays.mirrors().map_or(&[][..], Mirrors::images);
+        let in_image = |image| lights.iter().map(move |lights| lights.in_image(image));
+        let mirrored: Vec<Lights> = images.iter().flat_map(in_image).collect();
+        lights.extend(mirrored);
         Self {
-            fields: emitters
-                .into_iter()
-                .chain(outside)
-                .map(DirectField::new)
-                .collect(),
+            fields: lights.into_iter().map(DirectField::new).collect(),
             surroundings: Surroundings::default(),
             no_offsets: OffsetPlaces::default(),
         }

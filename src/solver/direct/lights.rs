@@ -5,7 +5,7 @@
 //! Shadow rays only estimate its visible fraction: they are distributed over the emitters in proportion to that
 //! irradiance, stratified, and weighted by their transfer.
 
-use std::{f32::consts::PI, ops::Range};
+use std::{f32::consts::PI, ops::Range, sync::Arc};
 
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     geometry::{
-        Passage, RAY_OFFSET, Random, RayTree, Shuffle, SphericalTriangle, low_discrepancy_2d,
+        Image, Passage, RAY_OFFSET, Random, RayTree, Shuffle, SphericalTriangle, low_discrepancy_2d,
     },
     hierarchy::{Hierarchy, Reading},
     scene::{MaterialId, Scene, Sky, Sun, TriangleId},
@@ -59,6 +59,8 @@ pub(crate) struct Lights {
     brightest: Vec4,
     /// Patches whose emission is sampled; empty for light from outside.
     is_sampled: Vec<bool>,
+    /// The image in which this light is seen, where it comes over mirrors.
+    image: Option<Arc<Image>>,
 }
 
 impl Lights {
@@ -87,6 +89,7 @@ impl Lights {
             brightest: brightest(&emitters),
             source: Source::Emitters(LightTree::new(&emitters, &panels)),
             is_sampled,
+            image: None,
         }
     }
 
@@ -97,6 +100,7 @@ impl Lights {
             brightest: tree.brightest(),
             source: Source::Sky(tree, Guidance::Unknown),
             is_sampled: Vec::new(),
+            image: None,
         })
     }
 
@@ -107,7 +111,48 @@ impl Lights {
             brightest: disc.brightest(),
             source: Source::Sun(disc),
             is_sampled: Vec::new(),
+            image: None,
         })
+    }
+
+    /// The same light as an image shows it.
+    pub(super) fn in_image(&self, image: &Arc<Image>) -> Self {
+        let mut source = self.source.clone();
+        if let Source::Sky(_, guidance) = &mut source {
+            *guidance = Guidance::None;
+        }
+        Self {
+            source,
+            brightest: self.brightest * image.reflectance().extend(1.0),
+            is_sampled: Vec::new(),
+            image: Some(image.clone()),
+        }
+    }
+
+    /// Whether it comes over mirrors.
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.image.is_some()
+    }
+
+    /// Index of its kind among the kinds of light.
+    pub(super) fn kind(&self) -> usize {
+        match self.source {
+            Source::Emitters(_) => 0,
+            Source::Sky(..) => 1,
+            Source::Sun(_) => 2,
+        }
+    }
+
+    /// A receiver as the light sees it.
+    fn facing(&self, receiver: &Receiver) -> Receiver {
+        match &self.image {
+            None => *receiver,
+            Some(image) => Receiver {
+                point: image.source_of(receiver.point),
+                normal: image.source_direction(receiver.normal),
+                ..*receiver
+            },
+        }
     }
 
     /// Whether it comes from outside the scene.
@@ -118,8 +163,8 @@ impl Lights {
     /// As [`SkyTree::even_radiosity`]; `None` for other light.
     pub(super) fn even_radiosity(&self) -> Option<f32> {
         match &self.source {
-            Source::Sky(sky, _) => sky.even_radiosity(),
-            Source::Emitters(_) | Source::Sun(_) => None,
+            Source::Sky(sky, _) if !self.is_mirrored() => sky.even_radiosity(),
+            Source::Sky(..) | Source::Emitters(_) | Source::Sun(_) => None,
         }
     }
 
@@ -237,6 +282,12 @@ impl Lights {
         }: &mut Shot,
         light: &mut DirectLight,
     ) {
+        let way = Way {
+            rays,
+            image: self.image.as_deref(),
+            from: *receiver,
+        };
+        let receiver = &self.facing(receiver);
         seen.clear();
         *blocked = Blocked::default();
         if rays.is_clear() {
@@ -276,7 +327,7 @@ impl Lights {
         });
         match &self.source {
             Source::Emitters(tree) => {
-                shoot_at_emitters(tree, rays, receiver, shots, light, blocked);
+                shoot_at_emitters(tree, way, receiver, shots, light, blocked);
             }
             Source::Sky(sky, _) => {
                 let aim = |ray: Ray| match ray.target {
@@ -289,12 +340,12 @@ impl Lights {
                 let shots = shots.map(aim);
                 let mixture = mixture.as_ref().map(|mixture| (mixture, &**lobes));
                 let blocked = (sky.width(), blocked);
-                shoot_outside(rays, receiver, shots, mixture, light, seen, blocked);
+                shoot_outside(way, shots, mixture, light, seen, blocked);
             }
             Source::Sun(sun) => {
                 let aim = |ray: Ray| sun.aim(receiver.normal, ray.square);
                 let blocked = (sun.width(), blocked);
-                shoot_outside(rays, receiver, shots.map(aim), None, light, seen, blocked);
+                shoot_outside(way, shots.map(aim), None, light, seen, blocked);
             }
         }
         cut.truncate(own);
@@ -307,10 +358,44 @@ impl Lights {
         scale: Option<f32>,
         cut: &mut Vec<Arriving>,
     ) -> Vec4 {
-        match &self.source {
+        let receiver = &self.facing(receiver);
+        let light = match &self.source {
             Source::Emitters(tree) => tree.unoccluded(receiver, scale, cut),
             Source::Sky(sky, _) => sky.unoccluded(receiver.normal, cut),
             Source::Sun(sun) => sun.unoccluded(receiver.normal, cut),
+        };
+        match &self.image {
+            None => light,
+            Some(image) => light * image.reflectance().extend(1.0),
+        }
+    }
+}
+
+/// The way of the light to a receiver.
+#[derive(Clone, Copy)]
+struct Way<'a> {
+    rays: &'a RayTree,
+    /// The image in which it is seen.
+    image: Option<&'a Image>,
+    from: Receiver,
+}
+
+impl Way<'_> {
+    /// What passes from a point of a triangle.
+    fn passage(&self, point: Vec3, triangle: TriangleId) -> Passage {
+        let ends = [Some(self.from.triangle), Some(triangle)];
+        match self.image {
+            None => self.rays.passage(self.from.point, point, ends),
+            Some(image) => image.passage(self.rays, self.from.point, point, ends),
+        }
+    }
+
+    /// What passes from outside.
+    fn passage_outward(&self, direction: Vec3) -> Passage {
+        let (point, start) = (self.from.point, Some(self.from.triangle));
+        match self.image {
+            None => self.rays.passage_outward(point, direction, start),
+            Some(image) => image.passage_outward(self.rays, point, direction, start),
         }
     }
 }
@@ -336,10 +421,10 @@ struct Ray {
     square: Vec2,
 }
 
-/// Shoot shadow rays from a receiver to emitters.
+/// Shoot shadow rays from a receiver, as the emitters see it, to these.
 fn shoot_at_emitters(
     tree: &LightTree,
-    rays: &RayTree,
+    way: Way<'_>,
     receiver: &Receiver,
     shots: impl Iterator<Item = Ray>,
     light: &mut DirectLight,
@@ -360,9 +445,8 @@ fn shoot_at_emitters(
         if !(weight.is_finite() && weight > 0.0) {
             continue;
         }
-        let ends = [Some(receiver.triangle), Some(emitter.triangle)];
         let color = emitter.radiosity / luminance(emitter.radiosity);
-        let passage = rays.passage(receiver.point, point, ends);
+        let passage = way.passage(point, emitter.triangle);
         let passing = passage.transmittance;
         if passing == Vec3::ZERO {
             // As wide as two of these triangles, of which lamps are mostly made.
@@ -391,8 +475,7 @@ fn bundle_towards(tree: &LightTree, receiver: &Receiver, target: Target) -> Bund
 
 /// Shoot shadow rays from a receiver out of the scene, and add what they see.
 fn shoot_outside(
-    rays: &RayTree,
-    receiver: &Receiver,
+    way: Way<'_>,
     shots: impl Iterator<Item = Option<OutsideRay>>,
     mixture: Option<(&Mixture, &[Lobe])>,
     light: &mut DirectLight,
@@ -403,8 +486,7 @@ fn shoot_outside(
     for ray in shots {
         bundle.rays += 1;
         let Some(ray) = ray else { continue };
-        let start = Some(receiver.triangle);
-        let passage = rays.passage_outward(receiver.point, ray.direction, start);
+        let passage = way.passage_outward(ray.direction);
         let passing = passage.transmittance;
         let is_visible = passing != Vec3::ZERO;
         outcomes.count(is_visible);

@@ -17,7 +17,7 @@ use crate::{
     geometry::{RayTree, Shuffle},
     hierarchy::Channels as _,
     solver::{
-        output::{DirectLights, LightSampler, LitPoint, SampledLight, Shadow},
+        output::{DirectLights, LightSampler, LitPoint, SampledLight},
         places::Receiver,
     },
 };
@@ -102,18 +102,25 @@ impl LightSampler for Sampler<'_> {
             return light;
         }
         let visible = visible(point.expected, light.unoccluded).extend(1.0);
-        for (shadow, part) in light.shadows.iter_mut().zip(&mut self.parts) {
+        for part in &mut self.parts {
+            if part.exact == Vec4::ZERO {
+                continue;
+            }
+            let shadow = &mut light.shadows[part.lights.kind()];
             let mut light = DirectLight::expected(part.exact);
             let (shot, rays) = (&mut part.shot, samples.clone());
             part.lights
                 .shoot_at(self.rays, &receiver, rays, shuffle, shot, &mut light);
-            let irradiance = light.irradiance_near(visible, samples.len() as u32);
-            let blocked = &shot.blocked;
-            *shadow = Shadow {
-                missing: (part.exact - irradiance).color(),
-                variance: light.error().powi(2),
-                sharpness: blocked.sharpness / blocked.count.max(1) as f32,
+            // What little of an image is seen does not follow from what is seen of all light.
+            let irradiance = match part.lights.is_mirrored() {
+                true => light.irradiance(),
+                false => light.irradiance_near(visible, samples.len() as u32),
             };
+            let blocked = &shot.blocked;
+            shadow.missing += (part.exact - irradiance).color();
+            shadow.variance += light.error().powi(2);
+            let sharpness = blocked.sharpness / blocked.count.max(1) as f32;
+            shadow.sharpness = shadow.sharpness.max(sharpness);
         }
         light
     }

@@ -214,7 +214,7 @@ impl ErrorEstimator {
                 direct: Direct::Sampled,
                 ..shown.settings.clone()
             };
-            DirectFields::new(shown.scene, hierarchy, &settings, shown.sees_outside)
+            DirectFields::new(shown.scene, hierarchy, &settings, shown.sees_outside, &self.rays)
         });
         let scene = Scenery {
             hierarchy,

@@ -146,19 +146,19 @@ impl Scenery<'_> {
         order(patch, barycentric(point, corners))
     }
 
-    /// What a ray meets, and its tint.
+    /// What a ray meets over the mirrors on its way, and its tint.
     fn meet(&self, from: &Receiver, direction: Vec3) -> (Kept, Vec3) {
-        let start = Some(from.triangle);
-        let hit = self.rays.closest(from.point, direction, start);
-        let tint = self.rays.tint(from.point, direction, start, hit);
-        let met = hit.and_then(|hit| {
-            let patch = self.hierarchy.patch_met(hit.triangle, direction)?;
+        let end = self
+            .rays
+            .followed(from.point, direction, Some(from.triangle));
+        let met = end.hit.and_then(|hit| {
+            let patch = self.hierarchy.patch_met(hit.triangle, end.direction)?;
             Some(Kept {
                 patch: patch as u32,
-                point: from.point + direction * hit.distance,
+                point: end.origin + end.direction * hit.distance,
             })
         });
-        (met.unwrap_or(Kept::NOTHING), tint)
+        (met.unwrap_or(Kept::NOTHING), end.tint)
     }
 }
 
@@ -166,7 +166,7 @@ impl Scenery<'_> {
 pub(super) struct Samples {
     seed: u64,
     kept: Vec<Vec<Kept>>,
-    /// Tints of these rays; empty where no pane is coloured.
+    /// Tints of these rays; empty where there is none.
     tints: Vec<Vec<Vec3>>,
     direct: PointLight,
 }
@@ -193,7 +193,7 @@ impl Samples {
         indices: &[usize],
         count: u32,
     ) -> Option<u64> {
-        let (seed, is_tinted) = (self.seed, scene.rays.has_coloured_panes());
+        let (seed, is_tinted) = (self.seed, scene.rays.has_tints());
         // Over the hemisphere.
         let kept = &self.kept;
         let of_place = |(&index, place): (&usize, &Option<Place>)| -> Vec<(Kept, Vec3)> {

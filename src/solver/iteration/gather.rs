@@ -72,8 +72,42 @@ impl LinkedLight {
             hierarchy,
             tables,
             reading: settings.method.reading(),
+            image: None,
         };
         gather(kernel, &self.links, linked_clusters, settings.push, cancel)
+    }
+
+    /// The linked clusters of the links over mirrors.
+    pub(super) fn clusters_of_images(&self, hierarchy: &Hierarchy) -> Vec<LinkedClusters> {
+        let images = self.images.iter();
+        images
+            .map(|image| LinkedClusters::new(hierarchy, &image.links))
+            .collect()
+    }
+
+    /// Add the irradiance over mirrors to that of every element; not to the sums of form factors. `None` when cancelled.
+    pub(super) fn add_images(
+        &self,
+        hierarchy: &Hierarchy,
+        linked_clusters: &[LinkedClusters],
+        settings: &SolveSettings,
+        cancel: &Cancel,
+        irradiance: &mut [Vec4],
+    ) -> Option<()> {
+        for (image, linked_clusters) in self.images.iter().zip(linked_clusters) {
+            let kernel = Kernel {
+                hierarchy,
+                tables: &self.power,
+                reading: settings.method.reading(),
+                image: Some(&image.image),
+            };
+            let seen = gather(kernel, &image.links, linked_clusters, settings.push, cancel)?;
+            let arriving = image.image.reflectance().extend(0.0);
+            for (sum, light) in irradiance.iter_mut().zip(seen) {
+                *sum += light * arriving;
+            }
+        }
+        Some(())
     }
 }
 
@@ -192,7 +226,7 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     let cluster = &hierarchy.clusters[index];
     let mut sum = Moments::default();
     links.tinted(NodeId(index as u32)).for_each(|link| {
-        if link.source.index() == index {
+        if link.source.index() == index && kernel.image.is_none() {
             sum.add_isotropic(
                 self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
                     * link.tinted_transmission(),
@@ -254,7 +288,7 @@ fn push_one(
     sums: &mut [Vec4],
 ) {
     let hierarchy = kernel.hierarchy;
-    if source.index() == cluster {
+    if source.index() == cluster && kernel.image.is_none() {
         let irradiance =
             self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total())
                 * transmission;

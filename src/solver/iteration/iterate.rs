@@ -128,6 +128,9 @@ pub(crate) fn iterate(linked: &mut LinkedLight, iteration: Iteration<'_>) -> Opt
                 linked.irradiance.clone_from(&before);
                 linked.pull(iteration.surfaces);
                 linked.links.level(iteration.surfaces.hierarchy);
+                for image in &mut linked.images {
+                    image.links.level(iteration.surfaces.hierarchy);
+                }
                 convergence.notes.push(match bounds_rows {
                     false => Note::GrowthBounded,
                     true => Note::GrowthUnbounded,
@@ -155,6 +158,7 @@ fn converge(
     let hierarchy = surfaces.hierarchy;
     let weights = leaf_areas(hierarchy);
     let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
+    let clusters_of_images = linked.clusters_of_images(hierarchy);
     let direct = surfaces.direct_of_leaves();
     let powers = surfaces.powers();
     let ceiling = CEILING_SLACK * powers.most;
@@ -166,7 +170,7 @@ fn converge(
         let sweep = sweep(
             linked,
             iteration,
-            &linked_clusters,
+            (&linked_clusters, &clusters_of_images),
             (&direct, powers.sampled),
             bounds_rows,
         )?;
@@ -210,7 +214,7 @@ fn converge(
 fn sweep(
     linked: &LinkedLight,
     iteration: Iteration<'_>,
-    linked_clusters: &LinkedClusters,
+    (linked_clusters, clusters_of_images): (&LinkedClusters, &[LinkedClusters]),
     (direct, sampled): (&[Vec4], f64),
     bounds_rows: bool,
 ) -> Option<Sweep> {
@@ -230,6 +234,7 @@ fn sweep(
     };
     let returned_unscaled = returned(&image);
     coverage.scale(hierarchy, &linked.power, &mut image, bounds_rows);
+    linked.add_images(hierarchy, clusters_of_images, settings, cancel, &mut image)?;
     cancel.proceed()?;
     Some(Sweep {
         sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf)) + sampled,

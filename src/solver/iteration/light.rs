@@ -1,8 +1,11 @@
 //! Light over links, with the links and tables from which it is computed.
 
+use std::sync::Arc;
+
 use glam::{Vec3, Vec4};
 
 use crate::{
+    geometry::{Image, Mirrors, RayTree},
     hierarchy::{Channels as _, Hierarchy, Reading, Tables, luminance},
     solver::{direct::Surfaces, sums},
     transport::{Kernel, LinkStore},
@@ -13,6 +16,8 @@ use crate::{
 pub(crate) struct LinkedLight {
     /// The pairs of nodes that exchange light.
     pub(crate) links: LinkStore,
+    /// The same over mirrors.
+    pub(crate) images: Vec<ImageLinks>,
     /// Linked irradiance of every element, scaled to the coverage, W/m²; the fourth channel is the unscaled sum of form
     /// factors.
     pub(crate) irradiance: Vec<Vec4>,
@@ -22,7 +27,29 @@ pub(crate) struct LinkedLight {
     pub(crate) power: Tables,
 }
 
+/// Links from the image of the scene in mirrors.
+pub(crate) struct ImageLinks {
+    pub(crate) image: Arc<Image>,
+    pub(crate) links: LinkStore,
+}
+
 impl LinkedLight {
+    /// Begin with links from all images in mirrors.
+    pub(crate) fn show_images(&mut self, rays: &RayTree) {
+        let images = rays.mirrors().map_or(&[][..], Mirrors::images);
+        let unlinked = images.iter().map(|image| ImageLinks {
+            image: image.clone(),
+            links: LinkStore::default(),
+        });
+        self.images = unlinked.collect();
+    }
+
+    /// Number of links, those over mirrors included.
+    pub(crate) fn link_count(&self) -> usize {
+        let images = self.images.iter().map(|image| image.links.len());
+        self.links.len() + images.sum::<usize>()
+    }
+
     /// Give new elements the irradiance and the factor of the element that was divided; those of the first mesh are
     /// dark.
     pub(crate) fn extend(&mut self, hierarchy: &Hierarchy) {
@@ -63,6 +90,7 @@ impl LinkedLight {
             hierarchy,
             tables: &self.power,
             reading,
+            image: None,
         }
     }
 
@@ -95,8 +123,10 @@ impl LinkedLight {
 
     /// Memory in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
+        let images = self.images.iter().map(|image| image.links.memory_bytes());
         self.power.memory_bytes()
             + self.links.memory_bytes()
+            + images.sum::<usize>()
             + size_of_val(self.irradiance.as_slice())
             + size_of_val(self.sending.as_slice())
     }

@@ -315,7 +315,7 @@ impl Met {
         if opacity > 0.0 || patch.opacity <= 0.0 {
             return Self {
                 colors: [
-                    hierarchy.reflectance_of(element),
+                    hierarchy.diffuse_reflectance_of(element),
                     hierarchy.emission_of(element),
                 ],
                 opacity,

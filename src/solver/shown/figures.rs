@@ -18,7 +18,7 @@ pub(crate) fn fill(
     leaves: &[LeafLight],
 ) {
     let hierarchy = surfaces.hierarchy;
-    report.links = linked.links.len() as u64;
+    report.links = linked.link_count() as u64;
     report.nodes = hierarchy.node_count() as u64;
     report.elements = leaves.len() as u64;
     report.vertices = hierarchy.mesh.vertices.len() as u64;

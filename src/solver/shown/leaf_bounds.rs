@@ -7,7 +7,7 @@ use super::path::path_to;
 use crate::{
     hierarchy::{ElementId, Hierarchy, NodeId, luminance},
     solver::vertices::{LeafLight, link_irradiance, own_irradiance},
-    transport::{Interval, Kernel, LinkStore, TintedLink, is_too_near_for_tables},
+    transport::{Interval, Kernel, LinkStore, TintedLink},
 };
 
 /// Sum of the widths of the bounds of the kernel, relative to the linked irradiance of a leaf. Smaller costs time;
@@ -50,7 +50,7 @@ impl<'a> Bounding<'a> {
                 } else {
                     link_irradiance(kernel, link, point, normal)
                 };
-                let is_by_rays = is_own || is_too_near_for_tables(hierarchy, link.source, receiver);
+                let is_by_rays = is_own || kernel.is_too_near_for_tables(link.source, receiver);
                 given.push(Given {
                     link,
                     receiver,

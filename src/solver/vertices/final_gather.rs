@@ -17,7 +17,7 @@ use super::{
     reconstruct::LeafLight,
 };
 use crate::{
-    geometry::{Hit, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
+    geometry::{Followed, Random, RayTree, barycentric, cosine_direction, low_discrepancy_2d},
     hierarchy::{Element, Hierarchy},
     solver::{
         Cancel,
@@ -104,7 +104,7 @@ struct VertexProbe {
     /// Coverage, where an even sky gives it.
     coverage: Option<HemisphereCoverage>,
     met: Vec<Met>,
-    /// The tints of these rays; empty where no pane is coloured.
+    /// The tints of these rays; empty where there is none.
     tints: Vec<Vec3>,
     found: GatherEstimate,
 }
@@ -295,17 +295,19 @@ impl FinalGather<'_> {
         Some(shot.into_iter().map(u64::from).sum())
     }
 
-    /// What a ray meets first, and its tint where some pane is coloured.
+    /// What a ray meets over the mirrors on its way, and its tint where there may be one.
     fn meet(&self, from: &Receiver, direction: Vec3) -> (Met, Option<Vec3>) {
-        let start = Some(from.triangle);
-        let hit = self.rays.closest(from.point, direction, start);
-        let tint = self.rays.has_coloured_panes();
-        let tint = tint.then(|| self.rays.tint(from.point, direction, start, hit));
-        (self.met(from, direction, hit), tint)
+        let end = self
+            .rays
+            .followed(from.point, direction, Some(from.triangle));
+        (self.met(&end), self.rays.has_tints().then_some(end.tint))
     }
 
     /// What a ray met by the triangle that it hit.
-    fn met(&self, from: &Receiver, direction: Vec3, hit: Option<Hit>) -> Met {
+    fn met(&self, end: &Followed) -> Met {
+        let Followed {
+            hit, direction, ..
+        } = *end;
         let Some(hit) = hit else {
             return Met::Nothing;
         };
@@ -320,7 +322,7 @@ impl FinalGather<'_> {
         if !hierarchy.active_patches().contains(&patch) {
             return Met::Nothing;
         }
-        let point = from.point + direction * hit.distance;
+        let point = end.origin + direction * hit.distance;
         let Some(leaf) = hierarchy.mesh.leaf_at(patch, point) else {
             return Met::Back;
         };

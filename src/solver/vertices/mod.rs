@@ -7,4 +7,6 @@ mod reconstruct;
 
 pub(crate) use final_gather::{FinalGather, converged_change};
 pub(crate) use means::{divide_by_interpolation_error, vertex_means};
-pub(crate) use reconstruct::{LeafLight, gather_leaves, link_irradiance, own_irradiance};
+pub(crate) use reconstruct::{
+    LeafLight, add_mirrored, gather_leaves, link_irradiance, own_irradiance,
+};

@@ -42,12 +42,13 @@ pub(crate) struct LeafLight {
     pub centre: Vec4,
 }
 
-/// Linked light of all leaves, in the order of the tree, at the places of their direct light; `None` when cancelled.
+/// Linked light of all leaves, in the order of the tree, at the places of their direct light, scaled to the coverage where
+/// there is one; `None` when cancelled.
 pub(crate) fn gather_leaves(
     kernel: Kernel<'_>,
     surfaces: Surfaces<'_>,
     links: &LinkStore,
-    coverage: &CoverageMap,
+    coverage: Option<&CoverageMap>,
     cancel: &Cancel,
 ) -> Option<Vec<LeafLight>> {
     let hierarchy = kernel.hierarchy;
@@ -73,6 +74,17 @@ pub(crate) fn gather_leaves(
         .collect();
     cancel.proceed()?;
     Some(found.into_iter().flatten().collect())
+}
+
+/// Add the light of the same leaves over mirrors, times what arrives of it, by channel.
+pub(crate) fn add_mirrored(leaves: &mut [LeafLight], mirrored: &[LeafLight], arriving: Vec3) {
+    let arriving = arriving.extend(0.0);
+    leaves.par_iter_mut().zip(mirrored).for_each(|(leaf, light)| {
+        leaf.centre += light.centre * arriving;
+        for (sum, light) in leaf.corners.iter_mut().zip(light.corners) {
+            *sum += light * arriving;
+        }
+    });
 }
 
 /// Scale the light of the leaves of one cell so that their form factors add to its coverage; `nearby` is the mean
@@ -128,7 +140,7 @@ impl<'a> Chain<'a> {
     fn add(&mut self, kernel: Kernel<'_>, link: TintedLink<'a>, centre: Vec3, far: f32) {
         match kernel.hierarchy.kind(link.source) {
             Kind::Cluster(index)
-                if centre.distance_squared(kernel.tables.centres[index]) > far * far =>
+                if centre.distance_squared(kernel.centre(index)) > far * far =>
             {
                 let sight = kernel.sight(index, centre);
                 self.sights.push(&sight, link.tinted_transmission());
@@ -147,7 +159,7 @@ impl<'a> Chain<'a> {
 struct Walk<'a> {
     kernel: Kernel<'a>,
     links: &'a LinkStore,
-    coverage: &'a CoverageMap,
+    coverage: Option<&'a CoverageMap>,
     offsets: &'a OffsetPlaces,
     /// Chains of the ancestors of the current node.
     path: Vec<Chain<'a>>,
@@ -213,7 +225,7 @@ impl<'a> Walk<'a> {
         let far = SIGHT_DISTANCE * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
         self.links.tinted(NodeId(index as u32)).for_each(|link| {
-            if link.source.index() == index {
+            if link.source.index() == index && self.kernel.image.is_none() {
                 chain.even += own_irradiance(self.kernel, index, link);
             } else {
                 chain.add(self.kernel, link, cluster.centroid, far);
@@ -252,11 +264,14 @@ impl<'a> Walk<'a> {
             );
         }
         self.leave(top);
+        let Some(coverage) = self.coverage else {
+            return;
+        };
         // Leaves come depth first, so those of a cell are consecutive.
-        let cell = |leaf: &LeafLight| self.coverage.cell(hierarchy, leaf.element as usize);
-        let nearby = self.coverage.nearby(self.kernel.tables, patch);
+        let cell = |leaf: &LeafLight| coverage.cell(hierarchy, leaf.element as usize);
+        let nearby = coverage.nearby(self.kernel.tables, patch);
         for leaves in self.found[first..].chunk_by_mut(|a, b| cell(a) == cell(b)) {
-            scale_to_coverage(hierarchy, self.coverage, nearby, leaves);
+            scale_to_coverage(hierarchy, coverage, nearby, leaves);
         }
     }
 
