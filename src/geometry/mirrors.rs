@@ -19,7 +19,7 @@ const MOST_IMAGES: usize = 32;
 
 /// Images that are weaker than this part of what they show are left out. Larger darkens rooms with facing mirrors; smaller
 /// takes time.
-const LEAST_WEIGHT: f32 = 0.05;
+const LEAST_WEIGHT: f32 = 0.02;
 
 /// Mirrors smaller than this part of the area of the scene have no images. Larger leaves out mirrors that light shows; smaller
 /// takes time for those that it does not, and for every facet of a curved one.
@@ -80,10 +80,10 @@ pub struct Followed {
     pub origin: Vec3,
     /// Unit direction of its last part.
     pub direction: Vec3,
+    /// Length of its parts before that.
+    pub length: f32,
     /// By what its light is to be multiplied, by channel.
     pub tint: Vec3,
-    /// Whether there was a mirror.
-    pub is_mirrored: bool,
 }
 
 impl Mirrors {
@@ -169,7 +169,7 @@ impl Mirrors {
         from: Option<TriangleId>,
     ) -> Followed {
         let (mut origin, mut direction, mut from) = (origin, direction, from);
-        let (mut tint, mut is_mirrored) = (Vec3::ONE, false);
+        let (mut tint, mut length) = (Vec3::ONE, 0.0);
         loop {
             let hit = rays.closest(origin, direction, from);
             tint *= rays.tint(origin, direction, from, hit);
@@ -182,7 +182,7 @@ impl Mirrors {
                     direction = mirror.reflected(direction);
                     from = Some(hit.triangle);
                     tint *= mirror.reflectance / part;
-                    is_mirrored = true;
+                    length += hit.distance;
                     continue;
                 }
                 tint *= match reflects {
@@ -194,8 +194,8 @@ impl Mirrors {
                 hit,
                 origin,
                 direction,
+                length,
                 tint,
-                is_mirrored,
             };
         }
     }
@@ -395,8 +395,8 @@ impl Image {
             hit,
             origin: leg.origin,
             direction,
+            length: leg.length,
             tint: leg.tint * rays.tint(leg.origin, direction, leg.from, hit),
-            is_mirrored: true,
         })
     }
 
@@ -563,7 +563,7 @@ mod tests {
         let direction = Vec3::new(-0.8, 0.36, 0.48).normalize_or_zero();
         let followed = mirrors.follow(&rays, Vec3::ZERO, direction, None);
         let hit = followed.hit.expect("closed");
-        assert!(!mirrors.has(hit.triangle) && followed.is_mirrored);
+        assert!(!mirrors.has(hit.triangle) && followed.length > 0.0);
         let reflections = followed.tint.x.log(0.75).round();
         assert!((followed.tint.x - 0.75f32.powf(reflections)).abs() < 1e-5);
     }

@@ -101,8 +101,8 @@ impl RayTree {
                     hit,
                     origin,
                     direction,
+                    length: 0.0,
                     tint: self.tint(origin, direction, from, hit),
-                    is_mirrored: false,
                 }
             }
         }

@@ -165,15 +165,15 @@ impl<'a> Recorder<'a> {
         (light, nearness / count.max(1) as f32)
     }
 
-    /// The surface that a ray from another one meets, the tint of its light, and its distance.
+    /// The surface that a ray from another one meets over mirrors, the tint of its light, and the length of its way.
     fn meet(&self, from: &Surface, direction: Vec3) -> (Option<Surface>, Vec3, f32) {
-        let (rays, start, own) = (self.lit.rays, from.start, Some(from.triangle));
-        match rays.closest(start, direction, own) {
+        let rays = self.lit.rays;
+        let end = rays.followed(from.start, direction, Some(from.triangle));
+        match end.hit {
             None => (None, Vec3::ONE, f32::INFINITY),
             Some(hit) => {
-                let met = self.lit.surface(start, direction, hit);
-                let tint = rays.tint(start, direction, own, Some(hit));
-                (met, tint, hit.distance)
+                let met = self.lit.surface(end.origin, end.direction, hit);
+                (met, end.tint, end.length + hit.distance)
             }
         }
     }

@@ -117,9 +117,11 @@ impl LitScene<'_> {
             .emitted_at(point.triangle, emission, point.barycentric)
     }
 
-    /// What a surface reflects of light from all directions, in whatever directions.
+    /// What a surface reflects of light from all directions, in whatever directions, but for mirrors that rays follow.
     pub(super) fn reflectance(&self, surface: &Surface) -> Vec3 {
-        if surface.specular.is_none() {
+        let mirrors = self.rays.mirrors();
+        let is_followed = mirrors.is_some_and(|mirrors| mirrors.has(surface.triangle));
+        if surface.specular.is_none() || is_followed {
             return surface.reflectance;
         }
         let diffused = self.scene.material(surface.triangle).diffused_specular();

@@ -408,7 +408,7 @@ impl PairSampler<'_> {
                 Some(_) => self.rays.tint(from.point, direction, start, hit),
                 None => Vec3::ONE,
             },
-            is_mirrored: false,
+            length: 0.0,
         })
     }
 

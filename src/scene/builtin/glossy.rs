@@ -35,14 +35,14 @@ pub(super) fn glossy() -> SceneBuilder {
         "mirror",
         0.0,
         Specular::Mirror {
-            reflectance: Vec3::splat(0.85),
+            reflectance: Vec3::ONE,
         },
     );
     let metal = specular(
         "brass",
         0.0,
         Specular::Gloss {
-            reflectance: Vec3::new(0.8, 0.62, 0.32),
+            reflectance: Vec3::new(1.0, 0.78, 0.4),
             roughness: 0.2,
         },
     );
