@@ -309,6 +309,11 @@ impl Image {
         self.index
     }
 
+    /// Whether it is seen in one mirror.
+    pub fn is_single(&self) -> bool {
+        self.legs.len() == 1
+    }
+
     /// What arrives of its light, by channel, 0…1.
     pub fn reflectance(&self) -> Vec3 {
         self.reflectance

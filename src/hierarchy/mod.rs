@@ -169,6 +169,8 @@ pub struct Hierarchy {
     colors: ElementColors,
     /// By patch, what mirrors, gloss and glass reflect of what rays meet and is counted as diffuse; empty where nothing is.
     diffused: Vec<Vec3>,
+    /// By patch, what mirrors reflect whose images are followed; empty where there is none.
+    mirrored: Vec<Vec3>,
     /// Reflectances are at most this.
     max_reflectance: f32,
 }
@@ -216,8 +218,14 @@ impl Hierarchy {
             sides,
             colors: ElementColors::default(),
             diffused: Vec::new(),
+            mirrored: Vec::new(),
             max_reflectance: scene.max_reflectance,
         })
+    }
+
+    /// Whether some specular reflection counts as diffuse.
+    pub fn has_diffused(&self) -> bool {
+        !self.diffused.is_empty()
     }
 
     /// Count as diffuse what mirrors, gloss and glass reflect, but for the triangles whose images in mirrors are followed.
@@ -227,11 +235,26 @@ impl Hierarchy {
         if by_material.iter().all(|&diffused| diffused == Vec3::ZERO) {
             return;
         }
-        let of = |patch: &Patch| match is_followed(patch.triangle) {
-            true => Vec3::ZERO,
-            false => by_material[scene.triangles[patch.triangle.index()].material.index()],
+        let of = |patch: &Patch, is_wanted: bool| match is_followed(patch.triangle) == is_wanted {
+            true => by_material[scene.triangles[patch.triangle.index()].material.index()],
+            false => Vec3::ZERO,
         };
-        self.diffused = self.patches.iter().map(of).collect();
+        let [diffused, mirrored] = [false, true].map(|followed| {
+            let all = self.patches.iter().map(|patch| of(patch, followed));
+            all.collect::<Vec<Vec3>>()
+        });
+        let some = |list: Vec<Vec3>| match list.iter().any(|&part| part != Vec3::ZERO) {
+            true => list,
+            false => Vec::new(),
+        };
+        (self.diffused, self.mirrored) = (some(diffused), some(mirrored));
+    }
+
+    /// Mean reflectance of an element in the mirrors whose images are followed.
+    pub fn mirrored_by(&self, element: usize) -> Vec3 {
+        let patch = self.mesh.elements[element].patch as usize;
+        let mirrored = self.mirrored.get(patch).copied().unwrap_or_default();
+        mirrored * self.opacity_of(element)
     }
 
     /// The root cluster.

@@ -77,6 +77,7 @@ impl Pixel {
             source_part: self.counts[1] / count,
             background_part: self.unlit.background / count,
             back_part: self.unlit.back / count,
+            noise: self.noise()[1],
         }
     }
 }
@@ -94,6 +95,8 @@ pub struct Developed {
     pub background_part: f32,
     /// The part of it that shows backs of surfaces.
     pub back_part: f32,
+    /// Standard error of its luminance, as far as its samples tell: 0 for one sample.
+    pub noise: f32,
 }
 
 impl Developed {

@@ -1,6 +1,6 @@
 //! Rays from the eye, through what they pass and over mirrors, gloss and glass, to what they show.
 
-use std::f32::consts::FRAC_1_PI;
+use std::{f32::consts::FRAC_1_PI, iter};
 
 use glam::Vec3;
 
@@ -12,7 +12,7 @@ use super::{
     turn::Lobe,
 };
 use crate::{
-    geometry::Hit,
+    geometry::{Hit, Image, Mirrors},
     scene::{Sky, Specular, TriangleId, luminance},
 };
 
@@ -30,8 +30,11 @@ const BY_CHANCE: f32 = 0.05;
 /// lies behind glass; more take time there.
 const MOST_TURNS: u32 = 24;
 
-/// Gloss on the way of a ray at most. Fewer blur what gloss shows of gloss; more are noisy.
+/// Gloss on the way of a ray at most; the next one counts as diffuse. Fewer blur what gloss shows of gloss; more are noisy.
 const MOST_BLURS: u32 = 2;
+
+/// Rays of the first gloss on the way of a ray. Fewer leave grain on rough metal; more take time there.
+const GLOSS_RAYS: u32 = 4;
 
 /// A surface that a ray from the eye shows.
 #[derive(Clone, Copy, Debug)]
@@ -72,8 +75,21 @@ struct Leg {
     length: f32,
     turns: u32,
     blurs: u32,
-    /// Density with which gloss chose its direction, 1/sr.
-    density: Option<f32>,
+    /// Roughness of the gloss on its way: what lies behind seems as rough at least (Kaplanyan and Dachsbacher, "Path Space
+    /// Regularization for Holistic and Robust Light Transport", 2013).
+    roughness: f32,
+    /// Where gloss chose its direction, nothing or one plane mirror lying between.
+    chosen: Option<Chosen>,
+}
+
+/// A direction that gloss chose.
+#[derive(Clone, Copy, Debug)]
+struct Chosen {
+    /// Density of the choice, 1/sr.
+    density: f32,
+    /// Length of the way since.
+    length: f32,
+    is_mirrored: bool,
 }
 
 /// What a ray meets, as the eye sees it.
@@ -112,7 +128,8 @@ impl Sight {
             length: 0.0,
             turns: 0,
             blurs: 0,
-            density: None,
+            roughness: 0.0,
+            chosen: None,
         });
         while let Some(leg) = self.pending.pop() {
             self.follow_leg(seen, leg, &mut chances);
@@ -132,6 +149,9 @@ impl Sight {
                 return;
             };
             leg.length += hit.distance;
+            if let Some(chosen) = &mut leg.chosen {
+                chosen.length += hit.distance;
+            }
             match seen.met(&leg, hit) {
                 Met::Nothing => {}
                 Met::Back => {
@@ -164,12 +184,18 @@ impl Sight {
             leg.turns < MOST_TURNS && !seen.subject.is_unlit
         });
         let is_blurred = leg.blurs > 0;
-        let specular = specular.filter(|specular| {
-            leg.blurs < MOST_BLURS || !matches!(specular, Specular::Gloss { .. })
+        // Behind gloss, light passes straight through glass, as it does where gloss samples emitters.
+        let specular = specular.filter(|specular| match specular {
+            Specular::Mirror { .. } => true,
+            Specular::Gloss { .. } => leg.blurs < MOST_BLURS,
+            Specular::Glass { .. } => !is_blurred,
         });
-        let emitting = leg.density.map_or(1.0, |density| {
-            seen.share_of_ray(&surface, leg.direction, hit, density)
-        });
+        let emitting = match leg.chosen {
+            Some(chosen) => seen.share_of_ray(&surface, leg.direction, hit.triangle, chosen),
+            // The few lamps that gloss sees over curved mirrors would be specks.
+            None if is_blurred => 0.0,
+            None => 1.0,
+        };
         self.surfaces.push(Shown {
             surface,
             part,
@@ -182,12 +208,19 @@ impl Sight {
         let mut onward = *leg;
         (onward.origin, onward.from) = (surface.position, Some(hit.triangle));
         onward.turns += 1;
-        onward.density = None;
+        onward.chosen = None;
         let color = part * material.share_of_met();
         match specular {
             None => {}
             Some(Specular::Mirror { reflectance }) => {
                 onward.direction = surface.mirrored(leg.direction);
+                let is_first = |chosen: &Chosen| !chosen.is_mirrored;
+                let is_plane = seen.lit.is_followed(hit.triangle);
+                let chosen = leg.chosen.filter(is_first).filter(|_| is_plane);
+                onward.chosen = chosen.map(|chosen| Chosen {
+                    is_mirrored: true,
+                    ..chosen
+                });
                 onward.passing = color * reflectance;
                 self.go_on(onward, chances);
             }
@@ -195,15 +228,24 @@ impl Sight {
                 reflectance,
                 roughness,
             }) => {
+                let roughness = roughness.hypot(leg.roughness).min(1.0);
                 let lobe = surface.lobe(roughness, leg.direction);
-                let color = color * reflectance;
-                self.highlights += color * seen.highlights(&surface, &lobe, chances);
-                if let Some((direction, weight, density)) = lobe.sample(chances.square()) {
-                    onward.direction = direction;
-                    onward.passing = color * weight;
-                    onward.blurs += 1;
-                    onward.density = Some(density);
-                    self.go_on(onward, chances);
+                let count = if is_blurred { 1 } else { GLOSS_RAYS };
+                let color = color * reflectance / count as f32;
+                onward.blurs += 1;
+                onward.roughness = roughness;
+                for _ in 0..count {
+                    self.highlights += color * seen.highlights(&surface, &lobe, chances);
+                    if let Some((direction, weight, density)) = lobe.sample(chances.square()) {
+                        onward.direction = direction;
+                        onward.passing = color * weight;
+                        onward.chosen = Some(Chosen {
+                            density,
+                            length: 0.0,
+                            is_mirrored: false,
+                        });
+                        self.go_on(onward, chances);
+                    }
                 }
             }
             Some(Specular::Glass { index, is_thin }) => {
@@ -309,36 +351,62 @@ impl Seen<'_> {
 
     /// The share of the emission of a surface that counts where a ray of gloss meets it; the rest counts where gloss samples
     /// emitters (the balance heuristic of Veach and Guibas, 1995).
-    fn share_of_ray(&self, surface: &Surface, direction: Vec3, hit: Hit, density: f32) -> f32 {
-        let by_ray = density * -surface.flat_normal.dot(direction);
-        let of_emitters = self.lit.emitters.density(hit.triangle);
-        let by_point = of_emitters * hit.distance * hit.distance;
+    fn share_of_ray(
+        &self,
+        surface: &Surface,
+        direction: Vec3,
+        triangle: TriangleId,
+        chosen: Chosen,
+    ) -> f32 {
+        let by_ray = chosen.density * -surface.flat_normal.dot(direction);
+        let by_point = self.lit.emitters.density(triangle) * chosen.length * chosen.length;
         if by_ray > 0.0 { by_ray / (by_ray + by_point) } else { 0.0 }
     }
 
-    /// What gloss reflects straight from the sun, and from a point of an emitter, as radiance; its colour apart.
+    /// What gloss reflects from the sun, from a point of an emitter, and from one of its image in each mirror, as radiance; its
+    /// colour apart.
     fn highlights(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
-        self.emitter_highlight(surface, lobe, chances) + self.sun_highlight(surface, lobe, chances)
+        let mirrors = self.lit.rays.mirrors();
+        let images = mirrors.map_or(&[][..], Mirrors::images).iter();
+        let images = images.filter(|image| image.is_single());
+        let all = iter::once(None).chain(images.map(|image| Some(&**image)));
+        let emitters = all.map(|image| self.emitter_highlight(surface, lobe, image, chances));
+        emitters.sum::<Vec3>() + self.sun_highlight(surface, lobe, chances)
     }
 
-    fn emitter_highlight(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
+    fn emitter_highlight(
+        &self,
+        surface: &Surface,
+        lobe: &Lobe,
+        image: Option<&Image>,
+        chances: &mut Chances,
+    ) -> Vec3 {
         let (choice, square) = chances.choice();
         let lit = self.lit;
         let Some(point) = lit.emitters.sample(lit.scene, choice, square) else {
             return Vec3::ZERO;
         };
-        let separation = point.position - surface.start;
+        let seen = image.map_or(point.position, |image| image.place(point.position));
+        let separation = seen - surface.start;
         let direction = separation.normalize_or_zero();
         let toward = lobe.toward(direction);
-        let (normal, is_back) = lit.side(point.triangle, direction);
-        let source_cosine = -normal.dot(direction);
-        let is_lit = lit.is_lit(point.triangle, is_back) && point.triangle != surface.triangle;
-        if toward.value <= 0.0 || source_cosine <= 0.0 || !is_lit {
+        let arriving = image.map_or(direction, |image| image.source_direction(direction));
+        let (normal, is_back) = lit.side(point.triangle, arriving);
+        let source_cosine = -normal.dot(arriving);
+        let is_lit = lit.is_lit(point.triangle, is_back);
+        let is_own = image.is_none() && point.triangle == surface.triangle;
+        if toward.value <= 0.0 || source_cosine <= 0.0 || !is_lit || is_own {
             return Vec3::ZERO;
         }
         let density = lit.emitters.density(point.triangle) * separation.length_squared();
         let ends = [Some(surface.triangle), Some(point.triangle)];
-        let mut passing = lit.rays.transmittance(surface.start, point.position, ends);
+        let (from, to) = (surface.start, point.position);
+        let mut passing = match image {
+            None => lit.rays.transmittance(from, to, ends),
+            Some(image) => {
+                image.passage(lit.rays, from, to, ends).transmittance * image.reflectance()
+            }
+        };
         passing *= lit.scene.opacity_at(point.triangle, point.barycentric);
         let weight = toward.value * source_cosine / (density + source_cosine * toward.density);
         lit.emitted(&point) * weight * passing

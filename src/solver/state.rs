@@ -253,6 +253,9 @@ impl Solver {
         report.estimated_error = Some(estimated);
         self.step = report.step;
         report.is_final = is_last && self.ends_with(estimated, &mut report);
+        if report.is_final {
+            shown::note_diffused(&mut report);
+        }
         self.relighting.end_step(&report);
         Some(report)
     }

@@ -70,6 +70,8 @@ pub enum Action {
     ClusterLevelBy(i32),
     /// Backs of one-sided faces on or off.
     ToggleBacks,
+    /// The view at rest sharpened to a traced picture, or not.
+    ToggleTraced,
     /// Walls before the inside of a room drawn, or not.
     ToggleSeeThrough,
     /// The view that the scene opened with.

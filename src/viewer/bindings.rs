@@ -190,6 +190,12 @@ pub fn bindings() -> Vec<Binding> {
         plain(Key::N, View, "Normals and back", Action::ToggleNormals),
         plain(Key::K, View, "Backs of faces", Action::ToggleBacks),
         plain(
+            Key::V,
+            View,
+            "Traced picture of the view at rest",
+            Action::ToggleTraced,
+        ),
+        plain(
             Key::X,
             View,
             "See through walls from outside",

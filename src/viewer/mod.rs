@@ -40,6 +40,7 @@ pub mod run;
 pub mod saved_light;
 pub mod saver;
 pub mod session;
+pub mod sharpening;
 pub mod stage;
 pub mod start;
 pub mod state;

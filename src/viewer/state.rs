@@ -16,6 +16,7 @@ use super::{
     pick::{ObjectLight, Pick, Probe},
     run::Run,
     session::Recent,
+    sharpening::Sharpness,
     stage::Staged,
     truth::Truth,
     view::{ViewMode, ViewSettings},
@@ -94,6 +95,8 @@ pub struct State {
     pub adapter_name: String,
     /// Size of the viewport in pixels.
     pub viewport_size: [u32; 2],
+    /// How far the traced picture of the view is; `None` where there is none.
+    pub sharpness: Option<Sharpness>,
 }
 
 impl State {

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 use image::{Rgb, Rgb32FImage, Rgba, Rgba32FImage, RgbaImage};
+use rayon::prelude::*;
 
 use super::{
     camera::Camera,
@@ -27,6 +28,7 @@ pub struct Traced {
     to_file: f32,
     to_display: f32,
     tone_map: ToneMap,
+    is_unlit: bool,
 }
 
 /// The rays of a camera for a picture of this width over its height.
@@ -82,17 +84,16 @@ pub fn trace(
     if view.auto_exposure {
         view.exposure = exposure::of(&metered(&pixels)).unwrap_or(view.exposure);
     }
-    let (to_display, tone_map) = match is_unlit {
-        true => (1.0, ToneMap::None),
-        false => (view.light_factor() * view.exposure_factor(), view.tone_map),
-    };
-    Some(Traced {
+    let mut traced = Traced {
         size,
         pixels,
         to_file: view.light_factor() * subject.scene.radiance_unit,
-        to_display,
-        tone_map,
-    })
+        to_display: 1.0,
+        tone_map: ToneMap::None,
+        is_unlit,
+    };
+    traced.expose(&view);
+    Some(traced)
 }
 
 /// Luminances of the pixels that show light.
@@ -113,20 +114,49 @@ fn metered(pixels: &[Developed]) -> Metered {
 }
 
 impl Traced {
+    /// Expose and tone-map it as a view asks for. What shows no light stays as it is.
+    pub fn expose(&mut self, view: &ViewSettings) {
+        (self.to_display, self.tone_map) = match self.is_unlit {
+            true => (1.0, ToneMap::None),
+            false => (view.light_factor() * view.exposure_factor(), view.tone_map),
+        };
+    }
+
+    /// Estimated noise of its pixels, root mean square relative to their mean luminance; `None` where it is black, or where
+    /// each pixel has one sample.
+    pub fn noise(&self) -> Option<f32> {
+        let pixels = self.pixels.iter();
+        let squares: f64 = pixels.map(|pixel| f64::from(pixel.noise).powi(2)).sum();
+        let pixels = self.pixels.iter();
+        let light: f64 = pixels.map(|pixel| f64::from(luminance(pixel.radiance()))).sum();
+        let count = self.pixels.len().max(1) as f64;
+        let noise = ((squares / count).sqrt() / (light / count)) as f32;
+        (noise > 0.0 && noise.is_finite()).then_some(noise)
+    }
+
+    /// Its display colours over a background, display-linear.
+    pub fn display(&self, background: f32) -> RgbaImage {
+        let [width, height] = self.size;
+        let mut display = RgbaImage::new(width, height);
+        let bytes: &mut [u8] = &mut display;
+        let pixels = bytes.par_chunks_exact_mut(4).zip(&self.pixels);
+        pixels.for_each(|(display, pixel)| {
+            let behind = background * pixel.background_part;
+            let [r, g, b] = self.shown(pixel, behind).to_array().map(srgb_byte);
+            display.copy_from_slice(&[r, g, b, u8::MAX]);
+        });
+        display
+    }
+
     /// The picture over the window's background.
     pub fn picture(&self) -> HeadlessPicture {
         let [width, height] = self.size;
-        let mut display = RgbaImage::new(width, height);
         let mut radiance = Rgb32FImage::new(width, height);
-        let pixels = display.pixels_mut().zip(radiance.pixels_mut());
-        for (pixel, (display, radiance)) in self.pixels.iter().zip(pixels) {
-            let behind = theme::PICTURE_BACKGROUND * pixel.background_part;
-            let [r, g, b] = self.shown(pixel, behind).to_array().map(srgb_byte);
-            *display = Rgba([r, g, b, u8::MAX]);
+        for (pixel, radiance) in self.pixels.iter().zip(radiance.pixels_mut()) {
             *radiance = Rgb((pixel.radiance() * self.to_file).to_array());
         }
         HeadlessPicture {
-            display,
+            display: self.display(theme::PICTURE_BACKGROUND),
             radiance: Some(radiance),
         }
     }

@@ -198,6 +198,8 @@ pub struct ViewSettings {
     pub see_through: bool,
     /// Whether textures show in detail, and not only as the mean of each element.
     pub texture_detail: bool,
+    /// Whether a view at rest sharpens to a traced picture.
+    pub traced: bool,
     /// The cluster boxes.
     pub clusters: ClusterOverlay,
     /// The links of what is selected.
@@ -320,6 +322,7 @@ impl Default for ViewSettings {
             backs: false,
             see_through: true,
             texture_detail: true,
+            traced: true,
             clusters: ClusterOverlay::default(),
             links: LinkOverlay::default(),
             is_in_metres: false,

@@ -22,6 +22,7 @@ use super::{
         Target, Uploads,
     },
     saver::{Canvas, Drawn},
+    sharpening::Sharpening,
     stage::Staged,
     state::State,
     theme,
@@ -42,6 +43,7 @@ pub struct Viewport {
     /// The light that was there when nothing but errors lit the scene. It is not shown while that of new lamps is on its
     /// way, or the exposure would follow it.
     dark: Option<Weak<VertexLight>>,
+    sharpening: Sharpening,
 }
 
 /// Everything that the automatic exposure depends on.
@@ -121,6 +123,7 @@ impl Viewport {
             metered: None,
             metering: None,
             dark: None,
+            sharpening: Sharpening::default(),
         }
     }
 
@@ -165,6 +168,8 @@ impl Viewport {
         }
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(texture, rect, whole, Color32::WHITE);
+        let background = background(ui).x;
+        self.sharpening.show(ui, rect, background, state);
     }
 
     /// Meter the picture where that is due, and let the exposure follow. Returns whether it is still on its way.

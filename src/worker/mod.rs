@@ -33,6 +33,7 @@ use std::{
 pub use effect::{Effect, effect_of_change};
 pub use generation::Generation;
 pub use message::{Event, RunOptions, StopReason};
+pub use priority::pool_that_gives_way;
 pub use slot::Slot;
 pub use stepper::{Job, MakeStepper, Stepper};
 pub use trajectory::trajectory;

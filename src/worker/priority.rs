@@ -1,5 +1,17 @@
 //! Priority of threads where there are more of them than cores.
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// A pool of so many threads, or with 0 of one for each core, that give way; `None` where the system refuses threads.
+pub fn pool_that_gives_way(name: &'static str, count: usize) -> Option<ThreadPool> {
+    ThreadPoolBuilder::new()
+        .num_threads(count)
+        .thread_name(move |index| format!("{name} {index}"))
+        .start_handler(|_| give_way())
+        .build()
+        .ok()
+}
+
 /// Let the calling thread wait for others of the program, such as those that draw, where the system knows such a thing.
 #[cfg(all(target_os = "linux", feature = "viewer"))]
 pub(super) fn give_way() {

@@ -25,6 +25,11 @@ pub enum Note {
     },
     /// The memory limit prevented finer links or elements.
     MemoryLimit,
+    /// What curved mirrors, gloss and glass reflect counts as diffuse.
+    Diffused {
+        /// Its part of the reflected power, 0…1.
+        share: f64,
+    },
     /// The error that was asked for is not reached, and further steps do not lead there.
     ErrorNotReached {
         /// The error that was asked for, relative.
@@ -73,6 +78,11 @@ impl fmt::Display for Note {
                         "the estimated error is that small, but its interval is not, and no more rays are shot for it",
                     Obstacle::Mesh => "finer links and elements no longer reduce the error",
                 }
+            ),
+            Self::Diffused { share } => write!(
+                out,
+                "{:.1} % of the reflected light comes from gloss, curved mirrors and glass: it lights other surfaces as if it were diffuse",
+                100.0 * share
             ),
             Self::MemoryLimit => {
                 out.write_str("the memory limit is reached; refinement stops here with what fits")

@@ -47,6 +47,8 @@ pub struct StepReport {
     /// Bound of the error of the light over links, root mean square over the area, relative to the mean irradiance: see
     /// [`Inspection::error_bound`](super::Inspection::error_bound). That of the step; other appearances do not renew it.
     pub error_bound: f32,
+    /// Part of the reflected power that curved mirrors, gloss and glass reflect, which counts as diffuse; 0…1.
+    pub diffused_share: f64,
     /// Estimated error of the light shown; `None` where it was not estimated.
     pub estimated_error: Option<EstimatedError>,
     /// Whether this is the last step.

@@ -2,6 +2,8 @@
 
 use std::f32::consts::PI;
 
+use glam::Vec3;
+
 use crate::{
     hierarchy::{Channels as _, Hierarchy},
     solver::{
@@ -23,7 +25,35 @@ pub(crate) fn fill(
     report.elements = leaves.len() as u64;
     report.vertices = hierarchy.mesh.vertices.len() as u64;
     report.energy_balance = energy_balance(surfaces, linked);
+    report.diffused_share = diffused_share(surfaces, linked);
     fill_row_sums(report, hierarchy, linked);
+}
+
+/// Smallest part of the reflected power that is told of.
+const LEAST_TOLD: f64 = 0.005;
+
+/// Note how much light curved mirrors, gloss and glass send.
+pub(crate) fn note_diffused(report: &mut StepReport) {
+    let share = report.diffused_share;
+    if share >= LEAST_TOLD {
+        report.notes.push(Note::Diffused { share });
+    }
+}
+
+/// Part of the reflected power that is specular but counts as diffuse.
+fn diffused_share(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
+    let hierarchy = surfaces.hierarchy;
+    if !hierarchy.has_diffused() {
+        return 0.0;
+    }
+    let power = |of: &(dyn Fn(usize) -> Vec3 + Sync)| {
+        area_total(hierarchy, |leaf| {
+            of(leaf).extend(0.0) * linked.total(surfaces, leaf)
+        })
+    };
+    let all = power(&|leaf| hierarchy.reflectance_of(leaf));
+    let diffuse = power(&|leaf| hierarchy.diffuse_reflectance_of(leaf));
+    if all > 0.0 { 1.0 - diffuse / all } else { 0.0 }
 }
 
 /// Note that the memory limit prevented finer links or elements.
@@ -37,7 +67,8 @@ fn energy_balance(surfaces: Surfaces<'_>, linked: &LinkedLight) -> f64 {
     let hierarchy = surfaces.hierarchy;
     let arrived = area_total(hierarchy, |leaf| linked.total(surfaces, leaf));
     let sent = area_total(hierarchy, |leaf| {
-        let reflectance = hierarchy.reflectance_of(leaf).extend(0.0);
+        let mirrored = hierarchy.mirrored_by(leaf);
+        let reflectance = (hierarchy.reflectance_of(leaf) + mirrored).extend(0.0);
         let emitted = (hierarchy.emission_of(leaf) * PI).extend(0.0);
         let outside = surfaces.direct.outside_irradiance(hierarchy, leaf);
         reflectance * linked.total(surfaces, leaf) + emitted + outside

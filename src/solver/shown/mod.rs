@@ -8,6 +8,6 @@ mod path;
 mod seams;
 
 pub(crate) use display::{View, changed_triangles, color};
-pub(crate) use figures::{fill, note_full};
+pub(crate) use figures::{fill, note_diffused, note_full};
 pub(crate) use inspect::Inspector;
 pub(crate) use leaf_bounds::Bounding;

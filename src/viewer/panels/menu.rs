@@ -152,6 +152,11 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
         ),
         ("Backs of faces", view.backs, Action::ToggleBacks),
         (
+            "Traced picture at rest",
+            view.traced,
+            Action::ToggleTraced,
+        ),
+        (
             "See through walls from outside",
             view.see_through,
             Action::ToggleSeeThrough,

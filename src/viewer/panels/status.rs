@@ -48,6 +48,13 @@ pub fn status_ui(ui: &mut egui::Ui, state: &mut State) {
                 ui.label(RichText::new(text).weak());
             }
         }
+        if let Some(sharpness) = &state.sharpness {
+            let text = sharpness.label();
+            if text_width(ui, &text) + MESSAGE_WIDTH < ui.available_width() {
+                let why = "The traced picture of this view: samples of each pixel, and the noise that they leave";
+                ui.weak(text).on_hover_text(why);
+            }
+        }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             messages_ui(ui, state);
         });

@@ -44,6 +44,11 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
             ui.toggle_value(&mut view.texture_detail, "Textures")
                 .on_hover_text("Textures in detail, lit by the computed light");
         }
+        if view.mode == ViewMode::Radiance {
+            ui.toggle_value(&mut view.traced, "Traced").on_hover_text(
+                "Sharpen the view to a picture by rays from the eye while nothing moves and nothing is computed (V)",
+            );
+        }
         ui.separator();
         sides_ui(ui, &mut state.panels);
     });

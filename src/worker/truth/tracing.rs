@@ -6,7 +6,7 @@ use std::{
 };
 
 use glam::Vec3;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 
 use super::{Desk, MeasuredStep, TruthProgress, VertexErrors};
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     reference::{PathSettings, PathTraced, PathTracer, ReferencePoint},
     scene::Scene,
     solver::Snapshot,
-    worker::{Wake, priority::give_way},
+    worker::{Wake, priority::pool_that_gives_way},
 };
 
 /// Samples of a pass at each point. Fewer pay more for comparing than for tracing, more let the first error wait.
@@ -274,12 +274,7 @@ fn is_same(a: &Option<Arc<Snapshot>>, b: &Option<Arc<Snapshot>>) -> bool {
 fn pool(pools: &mut [Option<ThreadPool>; 2], is_narrow: bool) -> Option<&ThreadPool> {
     let pool = &mut pools[usize::from(!is_narrow)];
     if pool.is_none() {
-        *pool = ThreadPoolBuilder::new()
-            .num_threads(usize::from(is_narrow))
-            .thread_name(|index| format!("reference {index}"))
-            .start_handler(|_| give_way())
-            .build()
-            .ok();
+        *pool = pool_that_gives_way("reference", usize::from(is_narrow));
     }
     pool.as_ref()
 }
