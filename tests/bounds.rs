@@ -11,12 +11,12 @@ use vecrad::{
     geometry::{Random, RayTree, point_irradiance, triangle_point},
     hierarchy::{ElementId, Hierarchy, Kind, NodeId, Reading, Tables},
     reference::{MatrixSettings, solve_matrix},
-    scene::{Material, Scene, SceneBuilder, SceneOptions, Sides},
+    scene::{Material, Scene, SceneBuilder, SceneOptions, Sides, Specular},
     solver::{Direct, SolveSettings, Subject},
     transport::{Estimate, Judge, Judgement, Kernel, PairSampler, PatchSums, luminance},
 };
 
-/// Random triangles in a unit cube, gathered in clumps so that clusters differ.
+/// Random triangles in a unit cube, gathered in clumps so that clusters differ, and a mirror that stands askew beside them.
 fn clumps(seed: u64) -> Scene {
     let mut random = Random::new(seed, 0);
     let mut builder = SceneBuilder::default();
@@ -33,6 +33,15 @@ fn clumps(seed: u64) -> Scene {
             builder.push_triangle(corners, material);
         }
     }
+    let mirror = builder.push_material(Material {
+        specular: Some(Specular::Mirror {
+            reflectance: Vec3::splat(0.5),
+        }),
+        ..Material::plain("mirror", Vec3::ZERO, Vec3::ZERO)
+    });
+    let corners = [[0.9, -1.0, -1.0], [0.7, 1.0, -1.0], [1.1, 0.0, 1.2]];
+    let corners = corners.map(|corner| builder.push_position(DVec3::from_array(corner)));
+    builder.push_triangle(corners, mirror);
     builder
         .finish(&SceneOptions::with_sides(Sides::Two))
         .expect("the triangles are usable")
@@ -60,73 +69,83 @@ fn brute_force(
 
 #[test]
 fn the_interval_of_a_link_holds_what_brute_force_finds() {
+    for is_mirrored in [false, true] {
+        let checked: usize = (0..6).map(|seed| checked_pairs(seed, is_mirrored)).sum();
+        assert!(checked > 10_000, "only {checked} pairs were checked");
+    }
+}
+
+/// Check pairs of a scene, as they are or as a mirror shows them. Returns how many exchange light.
+fn checked_pairs(seed: u64, is_mirrored: bool) -> usize {
     let mut checked = 0;
-    for seed in 0..6 {
-        let scene = clumps(seed);
-        let (rays, hierarchy) = (RayTree::new(&scene), Hierarchy::new(&scene, 30.0));
-        let mut random = Random::new(seed, 1);
-        let radiosities: Vec<f32> = hierarchy.patches.iter().map(|_| random.uniform()).collect();
-        let tables = Tables::new(&hierarchy, |leaf| {
-            (Vec3::splat(radiosities[leaf].powi(4))).extend(1.0)
-        });
-        let areas = PatchSums::of_area(&hierarchy, &tables);
-        let powers = PatchSums::of_power(&hierarchy, &tables);
-        let kernel = Kernel {
+    let scene = clumps(seed);
+    let (rays, hierarchy) = (RayTree::new(&scene), Hierarchy::new(&scene, 30.0));
+    let image = rays.mirrors().expect("there is one").images()[0].clone();
+    let image = is_mirrored.then_some(&*image);
+    let seen_at = |point: Vec3| image.map_or(point, |image| image.place(point));
+    let source_of = |point: Vec3| image.map_or(point, |image| image.source_of(point));
+    let turned = |normal: Vec3| image.map_or(normal, |image| image.source_direction(normal));
+    let mut random = Random::new(seed, 1);
+    let radiosities: Vec<f32> = hierarchy.patches.iter().map(|_| random.uniform()).collect();
+    let tables = Tables::new(&hierarchy, |leaf| {
+        (Vec3::splat(radiosities[leaf].powi(4))).extend(1.0)
+    });
+    let areas = PatchSums::of_area(&hierarchy, &tables);
+    let powers = PatchSums::of_power(&hierarchy, &tables);
+    let kernel = Kernel {
+        hierarchy: &hierarchy,
+        tables: &tables,
+        reading: Some(Reading::Bounded),
+        image,
+    };
+    let judge = Judge {
+        ambient: 0.0,
+        kernel,
+        estimate: Estimate::Interval,
+        sampler: PairSampler {
             hierarchy: &hierarchy,
             tables: &tables,
-            reading: Some(Reading::Bounded),
+            areas: &areas,
+            powers: &powers,
+            rays: &rays,
+            image,
+        },
+    };
+    for _ in 0..20_000 {
+        let [source, receiver] =
+            [(); 2].map(|()| NodeId(random.below(hierarchy.node_count() as u32)));
+        let Judgement::Transfer { bound, .. } = judge.judge(source, receiver, &mut random) else {
+            continue;
         };
-        let judge = Judge {
-            ambient: 0.0,
-            kernel,
-            estimate: Estimate::Interval,
-            sampler: PairSampler {
-                hierarchy: &hierarchy,
-                tables: &tables,
-                areas: &areas,
-                powers: &powers,
-                rays: &rays,
-            },
-        };
-        for _ in 0..20_000 {
-            let [source, receiver] =
-                [(); 2].map(|()| NodeId(random.below(hierarchy.node_count() as u32)));
-            let Judgement::Transfer { bound, .. } = judge.judge(source, receiver, &mut random)
-            else {
-                continue;
-            };
-            let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
-            if hierarchy
-                .centroid(source)
-                .distance(hierarchy.centroid(receiver))
-                <= reach
-            {
-                continue;
-            }
-            let patch = match hierarchy.kind(receiver) {
-                Kind::Cluster(index) => {
-                    let range = hierarchy.clusters[index].patches();
-                    range.start + random.below(range.len() as u32) as usize
-                }
-                Kind::Element(index) => index,
-            };
-            let place = triangle_point(random.uniform_2d());
-            let [a, b, c] = hierarchy.mesh.corners(patch);
-            let point = a * place.x + b * place.y + c * place.z;
-            let normal = hierarchy.patches[patch].normal;
-            let pushed: Vec4 = kernel
-                .vector_irradiance(source, hierarchy.centroid(receiver))
-                .on_face(normal);
-            let truth = brute_force(&hierarchy, &tables, source, point, normal);
-            let difference = (luminance(pushed) - truth).abs();
-            assert!(
-                difference <= bound * 1.001 + 1e-6,
-                "seed {seed}, {source:?} to {receiver:?}: off by {difference}, bound {bound}"
-            );
-            checked += 1;
+        let reach = hierarchy.radius(source) + hierarchy.radius(receiver);
+        let distance = seen_at(hierarchy.centroid(source)).distance(hierarchy.centroid(receiver));
+        if distance <= reach {
+            continue;
         }
+        let patch = match hierarchy.kind(receiver) {
+            Kind::Cluster(index) => {
+                let range = hierarchy.clusters[index].patches();
+                range.start + random.below(range.len() as u32) as usize
+            }
+            Kind::Element(index) => index,
+        };
+        let place = triangle_point(random.uniform_2d());
+        let [a, b, c] = hierarchy.mesh.corners(patch);
+        let point = a * place.x + b * place.y + c * place.z;
+        let normal = hierarchy.patches[patch].normal;
+        let pushed: Vec4 = kernel
+            .vector_irradiance(source, hierarchy.centroid(receiver))
+            .on_face(normal);
+        let (point, facing) = (source_of(point), turned(normal));
+        let truth = brute_force(&hierarchy, &tables, source, point, facing);
+        let difference = (luminance(pushed) - truth).abs();
+        assert!(
+            difference <= bound * 1.001 + 1e-6,
+            "seed {seed}, {source:?} to {receiver:?}: off by {difference}, bound {bound}"
+        );
+        checked += 1;
     }
-    assert!(checked > 10_000, "only {checked} pairs were checked");
+    checked
 }
 
 /// Of the walls of the room.

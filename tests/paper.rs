@@ -34,6 +34,7 @@ fn kernel<'a>(hierarchy: &'a Hierarchy, tables: &'a Tables, reading: Reading) ->
         hierarchy,
         tables,
         reading: Some(reading),
+        image: None,
     }
 }
 

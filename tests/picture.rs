@@ -14,7 +14,7 @@ use vecrad::{
     reference::{BakePoint, bake},
     scene::{
         Environment, Face, Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, Sky,
-        Sun, Texture, TextureId, builtin, luminance,
+        Specular, Sun, Texture, TextureId, builtin, luminance,
     },
     solver::{Cancel, Snapshot, SolveSettings},
 };
@@ -147,6 +147,118 @@ fn every_pixel_of_a_furnace_is_alike() {
     for pixel in picture(&scene, &draft(&scene), &lens, 16) {
         let found = luminance(pixel.radiance());
         assert!((found - 1.0).abs() < 0.015, "{found}");
+    }
+}
+
+/// A furnace of radiance 1 with a cube in it.
+fn furnace_about(specular: Specular, opacity: f32) -> Arc<Scene> {
+    let mut builder = builtin::furnace(0.5, 0.5, 4);
+    let cube = builder.push_material(Material {
+        opacity,
+        specular: Some(specular),
+        ..Material::plain("cube", Vec3::ZERO, Vec3::ZERO)
+    });
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            let corner = |across: f64, up: f64| {
+                let mut at = DVec3::splat(0.5);
+                at[axis] += 0.15 * side;
+                at[(axis + 1) % 3] += 0.15 * across * side;
+                at[(axis + 2) % 3] += 0.15 * up;
+                at.to_array()
+            };
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            quad(
+                &mut builder,
+                corners.map(|(across, up)| corner(across, up)),
+                cube,
+            );
+        }
+    }
+    finish(builder, Sides::Auto)
+}
+
+#[test]
+fn mirrors_gloss_and_glass_do_not_show_in_a_furnace() {
+    let reflectance = Vec3::ONE;
+    let glass = |is_thin| Specular::Glass {
+        index: 1.5,
+        is_thin,
+    };
+    for (specular, opacity, tolerance) in [
+        (Specular::Mirror { reflectance }, 1.0, 0.02),
+        (glass(true), 0.0, 0.02),
+        (glass(false), 0.0, 0.03),
+        // Facets that hide each other take some light.
+        (
+            Specular::Gloss {
+                reflectance,
+                roughness: 0.15,
+            },
+            1.0,
+            0.06,
+        ),
+    ] {
+        let scene = furnace_about(specular, opacity);
+        let eye = scene.frame.from_world(DVec3::new(0.1, 0.8, 0.15));
+        let lens = lens(eye, scene.frame.from_world(DVec3::splat(0.5)), 1.2);
+        let picture = picture(&scene, &draft(&scene), &lens, 16);
+        let light: Vec<f32> = picture
+            .iter()
+            .map(|pixel| luminance(pixel.radiance()))
+            .collect();
+        let mean = light.iter().sum::<f32>() / light.len() as f32;
+        assert_close(mean, 1.0, tolerance, format_args!("{specular:?}"));
+        let most = light.iter().copied().fold(0.0, f32::max);
+        assert!(most < 1.2, "{specular:?}: a speck of {most}");
+        // Rays that end between facing sides of glass are few.
+        let dark = light.iter().filter(|light| **light < 0.7).count();
+        assert!(dark < 30, "{specular:?}: {dark} dark pixels");
+    }
+}
+
+#[test]
+fn a_mirror_shows_what_it_faces() {
+    // A floor of two colours before an upright mirror, seen over it.
+    let mut builder = SceneBuilder::default();
+    let (near, far) = (grey(&mut builder, 0.8), grey(&mut builder, 0.2));
+    let mirror = builder.push_material(Material {
+        specular: Some(Specular::Mirror {
+            reflectance: Vec3::splat(0.5),
+        }),
+        ..Material::plain("mirror", Vec3::ZERO, Vec3::ZERO)
+    });
+    for (z, material) in [(0.0, near), (1.0, far)] {
+        let corners = [
+            [-2.0, 0.0, z + 1.0],
+            [2.0, 0.0, z + 1.0],
+            [2.0, 0.0, z],
+            [-2.0, 0.0, z],
+        ];
+        quad(&mut builder, corners, material);
+    }
+    let corners = [
+        [-2.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 2.0, 0.0],
+        [-2.0, 2.0, 0.0],
+    ];
+    quad(&mut builder, corners, mirror);
+    let scene = builder
+        .finish(&SceneOptions::with_sides(Sides::One))
+        .unwrap();
+    let scene = Arc::new(scene.in_environment(Environment::default_sky()));
+    let snapshot = draft(&scene);
+    let eye = scene.frame.from_world(DVec3::new(0.0, 1.5, 3.0));
+    let at = |picture: &[Developed]| luminance(pixel(picture, [32, 24]).radiance());
+    // Straight at the floor, and at its image.
+    for z in [0.5, 1.5] {
+        let look = |z: f64| {
+            let target = scene.frame.from_world(DVec3::new(0.01, 0.0, z));
+            at(&picture(&scene, &snapshot, &lens(eye, target, 0.02), 16))
+        };
+        let (floor, image) = (look(z), look(-z));
+        assert_close(image, 0.5 * floor, 0.03, z);
     }
 }
 

@@ -72,6 +72,7 @@ fn visible(radiosity: impl Fn(bool) -> f32 + Sync, estimates: u32, rays_each: u3
         areas: &areas,
         powers: &powers,
         rays: &rays,
+        image: None,
     };
     let source = NodeId(source as u32);
     let sums = (0..estimates).fold((0.0, 0.0), |(light, area), estimate| {

@@ -91,13 +91,16 @@ impl Mirrors {
 
     /// Those of a scene; `None` where there is none.
     pub(super) fn of(scene: &Scene) -> Option<Box<Self>> {
-        let mirrors = |id: &TriangleId| {
-            matches!(scene.material(*id).specular, Some(Specular::Mirror { .. }))
-        };
+        let mirrors =
+            |id: &TriangleId| matches!(scene.material(*id).specular, Some(Specular::Mirror { .. }));
         if !scene.triangle_ids().any(|id| mirrors(&id)) {
             return None;
         }
-        let area: f32 = scene.surfaces.iter().map(|surface| surface.area_vector.length()).sum();
+        let area: f32 = scene
+            .surfaces
+            .iter()
+            .map(|surface| surface.area_vector.length())
+            .sum();
         let mut planes: HashMap<([i64; 4], u32, bool), usize> = HashMap::new();
         let mut list: Vec<(Mirror, Vec<TriangleId>)> = Vec::new();
         for id in scene.triangle_ids().filter(mirrors) {
@@ -232,7 +235,10 @@ impl Mirror {
     /// Take in another part of it.
     fn join(&mut self, other: &Self) {
         let share = other.area / (self.area + other.area);
-        self.normal = self.normal.lerp(other.normal, share).normalize_or(self.normal);
+        self.normal = self
+            .normal
+            .lerp(other.normal, share)
+            .normalize_or(self.normal);
         self.distance += (other.distance - self.distance) * share;
         self.area += other.area;
         self.min = self.min.min(other.min);
@@ -273,7 +279,9 @@ fn images(mirrors: &[Mirror]) -> Vec<Arc<Image>> {
                     leg as usize != *index && before.shows(mirror) && mirror.shows(before)
                 }
             });
-            follows.map(|(index, mirror)| image.in_mirror(index, mirror)).collect()
+            follows
+                .map(|(index, mirror)| image.in_mirror(index, mirror))
+                .collect()
         };
         last = last.iter().flat_map(longer).collect();
         last.retain(|image| luminance(image.reflectance) >= LEAST_WEIGHT);
@@ -283,7 +291,9 @@ fn images(mirrors: &[Mirror]) -> Vec<Arc<Image>> {
     all.sort_by(|a, b| luminance(b.reflectance).total_cmp(&luminance(a.reflectance)));
     all.truncate(MOST_IMAGES);
     let numbered = all.into_iter().zip(0..);
-    numbered.map(|(image, index)| Arc::new(Image { index, ..image })).collect()
+    numbered
+        .map(|(image, index)| Arc::new(Image { index, ..image }))
+        .collect()
 }
 
 impl Image {
@@ -517,9 +527,12 @@ mod tests {
         let first = &mirrors.images()[0];
         let world = frame.to_world(first.place(point));
         let expected = [(-2.25, 0.75), (0.25, 1.25)];
-        assert!(expected.iter().any(|(x, z)| {
-            (world.x - x).abs() < 1e-4 && (world.z - z).abs() < 1e-4
-        }), "{world}");
+        assert!(
+            expected
+                .iter()
+                .any(|(x, z)| { (world.x - x).abs() < 1e-4 && (world.z - z).abs() < 1e-4 }),
+            "{world}"
+        );
     }
 
     #[test]

@@ -69,7 +69,10 @@ impl Hierarchy {
     /// Mean reflectance of an element with what mirrors, gloss and glass reflect as if it were diffuse.
     pub fn reflectance_of(&self, element: usize) -> Vec3 {
         let diffuse = self.diffuse_reflectance_of(element);
-        match self.diffused.get(self.mesh.elements[element].patch as usize) {
+        match self
+            .diffused
+            .get(self.mesh.elements[element].patch as usize)
+        {
             Some(&diffused) if diffused != Vec3::ZERO => {
                 let most = Vec3::splat(self.max_reflectance);
                 (diffuse + diffused * self.opacity_of(element)).min(most)

@@ -180,9 +180,9 @@ impl Sight {
     ) -> bool {
         let passed = seen.passed(hit.triangle);
         let part = leg.passing * (1.0 - passed.element_sum() / 3.0);
-        let specular = surface.specular.filter(|_| {
-            leg.turns < MOST_TURNS && !seen.subject.is_unlit
-        });
+        let specular = surface
+            .specular
+            .filter(|_| leg.turns < MOST_TURNS && !seen.subject.is_unlit);
         let is_blurred = leg.blurs > 0;
         // Behind gloss, light passes straight through glass, as it does where gloss samples emitters.
         let specular = specular.filter(|specular| match specular {
@@ -360,7 +360,11 @@ impl Seen<'_> {
     ) -> f32 {
         let by_ray = chosen.density * -surface.flat_normal.dot(direction);
         let by_point = self.lit.emitters.density(triangle) * chosen.length * chosen.length;
-        if by_ray > 0.0 { by_ray / (by_ray + by_point) } else { 0.0 }
+        if by_ray > 0.0 {
+            by_ray / (by_ray + by_point)
+        } else {
+            0.0
+        }
     }
 
     /// What gloss reflects from the sun, from a point of an emitter, and from one of its image in each mirror, as radiance; its

@@ -41,7 +41,10 @@ impl Surface {
     ) -> [(Vec3, Vec3); 2] {
         let normal = self.mirror_normal(direction);
         let (onward, part) = if is_thin {
-            (Some(direction), reflected_by_pane(-normal.dot(direction), index))
+            (
+                Some(direction),
+                reflected_by_pane(-normal.dot(direction), index),
+            )
         } else {
             let index = if self.is_back { 1.0 / index } else { index };
             refracted(direction, normal, index)

@@ -156,7 +156,11 @@ impl Estimator<'_> {
             };
             sum += throughput * arrival.emission;
             let Some(turn) = turn else {
-                return (sum, ray_count, Some((arrival.point, throughput * arrival.reflectance)));
+                return (
+                    sum,
+                    ray_count,
+                    Some((arrival.point, throughput * arrival.reflectance)),
+                );
             };
             let at = arrival.point;
             let (onward, weight, density) = match turn {
@@ -241,7 +245,8 @@ impl Estimator<'_> {
             emission *= match flight.density.map(|density| density * source_cosine) {
                 None if source_cosine > 0.0 => 1.0,
                 Some(by_ray) if by_ray > 0.0 => {
-                    let by_point = self.emitters.density(hit.triangle) * hit.distance * hit.distance;
+                    let by_point =
+                        self.emitters.density(hit.triangle) * hit.distance * hit.distance;
                     by_ray / (by_ray + by_point)
                 }
                 _ => 0.0,
@@ -249,7 +254,11 @@ impl Estimator<'_> {
         }
         // Of glass, rays always meet something.
         let material = self.scene.material(hit.triangle);
-        let met = if material.is_glass() { material.met_share() } else { 1.0 };
+        let met = if material.is_glass() {
+            material.met_share()
+        } else {
+            1.0
+        };
         Some(Arrival {
             point: Place {
                 position,

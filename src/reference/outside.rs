@@ -1,9 +1,6 @@
 //! Light from outside as the references sample it: the sky by its luminance, the sun by its disc.
 
-use std::{
-    f32::consts::PI,
-    sync::Arc,
-};
+use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Vec2, Vec3};
 

@@ -81,7 +81,11 @@ pub(super) fn turned(
     }
     let color = specular.color() * material.share_of_met();
     let [diffuse, special] = [material.reflectance * material.share_of_met(), color].map(luminance);
-    let chance = if special > 0.0 { special / (special + diffuse) } else { 0.0 };
+    let chance = if special > 0.0 {
+        special / (special + diffuse)
+    } else {
+        0.0
+    };
     if random.uniform() >= chance {
         return Some(Turn::Diffuse {
             chance: 1.0 - chance,
@@ -115,7 +119,11 @@ fn glass(
 ) -> Turn {
     let (onward, part, scale) = if is_thin {
         let index = index.max(1.0 / index);
-        (Some(direction), reflected_by_pane(-normal.dot(direction), index), 1.0)
+        (
+            Some(direction),
+            reflected_by_pane(-normal.dot(direction), index),
+            1.0,
+        )
     } else {
         // Radiance is larger where light is slower.
         let (onward, part) = refracted(direction, normal, index);

@@ -112,10 +112,7 @@ pub fn reflected_by_pane(cosine: f32, index: f32) -> f32 {
 /// Fresnel's reflectance from the cosines before and behind a surface.
 fn fresnel(before: f32, behind: f32, index: f32) -> f32 {
     let ratio = |a: f32, b: f32| if a + b > 0.0 { (a - b) / (a + b) } else { 1.0 };
-    let (across, along) = (
-        ratio(before, index * behind),
-        ratio(index * before, behind),
-    );
+    let (across, along) = (ratio(before, index * behind), ratio(index * before, behind));
     0.5 * (across * across + along * along)
 }
 
@@ -123,7 +120,14 @@ fn fresnel(before: f32, behind: f32, index: f32) -> f32 {
 fn mean_fresnel(index: f32, is_thin: bool) -> f32 {
     cosine_mean(|cosine| match is_thin {
         true => reflected_by_pane(cosine, index),
-        false => refracted(Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, -cosine), Vec3::Z, index).1,
+        false => {
+            refracted(
+                Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, -cosine),
+                Vec3::Z,
+                index,
+            )
+            .1
+        }
     })
 }
 
@@ -295,7 +299,10 @@ mod tests {
                 }
                 let cell = std::f64::consts::PI / f64::from(steps * steps);
                 let (value, density) = ((value * cell) as f32, (density * cell) as f32);
-                assert!((value - albedo).abs() < 0.01, "{roughness} {cosine}: {value} {albedo}");
+                assert!(
+                    (value - albedo).abs() < 0.01,
+                    "{roughness} {cosine}: {value} {albedo}"
+                );
                 assert!(density <= 1.0 + 0.01 && density >= value - 1e-3);
             }
         }
@@ -305,7 +312,11 @@ mod tests {
     fn samples_have_the_weight_of_their_values() {
         for (roughness, cosine) in [(0.05, 0.9), (0.3, 0.2), (1.0, 0.5)] {
             let (gloss, from) = (Gloss::new(roughness), direction(cosine, 2.0));
-            for square in [Vec2::new(0.1, 0.2), Vec2::new(0.7, 0.01), Vec2::new(0.4, 0.6)] {
+            for square in [
+                Vec2::new(0.1, 0.2),
+                Vec2::new(0.7, 0.01),
+                Vec2::new(0.4, 0.6),
+            ] {
                 let Some((to, weight)) = gloss.sample(Vec3::Z, from, square) else {
                     continue;
                 };

@@ -2,7 +2,10 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Material, Scene, Specular, TriangleId, ranges::{finite_non_negative, limited_reflectance}};
+use super::{
+    Material, Scene, Specular, TriangleId,
+    ranges::{finite_non_negative, limited_reflectance},
+};
 
 /// Alpha below which a pixel is cut out.
 pub(super) const LEAST_ALPHA: f32 = 0.5;
@@ -203,7 +206,11 @@ impl Scene {
             return None;
         }
         let mut copy = self.clone();
-        for material in copy.materials.iter_mut().filter(|material| material.is_glass()) {
+        for material in copy
+            .materials
+            .iter_mut()
+            .filter(|material| material.is_glass())
+        {
             material.opacity = 1.0;
         }
         Some(copy)

@@ -47,7 +47,11 @@ impl MtlMaterial {
     pub(super) fn shine(&self, diffuse: Vec3) -> Option<Shine> {
         let is_painted = self.roughness.is_some() || self.metalness.is_some();
         let metal = self.metalness.unwrap_or(0.0);
-        let metal = if metal.is_finite() { metal.clamp(0.0, 1.0) } else { 0.0 };
+        let metal = if metal.is_finite() {
+            metal.clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         // The models without highlights.
         if matches!(self.model, Some(0 | 1)) && !is_painted {
             return None;
@@ -62,7 +66,11 @@ impl MtlMaterial {
             (None, Some(exponent)) if exponent >= MIRROR_EXPONENT => 0.0,
             (None, exponent) => roughness_of_exponent(exponent.unwrap_or(0.0)),
         };
-        let roughness = if roughness.is_finite() { roughness.min(1.0) } else { 1.0 };
+        let roughness = if roughness.is_finite() {
+            roughness.min(1.0)
+        } else {
+            1.0
+        };
         let specular = match roughness < LEAST_ROUGHNESS {
             true => Specular::Mirror { reflectance },
             false => Specular::Gloss {
@@ -93,24 +101,51 @@ mod tests {
     fn mirrors_and_gloss_are_told_by_model_exponent_and_roughness() {
         let shine = |text: &str| material(text).shine(Vec3::new(0.8, 0.4, 0.2));
         let reflectance = Vec3::splat(0.5);
-        for text in ["Ks 0.5\nillum 3", "illum 5\nKs 0.5\nNs 10", "Ks 0.5\nNs 1000", "Ks 0.5\nPr 0"] {
+        for text in [
+            "Ks 0.5\nillum 3",
+            "illum 5\nKs 0.5\nNs 10",
+            "Ks 0.5\nNs 1000",
+            "Ks 0.5\nPr 0",
+        ] {
             let mirror = Specular::Mirror { reflectance };
-            assert_eq!(shine(text).map(|shine| shine.specular), Some(mirror), "{text}");
+            assert_eq!(
+                shine(text).map(|shine| shine.specular),
+                Some(mirror),
+                "{text}"
+            );
         }
-        for (text, expected) in [("Ks 0.5", 1.0), ("Ks 0.5\nNs 198\nillum 2", 0.1), ("Ks 0.5\nillum 3\nPr 0.5", 0.25)] {
-            let Some(Specular::Gloss { roughness, .. }) = shine(text).map(|shine| shine.specular) else {
+        for (text, expected) in [
+            ("Ks 0.5", 1.0),
+            ("Ks 0.5\nNs 198\nillum 2", 0.1),
+            ("Ks 0.5\nillum 3\nPr 0.5", 0.25),
+        ] {
+            let Some(Specular::Gloss { roughness, .. }) = shine(text).map(|shine| shine.specular)
+            else {
                 panic!("{text}: no gloss");
             };
             assert!((roughness - expected).abs() < 1e-6, "{text}: {roughness}");
         }
-        for text in ["", "illum 5", "Ks 0 0 0\nNs 900", "Ks 0.5\nillum 1", "Ks -1", "Ks nan"] {
+        for text in [
+            "",
+            "illum 5",
+            "Ks 0 0 0\nNs 900",
+            "Ks 0.5\nillum 1",
+            "Ks -1",
+            "Ks nan",
+        ] {
             assert_eq!(shine(text), None, "{text}");
         }
         // Metal has its colour in the lobe.
         let metal = shine("Pm 1\nPr 0.3\nKs 0.5").expect("metal");
-        assert_eq!((metal.diffuse, metal.specular.color()), (0.0, Vec3::new(0.8, 0.4, 0.2)));
+        assert_eq!(
+            (metal.diffuse, metal.specular.color()),
+            (0.0, Vec3::new(0.8, 0.4, 0.2))
+        );
         let plastic = shine("Pr 0.3").expect("plastic");
-        assert_eq!((plastic.diffuse, plastic.specular.color()), (1.0, Vec3::splat(0.04)));
+        assert_eq!(
+            (plastic.diffuse, plastic.specular.color()),
+            (1.0, Vec3::splat(0.04))
+        );
     }
 
     #[test]

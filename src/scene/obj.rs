@@ -495,9 +495,10 @@ impl Import<'_> {
             cutting.as_ref(),
             remarks,
         );
-        let glass = defined.material.glass().filter(|_| {
-            shown.has_faces && !self.options.is_opaque && !self.options.is_matt
-        });
+        let glass = defined
+            .material
+            .glass()
+            .filter(|_| shown.has_faces && !self.options.is_opaque && !self.options.is_matt);
         let opacity = match glass {
             None => self.opacity(defined, shown, remarks),
             Some(_) => glass_opacity(defined, remarks),
@@ -614,7 +615,10 @@ impl Import<'_> {
 
     /// Mean colour of a texture.
     fn mean_color(&self, placed: &Placed) -> Vec3 {
-        let texture = placed.texture.id.map(|id| &self.builder.textures[id.index()]);
+        let texture = placed
+            .texture
+            .id
+            .map(|id| &self.builder.textures[id.index()]);
         texture.map_or(Vec3::ONE, |texture| {
             let sum: Vec3 = texture.pixels.iter().sum();
             sum / texture.pixels.len().max(1) as f32

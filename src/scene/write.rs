@@ -15,8 +15,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb32FImage, RgbImage};
 
 use super::{
     Cutout, Frame, Material, Scene, SceneOptions, Specular, Texture, TextureId, builtin,
-    mtl_specular::MIRROR_EXPONENT, srgb_byte,
-    whole::write_whole,
+    mtl_specular::MIRROR_EXPONENT, srgb_byte, whole::write_whole,
 };
 
 /// Write `scene` to `path`, its materials beside it under the same stem, and its textures beside both.

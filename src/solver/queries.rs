@@ -8,6 +8,7 @@ use super::{
     sums,
 };
 use crate::{
+    geometry::Image,
     hierarchy::{Hierarchy, luminance},
     scene::{Appearance, Scene},
     transport::LinkStore,
@@ -80,5 +81,11 @@ impl Solver {
     /// The links, for tests and inspection.
     pub fn links(&self) -> &LinkStore {
         &self.linked.links
+    }
+
+    /// The links from images in mirrors, for tests.
+    pub fn image_links(&self) -> impl Iterator<Item = (&Image, &LinkStore)> {
+        let images = self.linked.images.iter();
+        images.map(|image| (&*image.image, &image.links))
     }
 }

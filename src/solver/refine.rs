@@ -21,7 +21,8 @@ use crate::{
     geometry::{Image, Random, RayTree},
     hierarchy::{Channels as _, Hierarchy, NodeId, luminance},
     transport::{
-        Estimate, Judge, Kernel, Link, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement, Refiner,
+        Estimate, Judge, Kernel, Link, LinkBudget, LinkStore, PairSampler, PatchSums, Refinement,
+        Refiner,
     },
 };
 

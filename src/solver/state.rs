@@ -154,8 +154,7 @@ impl Solver {
         self.linked.extend(&self.hierarchy);
         let sees_outside = self.plan.sees_outside;
         let (scene, rays) = (&self.scene, &self.rays);
-        self.direct =
-            DirectFields::new(scene, &self.hierarchy, &self.settings, sees_outside, rays);
+        self.direct = DirectFields::new(scene, &self.hierarchy, &self.settings, sees_outside, rays);
         self.linked.show_images(rays);
         cancel.proceed()?;
         // Divide large elements and contact elements.

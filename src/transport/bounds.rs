@@ -252,6 +252,7 @@ mod tests {
             hierarchy,
             tables,
             reading: Some(Reading::Bounded),
+            image: None,
         }
     }
 

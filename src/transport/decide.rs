@@ -230,7 +230,10 @@ fn area_form_factor(kernel: Kernel<'_>, source: usize, receiver: usize) -> f32 {
     }
     let points = inner_points(hierarchy.mesh.corners(receiver));
     let normals = Vectors4::splat(normal);
-    kernel.element_form_factors(source, &points, &normals).element_sum() * 0.25
+    kernel
+        .element_form_factors(source, &points, &normals)
+        .element_sum()
+        * 0.25
 }
 
 #[cfg(test)]

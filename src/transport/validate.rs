@@ -1,7 +1,12 @@
 //! Check of a link store: every pair of leaves is linked exactly once, or does not need a link.
 
+use glam::Vec3;
+
 use super::{Link, LinkStore, oracle::IN_PLANE};
-use crate::hierarchy::{Hierarchy, Kind, NodeId};
+use crate::{
+    geometry::Image,
+    hierarchy::{Hierarchy, Kind, NodeId},
+};
 
 /// Height over a plane, in multiples of [`IN_PLANE`] times the radius of the scene, up to which a leaf counts as lying in
 /// it: refinement omits pairs of ancestors, whose radii add to at most twice that of the scene. Smaller reports pairs that
@@ -23,6 +28,18 @@ impl LinkStore {
     /// # Errors
     /// Names the first receiver and source that break the promise.
     pub fn validate(&self, hierarchy: &Hierarchy) -> Result<(), String> {
+        self.validate_seen(hierarchy, None)
+    }
+
+    /// As [`Self::validate`], for links from an image of the scene in mirrors.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn validate_seen(
+        &self,
+        hierarchy: &Hierarchy,
+        image: Option<&Image>,
+    ) -> Result<(), String> {
         if self.is_empty() {
             return Ok(());
         }
@@ -36,6 +53,7 @@ impl LinkStore {
         let mut check = Check {
             store: self,
             hierarchy,
+            image,
             parents,
             linked_by: vec![NONE; count],
             linked_below: vec![0; count],
@@ -50,6 +68,8 @@ impl LinkStore {
 struct Check<'a> {
     store: &'a LinkStore,
     hierarchy: &'a Hierarchy,
+    /// Where receivers see the sources.
+    image: Option<&'a Image>,
     /// By node, its parent, or [`NONE`].
     parents: Vec<u32>,
     /// By source, the node on the path to the present receiver that receives from it, or [`NONE`].
@@ -123,7 +143,7 @@ impl Check<'_> {
                 false => Ok(()),
             };
         }
-        if !has_links_below && !self.is_above(source, leaf) {
+        if !has_links_below && !self.is_above(source, leaf, |point| self.seen_at(point)) {
             return Ok(());
         }
         let children = self.hierarchy.children(source);
@@ -136,8 +156,16 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Whether some of a node, or of its box, lies above the plane of a leaf.
-    fn is_above(&self, node: NodeId, leaf: NodeId) -> bool {
+    fn seen_at(&self, point: Vec3) -> Vec3 {
+        self.image.map_or(point, |image| image.place(point))
+    }
+
+    fn source_of(&self, place: Vec3) -> Vec3 {
+        self.image.map_or(place, |image| image.source_of(place))
+    }
+
+    /// Whether some of a node, or of its box, lies above the plane of a leaf that sees it where `place` puts it.
+    fn is_above(&self, node: NodeId, leaf: NodeId, place: impl Fn(Vec3) -> Vec3) -> bool {
         let Kind::Element(of) = self.hierarchy.kind(leaf) else {
             return true;
         };
@@ -146,13 +174,16 @@ impl Check<'_> {
         let height = match self.hierarchy.kind(node) {
             Kind::Element(index) => {
                 let corners = self.hierarchy.mesh.corners(index);
-                let heights = corners.map(|corner| corner.dot(normal));
+                let heights = corners.map(|corner| place(corner).dot(normal));
                 heights.into_iter().fold(f32::MIN, f32::max)
             }
             Kind::Cluster(_) => {
                 let (min, max) = self.hierarchy.bounds(node);
-                let half = (max - min) * 0.5;
-                (min + half).dot(normal) + half.dot(normal.abs())
+                let (half, middle) = ((max - min) * 0.5, (max + min) * 0.5);
+                let centre = place(middle).dot(normal);
+                let reach =
+                    Vec3::AXES.map(|axis| (place(middle + axis * half).dot(normal) - centre).abs());
+                centre + reach.into_iter().sum::<f32>()
             }
         };
         height - base > self.slack
@@ -176,8 +207,8 @@ impl Check<'_> {
         };
         counts(source)
             && counts(receiver)
-            && self.is_above(source, receiver)
-            && self.is_above(receiver, source)
+            && self.is_above(source, receiver, |point| self.seen_at(point))
+            && self.is_above(receiver, source, |point| self.source_of(point))
     }
 }
 

@@ -12,8 +12,8 @@ use glam::{Vec3, Vec4};
 use super::{luminance, patch_sums::PatchSums};
 use crate::{
     geometry::{
-        Followed, Image, Random, RayTree, Vectors4, barycentric_in_plane, cosine_direction, point_irradiances,
-        triangle_point,
+        Followed, Image, Random, RayTree, Vectors4, barycentric_in_plane, cosine_direction,
+        point_irradiances, triangle_point,
     },
     hierarchy::{Channels as _, Hierarchy, Kind, NodeId, Tables},
     scene::TriangleId,

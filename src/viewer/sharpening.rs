@@ -205,7 +205,9 @@ impl Tracing {
             }
         };
         // Without a thread the drawn picture stays.
-        let _ = thread::Builder::new().name("picture".to_owned()).spawn(work);
+        let _ = thread::Builder::new()
+            .name("picture".to_owned())
+            .spawn(work);
         self.pictures = Some((cancel, pictures));
     }
 

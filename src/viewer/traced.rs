@@ -128,7 +128,9 @@ impl Traced {
         let pixels = self.pixels.iter();
         let squares: f64 = pixels.map(|pixel| f64::from(pixel.noise).powi(2)).sum();
         let pixels = self.pixels.iter();
-        let light: f64 = pixels.map(|pixel| f64::from(luminance(pixel.radiance()))).sum();
+        let light: f64 = pixels
+            .map(|pixel| f64::from(luminance(pixel.radiance())))
+            .sum();
         let count = self.pixels.len().max(1) as f64;
         let noise = ((squares / count).sqrt() / (light / count)) as f32;
         (noise > 0.0 && noise.is_finite()).then_some(noise)

@@ -164,6 +164,7 @@ fn pairs(criterion: &mut Criterion, scene: &Scene) {
         hierarchy: &hierarchy,
         tables: &tables,
         reading: Some(Reading::Bounded),
+        image: None,
     };
     let mut random = Random::new(4, 0);
     let mut node = |count: usize| NodeId(random.below(count as u32));
@@ -184,6 +185,7 @@ fn pairs(criterion: &mut Criterion, scene: &Scene) {
         areas: &areas,
         powers: &powers,
         rays: &rays,
+        image: None,
     };
     oracle_and_visibility(criterion, kernel, sampler, &pairs);
 }

@@ -214,7 +214,13 @@ impl ErrorEstimator {
                 direct: Direct::Sampled,
                 ..shown.settings.clone()
             };
-            DirectFields::new(shown.scene, hierarchy, &settings, shown.sees_outside, &self.rays)
+            DirectFields::new(
+                shown.scene,
+                hierarchy,
+                &settings,
+                shown.sees_outside,
+                &self.rays,
+            )
         });
         let scene = Scenery {
             hierarchy,

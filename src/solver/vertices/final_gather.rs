@@ -305,9 +305,7 @@ impl FinalGather<'_> {
 
     /// What a ray met by the triangle that it hit.
     fn met(&self, end: &Followed) -> Met {
-        let Followed {
-            hit, direction, ..
-        } = *end;
+        let Followed { hit, direction, .. } = *end;
         let Some(hit) = hit else {
             return Met::Nothing;
         };

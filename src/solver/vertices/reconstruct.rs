@@ -79,12 +79,15 @@ pub(crate) fn gather_leaves(
 /// Add the light of the same leaves over mirrors, times what arrives of it, by channel.
 pub(crate) fn add_mirrored(leaves: &mut [LeafLight], mirrored: &[LeafLight], arriving: Vec3) {
     let arriving = arriving.extend(0.0);
-    leaves.par_iter_mut().zip(mirrored).for_each(|(leaf, light)| {
-        leaf.centre += light.centre * arriving;
-        for (sum, light) in leaf.corners.iter_mut().zip(light.corners) {
-            *sum += light * arriving;
-        }
-    });
+    leaves
+        .par_iter_mut()
+        .zip(mirrored)
+        .for_each(|(leaf, light)| {
+            leaf.centre += light.centre * arriving;
+            for (sum, light) in leaf.corners.iter_mut().zip(light.corners) {
+                *sum += light * arriving;
+            }
+        });
 }
 
 /// Scale the light of the leaves of one cell so that their form factors add to its coverage; `nearby` is the mean
@@ -139,9 +142,7 @@ impl<'a> Chain<'a> {
     /// Add a link, as a sight if its source is a cluster further than `far` from a centre.
     fn add(&mut self, kernel: Kernel<'_>, link: TintedLink<'a>, centre: Vec3, far: f32) {
         match kernel.hierarchy.kind(link.source) {
-            Kind::Cluster(index)
-                if centre.distance_squared(kernel.centre(index)) > far * far =>
-            {
+            Kind::Cluster(index) if centre.distance_squared(kernel.centre(index)) > far * far => {
                 let sight = kernel.sight(index, centre);
                 self.sights.push(&sight, link.tinted_transmission());
             }

@@ -24,6 +24,7 @@ fn sampled<T>(scene: &Scene, rays: &RayTree, of: impl Fn(&PairSampler<'_>) -> T)
         areas: &areas,
         powers: &powers,
         rays,
+        image: None,
     })
 }
 

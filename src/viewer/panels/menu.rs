@@ -151,11 +151,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
             Action::ToggleLinks,
         ),
         ("Backs of faces", view.backs, Action::ToggleBacks),
-        (
-            "Traced picture at rest",
-            view.traced,
-            Action::ToggleTraced,
-        ),
+        ("Traced picture at rest", view.traced, Action::ToggleTraced),
         (
             "See through walls from outside",
             view.see_through,
