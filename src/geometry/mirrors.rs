@@ -8,7 +8,6 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::{Mat3, Vec3};
 
-use super::{Hit, Passage, RayTree, panes::chance};
 use crate::scene::{Scene, Specular, TriangleId, luminance};
 
 /// Most mirrors whose images are followed. Fewer, and rooms of mirrors are taken for diffuse; more take time for each.
@@ -25,9 +24,6 @@ const LEAST_WEIGHT: f32 = 0.02;
 /// takes time for those that it does not, and for every facet of a curved one.
 const LEAST_SHARE: f32 = 2e-4;
 
-/// Part of a ray's light below which it ends between mirrors.
-const LEAST_LEFT: f32 = 1e-3;
-
 /// Steps within which normals (of unit length) and distances (in frame units) are those of one plane.
 const PLANE_STEPS: [f32; 2] = [1e-4, 1e-3];
 
@@ -41,16 +37,16 @@ pub struct Mirrors {
 
 /// A plane mirror.
 #[derive(Clone, Debug)]
-struct Mirror {
+pub(super) struct Mirror {
     /// Unit normal of the fronts of its triangles.
     normal: Vec3,
     /// Of the plane from the origin, along the normal.
     distance: f32,
     is_two_sided: bool,
     /// What it reflects, of what rays meet.
-    reflectance: Vec3,
+    pub(super) reflectance: Vec3,
     /// The part of the rays that it reflects as a mirror; of the others it is diffuse.
-    mirrored_part: f32,
+    pub(super) mirrored_part: f32,
     area: f32,
     /// Box about its triangles.
     min: Vec3,
@@ -63,27 +59,12 @@ pub struct Image {
     /// Its place in the list of images.
     index: u32,
     /// The mirrors on the way from the point that sees the image.
-    legs: Vec<u32>,
+    pub(super) legs: Vec<u32>,
     /// From places of the scene to those of the image: a rotation, with a reflection where the legs are odd, and a shift.
     turn: Mat3,
     shift: Vec3,
     /// What arrives of its light, by channel.
     reflectance: Vec3,
-}
-
-/// A ray after the mirrors on its way.
-#[derive(Clone, Copy, Debug)]
-pub struct Followed {
-    /// What it meets.
-    pub hit: Option<Hit>,
-    /// Where its last part starts.
-    pub origin: Vec3,
-    /// Unit direction of its last part.
-    pub direction: Vec3,
-    /// Length of its parts before that.
-    pub length: f32,
-    /// By what its light is to be multiplied, by channel.
-    pub tint: Vec3,
 }
 
 impl Mirrors {
@@ -156,51 +137,11 @@ impl Mirrors {
     }
 
     /// The mirror that a ray meets on the side that reflects.
-    fn met(&self, triangle: TriangleId, direction: Vec3) -> Option<(u32, &Mirror)> {
+    pub(super) fn met(&self, triangle: TriangleId, direction: Vec3) -> Option<(u32, &Mirror)> {
         let index = self.of_triangle[triangle.index()];
         let mirror = self.list.get(index as usize)?;
         let is_front = mirror.normal.dot(direction) < 0.0;
         (is_front || mirror.is_two_sided).then_some((index, mirror))
-    }
-
-    /// Follow a ray to a surface that does not reflect it as a mirror. Where a mirror is diffuse as well, chance decides.
-    pub fn follow(
-        &self,
-        rays: &RayTree,
-        origin: Vec3,
-        direction: Vec3,
-        from: Option<TriangleId>,
-    ) -> Followed {
-        let (mut origin, mut direction, mut from) = (origin, direction, from);
-        let (mut tint, mut length) = (Vec3::ONE, 0.0);
-        loop {
-            let hit = rays.closest(origin, direction, from);
-            tint *= rays.tint(origin, direction, from, hit);
-            let met = hit.and_then(|hit| Some((hit, self.met(hit.triangle, direction)?.1)));
-            if let Some((hit, mirror)) = met {
-                let part = mirror.mirrored_part;
-                let reflects = part >= 1.0 || chance(origin, direction, !hit.triangle.0) < part;
-                if reflects && tint.max_element() > LEAST_LEFT {
-                    origin += direction * hit.distance;
-                    direction = mirror.reflected(direction);
-                    from = Some(hit.triangle);
-                    tint *= mirror.reflectance / part;
-                    length += hit.distance;
-                    continue;
-                }
-                tint *= match reflects {
-                    true => 0.0,
-                    false => 1.0 / (1.0 - part),
-                };
-            }
-            return Followed {
-                hit,
-                origin,
-                direction,
-                length,
-                tint,
-            };
-        }
     }
 }
 
@@ -245,7 +186,7 @@ impl Mirror {
         self.max = self.max.max(other.max);
     }
 
-    fn reflected(&self, direction: Vec3) -> Vec3 {
+    pub(super) fn reflected(&self, direction: Vec3) -> Vec3 {
         (direction - 2.0 * direction.dot(self.normal) * self.normal).normalize_or(-direction)
     }
 
@@ -347,242 +288,5 @@ impl Image {
     /// The direction of the scene that is seen in a direction.
     pub fn source_direction(&self, direction: Vec3) -> Vec3 {
         self.turn.transpose() * direction
-    }
-
-    /// What passes from a point to one of the scene over all mirrors, by channel, beside what they take, with the length of
-    /// the way to what blocks. The triangles are those of both ends.
-    pub fn passage(
-        &self,
-        rays: &RayTree,
-        from: Vec3,
-        to: Vec3,
-        [start, end]: [Option<TriangleId>; 2],
-    ) -> Passage {
-        let seen = self.place(to);
-        let direction = (seen - from).normalize_or_zero();
-        match self.over_mirrors(rays, from, direction, from.distance(seen), start) {
-            Err(blocked) => blocked,
-            Ok(leg) => {
-                let last = rays.passage(leg.origin, to, [leg.from, end]);
-                Passage {
-                    transmittance: leg.tint * last.transmittance,
-                    end: leg.length + last.end,
-                }
-            }
-        }
-    }
-
-    /// As [`Self::passage`], out of the scene in a direction of it.
-    pub fn passage_outward(
-        &self,
-        rays: &RayTree,
-        from: Vec3,
-        direction: Vec3,
-        start: Option<TriangleId>,
-    ) -> Passage {
-        let seen = self.direction(direction);
-        match self.over_mirrors(rays, from, seen, f32::INFINITY, start) {
-            Err(blocked) => blocked,
-            Ok(leg) => {
-                let last = rays.passage_outward(leg.origin, direction, leg.from);
-                Passage {
-                    transmittance: leg.tint * last.transmittance,
-                    end: leg.length + last.end,
-                }
-            }
-        }
-    }
-
-    /// What a ray meets behind all mirrors of the image, with its tint; `None` where it misses one.
-    pub fn met(
-        &self,
-        rays: &RayTree,
-        from: Vec3,
-        direction: Vec3,
-        start: Option<TriangleId>,
-    ) -> Option<Followed> {
-        let leg = self
-            .over_mirrors(rays, from, direction, f32::INFINITY, start)
-            .ok()?;
-        let direction = self.source_direction(direction);
-        let hit = rays.closest(leg.origin, direction, leg.from);
-        Some(Followed {
-            hit,
-            origin: leg.origin,
-            direction,
-            length: leg.length,
-            tint: leg.tint * rays.tint(leg.origin, direction, leg.from, hit),
-        })
-    }
-
-    /// The last mirror on the way of a ray; what it is blocked by if it misses one, or if that lies further than `until`.
-    fn over_mirrors(
-        &self,
-        rays: &RayTree,
-        from: Vec3,
-        direction: Vec3,
-        until: f32,
-        start: Option<TriangleId>,
-    ) -> Result<Leg, Passage> {
-        let mut leg = Leg {
-            origin: from,
-            from: start,
-            length: 0.0,
-            tint: Vec3::ONE,
-        };
-        let mut direction = direction;
-        for &expected in &self.legs {
-            let hit = rays.closest(leg.origin, direction, leg.from);
-            let blocked = |end: f32| Passage {
-                transmittance: Vec3::ZERO,
-                end,
-            };
-            let Some(hit) = hit else {
-                return Err(blocked(until));
-            };
-            let mirrors = rays.mirrors();
-            let met = mirrors.and_then(|mirrors| mirrors.met(hit.triangle, direction));
-            let end = leg.length + hit.distance;
-            let Some((_, mirror)) = met.filter(|(index, _)| *index == expected && end < until)
-            else {
-                return Err(blocked(end));
-            };
-            leg.tint *= rays.tint(leg.origin, direction, leg.from, Some(hit));
-            leg.origin += direction * hit.distance;
-            leg.from = Some(hit.triangle);
-            leg.length = end;
-            direction = mirror.reflected(direction);
-        }
-        Ok(leg)
-    }
-}
-
-/// A ray at a mirror.
-struct Leg {
-    origin: Vec3,
-    from: Option<TriangleId>,
-    /// Of the way so far.
-    length: f32,
-    tint: Vec3,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        geometry::Random,
-        scene::{Material, SceneBuilder, SceneOptions, Sides},
-    };
-
-    /// A box of 2 x 2 x 2 about the origin, seen from inside, whose walls of lowest x and highest z are mirrors.
-    fn scene() -> Scene {
-        let mut builder = SceneBuilder::default();
-        let wall = builder.push_material(Material::plain("wall", Vec3::splat(0.5), Vec3::ONE));
-        let mirror = builder.push_material(Material {
-            specular: Some(Specular::Mirror {
-                reflectance: Vec3::splat(0.75),
-            }),
-            ..Material::plain("mirror", Vec3::ZERO, Vec3::ZERO)
-        });
-        let at = |corner: u32| {
-            let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            glam::DVec3::new(sign(0), sign(1), sign(2))
-        };
-        for corner in 0..8 {
-            builder.push_position(at(corner));
-        }
-        for (corners, is_mirror) in [
-            ([0, 2, 6, 4], true),
-            ([1, 5, 7, 3], false),
-            ([0, 4, 5, 1], false),
-            ([2, 3, 7, 6], false),
-            ([0, 1, 3, 2], false),
-            ([4, 6, 7, 5], true),
-        ] {
-            let [a, b, c, d] = corners;
-            let material = if is_mirror { mirror } else { wall };
-            builder.push_triangle([a, b, c], material);
-            builder.push_triangle([a, c, d], material);
-        }
-        let options = SceneOptions::with_sides(Sides::Two);
-        builder.finish(&options).expect("six faces")
-    }
-
-    #[test]
-    fn images_lie_where_mirrors_show_them() {
-        let scene = scene();
-        let rays = RayTree::new(&scene);
-        let mirrors = rays.mirrors().expect("two");
-        // One in each, and one in both in either order; a third reflection cannot come.
-        let lengths = mirrors.images().iter().map(|image| image.legs.len());
-        assert!(lengths.clone().eq([1, 1, 2, 2, 3, 3, 4, 4]) || lengths.count() >= 4);
-        let frame = &scene.frame;
-        let point = frame.from_world(glam::DVec3::new(0.25, 0.5, 0.75));
-        for image in mirrors.images() {
-            let seen = image.place(point);
-            assert!(image.source_of(seen).distance(point) < 1e-4);
-            let unit = Vec3::new(0.6, 0.0, 0.8);
-            assert!(image.source_direction(image.direction(unit)).distance(unit) < 1e-6);
-        }
-        let first = &mirrors.images()[0];
-        let world = frame.to_world(first.place(point));
-        let expected = [(-2.25, 0.75), (0.25, 1.25)];
-        assert!(
-            expected
-                .iter()
-                .any(|(x, z)| { (world.x - x).abs() < 1e-4 && (world.z - z).abs() < 1e-4 }),
-            "{world}"
-        );
-    }
-
-    #[test]
-    fn rays_over_mirrors_end_where_they_are_aimed() {
-        let scene = scene();
-        let rays = RayTree::new(&scene);
-        let mirrors = rays.mirrors().expect("two");
-        let mut random = Random::new(1, 2);
-        let mut passed = [0; 3];
-        for _ in 0..2000 {
-            let mut inside = || {
-                let at = [(); 3].map(|()| f64::from(random.uniform()) * 1.8 - 0.9);
-                scene.frame.from_world(glam::DVec3::from_array(at))
-            };
-            let (from, to) = (inside(), inside());
-            for image in mirrors.images().iter().filter(|image| image.legs.len() < 3) {
-                let passage = image.passage(&rays, from, to, [None; 2]);
-                if passage.transmittance == Vec3::ZERO {
-                    continue;
-                }
-                passed[image.legs.len()] += 1;
-                // A ray that is mirrored by what it meets comes to the same place.
-                let direction = (image.place(to) - from).normalize_or_zero();
-                let (mut origin, mut direction, mut start) = (from, direction, None);
-                for _ in &image.legs {
-                    let hit = rays.closest(origin, direction, start).expect("closed");
-                    origin += direction * hit.distance;
-                    let mirror = mirrors.met(hit.triangle, direction).expect("a mirror").1;
-                    direction = mirror.reflected(direction);
-                    start = Some(hit.triangle);
-                }
-                let nearest = origin + direction * (to - origin).dot(direction);
-                assert!(nearest.distance(to) < 1e-3, "{nearest} {to}");
-            }
-        }
-        // In a convex room each mirror shows all of it, and two at a right angle show it once more between them.
-        assert_eq!(passed[1], 4000);
-        assert!(passed[2] > 1900 && passed[2] < 2100, "{passed:?}");
-    }
-
-    #[test]
-    fn followed_rays_lose_what_mirrors_take() {
-        let scene = scene();
-        let rays = RayTree::new(&scene);
-        let mirrors = rays.mirrors().expect("two");
-        let direction = Vec3::new(-0.8, 0.36, 0.48).normalize_or_zero();
-        let followed = mirrors.follow(&rays, Vec3::ZERO, direction, None);
-        let hit = followed.hit.expect("closed");
-        assert!(!mirrors.has(hit.triangle) && followed.length > 0.0);
-        let reflections = followed.tint.x.log(0.75).round();
-        assert!((followed.tint.x - 0.75f32.powf(reflections)).abs() < 1e-5);
     }
 }

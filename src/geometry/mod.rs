@@ -6,13 +6,15 @@ mod mirrors;
 mod panes;
 mod polygon;
 mod rays;
+mod reflections;
 mod sampling;
 mod wide;
 
 pub use lanes::Vectors4;
-pub use mirrors::{Followed, Image, Mirrors};
+pub use mirrors::{Image, Mirrors};
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};
 pub use rays::{Hit, Passage, RAY_OFFSET, RayTree};
+pub use reflections::Followed;
 pub use sampling::{
     Random, Shuffle, SphericalTriangle, cosine_direction, low_discrepancy_1d, low_discrepancy_2d,
     shuffled, sobol_2d, triangle_point,

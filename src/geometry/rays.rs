@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::{
-    mirrors::{Followed, Mirrors},
+    mirrors::Mirrors,
     panes::{self, Panes},
     wide::{Ray, Reach, Tree},
 };
@@ -89,23 +89,6 @@ impl RayTree {
     /// The plane mirrors, if there are any.
     pub fn mirrors(&self) -> Option<&Mirrors> {
         self.mirrors.as_deref()
-    }
-
-    /// As [`Self::closest`], over the plane mirrors on the way, with the tint of the light that comes along.
-    pub fn followed(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Followed {
-        match self.mirrors() {
-            Some(mirrors) => mirrors.follow(self, origin, direction, from),
-            None => {
-                let hit = self.closest(origin, direction, from);
-                Followed {
-                    hit,
-                    origin,
-                    direction,
-                    length: 0.0,
-                    tint: self.tint(origin, direction, from, hit),
-                }
-            }
-        }
     }
 
     /// Whether rays to surfaces may lose some of their light, by colour, on the way.

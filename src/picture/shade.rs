@@ -408,7 +408,7 @@ impl Seen<'_> {
         let mut passing = match image {
             None => lit.rays.transmittance(from, to, ends),
             Some(image) => {
-                image.passage(lit.rays, from, to, ends).transmittance * image.reflectance()
+                lit.rays.passage_over(image, from, to, ends).transmittance * image.reflectance()
             }
         };
         passing *= lit.scene.opacity_at(point.triangle, point.barycentric);

@@ -1,13 +1,13 @@
 //! Light from outside as the references sample it: the sky by its luminance, the sun by its disc.
 
-use std::{f32::consts::PI, sync::Arc};
+use std::{collections::HashMap, f32::consts::PI, sync::Arc};
 
 use glam::{Vec2, Vec3};
 
 use super::scatter::Scatter;
 use crate::{
     geometry::{RayTree, cosine_direction, low_discrepancy_2d},
-    scene::{Environment, Scene, Sky, SkyPicture, TriangleId, luminance},
+    scene::{Environment, MaterialId, Scene, Sky, SkyPicture, Specular, TriangleId, luminance},
 };
 
 /// Most cells of a table by width and height. Fewer blur a sun in the picture into its surroundings, and noise grows; more
@@ -49,6 +49,68 @@ pub(super) struct Outside {
     environment: Arc<Environment>,
     /// Of a sky that varies.
     table: Option<SkyTable>,
+    /// Mirrors that show the sun.
+    mirrors: SunMirrors,
+}
+
+/// The mirrors of a scene that show the sun. Rays that meet its disc by chance count nothing, so that what mirrors send of it
+/// has rays of its own: over one mirror, not over several.
+#[derive(Clone, Debug, Default)]
+struct SunMirrors {
+    /// Mirrors that are turned alike.
+    list: Vec<SunMirror>,
+    /// By triangle, index into `list`, and whether both sides reflect.
+    of_triangle: HashMap<TriangleId, (usize, bool)>,
+}
+
+/// Mirrors of a material that are turned alike.
+#[derive(Clone, Copy, Debug)]
+struct SunMirror {
+    /// Unit normal of the fronts.
+    normal: Vec3,
+    material: MaterialId,
+    /// What is reflected, by channel.
+    reflectance: Vec3,
+}
+
+/// Most of these. Fewer leave out what curved mirrors send of the sun; more take a ray each at every reflection.
+const MOST_SUN_MIRRORS: usize = 64;
+
+/// Mirrors whose normals differ by less than this are turned alike.
+const ALIKE: f32 = 1e-4;
+
+impl SunMirrors {
+    /// Those of a scene; none where there are too many.
+    fn of(scene: &Scene) -> Self {
+        let mut found = Self::default();
+        if scene.environment.sun.is_none() {
+            return found;
+        }
+        for id in scene.triangle_ids() {
+            let own = scene.material(id);
+            let Some(Specular::Mirror { reflectance }) = own.specular else {
+                continue;
+            };
+            let triangle = &scene.triangles[id.index()];
+            let normal = scene.surfaces[id.index()].area_vector.normalize_or_zero();
+            let is_alike = |known: &SunMirror| {
+                known.material == triangle.material && known.normal.abs_diff_eq(normal, ALIKE)
+            };
+            let index = found.list.iter().position(is_alike).unwrap_or_else(|| {
+                found.list.push(SunMirror {
+                    normal,
+                    material: triangle.material,
+                    reflectance: reflectance * own.share_of_met(),
+                });
+                found.list.len() - 1
+            });
+            if found.list.len() > MOST_SUN_MIRRORS {
+                return Self::default();
+            }
+            found.of_triangle.insert(id, (index, triangle.two_sided));
+        }
+        found
+    }
 }
 
 impl Outside {
@@ -59,7 +121,11 @@ impl Outside {
             Sky::Picture(sky) if !environment.sky.is_dark() => Some(SkyTable::new(sky)),
             _ => None,
         };
-        Self { environment, table }
+        Self {
+            environment,
+            table,
+            mirrors: SunMirrors::of(scene),
+        }
     }
 
     /// Whether no light comes from outside.
@@ -69,7 +135,9 @@ impl Outside {
 
     /// Shadow rays of a sample: one for a sky that varies, one for the sun.
     pub(super) fn ray_count(&self) -> u32 {
-        u32::from(self.table.is_some()) + u32::from(self.environment.sun.is_some())
+        u32::from(self.table.is_some())
+            + u32::from(self.environment.sun.is_some())
+            + self.mirrors.list.len() as u32
     }
 
     /// Points of the unit square by `next`, which is asked only for those that are needed.
@@ -92,6 +160,7 @@ impl Outside {
     ) -> Vec3 {
         self.sky_share(rays, at, scatter, squares.sky)
             + self.sun_share(rays, at, scatter, squares.sun)
+            + self.mirrored_sun_share(rays, at, scatter, squares.sun)
     }
 
     /// Radiance by a ray that left the scene, weighted against [`Self::share`] by the balance heuristic where its direction
@@ -156,6 +225,47 @@ impl Outside {
             return Vec3::ZERO;
         }
         sun.irradiance * (toward.value * weight) * passing(rays, at, direction)
+    }
+}
+
+impl Outside {
+    /// As the sun's share, over one mirror.
+    fn mirrored_sun_share(
+        &self,
+        rays: &RayTree,
+        at: Place,
+        scatter: Scatter,
+        square: Vec2,
+    ) -> Vec3 {
+        let Some(sun) = self.environment.sun else {
+            return Vec3::ZERO;
+        };
+        let (direction, weight) = sun.sample(square);
+        let mut sum = Vec3::ZERO;
+        for (number, mirror) in self.mirrors.list.iter().enumerate() {
+            let cosine = direction.dot(mirror.normal);
+            let toward_mirror = direction - 2.0 * cosine * mirror.normal;
+            let toward = scatter.toward(toward_mirror);
+            if toward.value <= 0.0 {
+                continue;
+            }
+            let start = Some(at.triangle);
+            let Some(hit) = rays.closest(at.position, toward_mirror, start) else {
+                continue;
+            };
+            let met = self.mirrors.of_triangle.get(&hit.triangle);
+            let is_meant = |&&(met, is_two_sided): &&(usize, bool)| {
+                met == number && (cosine > 0.0 || is_two_sided)
+            };
+            if met.filter(is_meant).is_some() {
+                let point = at.position + toward_mirror * hit.distance;
+                let tint = rays.tint(at.position, toward_mirror, start, Some(hit));
+                let passed = rays.transmittance_outward(point, direction, Some(hit.triangle));
+                sum +=
+                    sun.irradiance * (toward.value * weight) * mirror.reflectance * tint * passed;
+            }
+        }
+        sum
     }
 }
 
@@ -293,6 +403,7 @@ mod tests {
                 sun,
                 is_default: false,
             }),
+            mirrors: SunMirrors::default(),
         }
     }
 

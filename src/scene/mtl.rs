@@ -238,7 +238,7 @@ mod tests {
         assert_eq!(materials[1].diffuse, Some(Vec3::new(0.1, 0.2, 0.3)));
         let expected = "x.mtl:1: skipped a material line that cannot be used (Kd) (3 times)";
         assert_eq!(warnings[0], expected);
-        assert_eq!(warnings.len(), 3);
+        assert_eq!(warnings.len(), 4);
     }
 
     #[test]

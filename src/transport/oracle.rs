@@ -82,10 +82,16 @@ impl Judge<'_> {
 
     /// Whether some point of each node can face the other.
     pub(super) fn face_each_other(&self, source: NodeId, receiver: NodeId) -> bool {
-        let kernel = self.kernel;
-        let as_source = |point: Vec3| kernel.source_of(point);
-        let as_seen = |point: Vec3| kernel.seen_at(point);
-        self.can_face(source, receiver, as_source) && self.can_face(receiver, source, as_seen)
+        let Some(image) = self.kernel.image else {
+            let is_there = |point: Vec3| point;
+            return self.can_face(source, receiver, is_there, |bounds| bounds)
+                && self.can_face(receiver, source, is_there, |bounds| bounds);
+        };
+        let as_source = |point: Vec3| image.source_of(point);
+        let as_seen = |point: Vec3| image.place(point);
+        self.can_face(source, receiver, as_source, |bounds| {
+            placed(bounds, as_source)
+        }) && self.can_face(receiver, source, as_seen, |bounds| placed(bounds, as_seen))
     }
 
     /// Luminance of a quantity of light, with the ambient radiosity added.
@@ -103,8 +109,14 @@ impl Judge<'_> {
         luminance(self.tables().brightest(self.hierarchy(), node))
     }
 
-    /// Whether any face of `from` can face any point of `to`, which it sees where `place` puts it.
-    fn can_face(&self, from: NodeId, to: NodeId, place: impl Fn(Vec3) -> Vec3) -> bool {
+    /// Whether any face of `from` can face any point of `to`, which it sees where `place` and `placed` put points and boxes.
+    fn can_face(
+        &self,
+        from: NodeId,
+        to: NodeId,
+        place: impl Fn(Vec3) -> Vec3,
+        placed: impl Fn((Vec3, Vec3)) -> (Vec3, Vec3),
+    ) -> bool {
         let hierarchy = self.hierarchy();
         match hierarchy.kind(from) {
             // Some corner of the other node, or of its box, must stand above the plane of the element.
@@ -125,17 +137,16 @@ impl Judge<'_> {
                     }
                     Kind::Cluster(other) => {
                         let cluster = &hierarchy.clusters[other];
-                        let (min, max) = placed((cluster.min, cluster.max), &place);
+                        let (min, max) = placed((cluster.min, cluster.max));
                         let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
-                        let height = (middle - element.centroid).dot(normal);
-                        height + half.dot(normal.abs()) > least
+                        (middle - element.centroid).dot(normal) + half.dot(normal.abs()) > least
                     }
                 }
             }
             // Along some axis the cluster must have projected area towards a part of the other node's box.
             Kind::Cluster(index) => {
                 let cluster = &hierarchy.clusters[index];
-                let (min, max) = placed(hierarchy.bounds(to), &place);
+                let (min, max) = placed(hierarchy.bounds(to));
                 let (least, most) = (min - cluster.max, max - cluster.min);
                 let faces = self.tables().clusters[index]
                     .six_faces()
@@ -257,7 +268,7 @@ impl Judge<'_> {
 }
 
 /// The box about a box whose points are moved by an isometry.
-fn placed((min, max): (Vec3, Vec3), place: &impl Fn(Vec3) -> Vec3) -> (Vec3, Vec3) {
+fn placed((min, max): (Vec3, Vec3), place: impl Fn(Vec3) -> Vec3) -> (Vec3, Vec3) {
     let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
     let centre = place(middle);
     let along = |axis: Vec3| (place(middle + axis) - centre).abs();

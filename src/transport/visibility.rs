@@ -336,7 +336,7 @@ impl PairSampler<'_> {
         let passing = match self.image {
             None => self.rays.transmittance(to.point, from.point, ends),
             Some(image) => {
-                let passage = image.passage(self.rays, to.point, from.point, ends);
+                let passage = self.rays.passage_over(image, to.point, from.point, ends);
                 passage.transmittance
             }
         };
@@ -396,7 +396,7 @@ impl PairSampler<'_> {
     fn end_of(&self, from: &Sample, direction: Vec3) -> Option<Followed> {
         let start = Some(from.triangle);
         if let Some(image) = self.image {
-            return image.met(self.rays, from.point, direction, start);
+            return self.rays.met_over(image, from.point, direction, start);
         }
         let hit = self.rays.closest(from.point, direction, start);
         Some(Followed {

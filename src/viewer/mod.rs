@@ -41,6 +41,7 @@ pub mod saved_light;
 pub mod saver;
 pub mod session;
 pub mod sharpening;
+pub mod sharpness;
 pub mod stage;
 pub mod start;
 pub mod state;

@@ -16,7 +16,7 @@ use super::{
     pick::{ObjectLight, Pick, Probe},
     run::Run,
     session::Recent,
-    sharpening::Sharpness,
+    sharpness::Sharpness,
     stage::Staged,
     truth::Truth,
     view::{ViewMode, ViewSettings},

@@ -386,7 +386,7 @@ impl Way<'_> {
         let ends = [Some(self.from.triangle), Some(triangle)];
         match self.image {
             None => self.rays.passage(self.from.point, point, ends),
-            Some(image) => image.passage(self.rays, self.from.point, point, ends),
+            Some(image) => self.rays.passage_over(image, self.from.point, point, ends),
         }
     }
 
@@ -395,7 +395,9 @@ impl Way<'_> {
         let (point, start) = (self.from.point, Some(self.from.triangle));
         match self.image {
             None => self.rays.passage_outward(point, direction, start),
-            Some(image) => image.passage_outward(self.rays, point, direction, start),
+            Some(image) => self
+                .rays
+                .passage_outward_over(image, point, direction, start),
         }
     }
 }
