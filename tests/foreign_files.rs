@@ -7,7 +7,9 @@ use std::{fs, path::Path};
 
 use glam::Vec3;
 use tempfile::TempDir;
-use vecrad::scene::{ReadError, Scene, SceneOptions, TriangleId, WarningKind, read_obj};
+use vecrad::scene::{
+    Material, ReadError, Scene, SceneOptions, Specular, TriangleId, WarningKind, read_obj,
+};
 
 /// A square with texture coordinates.
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
@@ -271,6 +273,72 @@ fn transparency_and_gloss_are_told_once_and_for_which_materials() {
             "{name}"
         );
     }
+}
+
+#[test]
+fn specular_materials_reflect_at_most_all_light_and_survive_their_file() {
+    let mtl = "newmtl bright\nKd 0.8 0.4 0.2\nKs 0.5 0.1 0.1\nNs 98\nillum 2\n\
+        newmtl mirror\nKd 0.1\nKs 0.9\nillum 3\n\
+        newmtl pane\nKd 0.2\nNi 1.5\nd 0.25\nillum 4\n\
+        newmtl steel\nKd 0.6 0.5 0.4\nPm 1\nPr 0.5\n\
+        newmtl ball\nKd 0\nNi 1.33\nTf 1 0.5 1\nillum 7\n";
+    let mut obj = format!("mtllib a.mtl\n{SQUARE}");
+    for (number, name) in (5..).zip(["bright", "mirror", "pane", "steel", "ball"]) {
+        obj += &format!("v 0 0 {number}\nv 1 0 {number}\nv 0 1 {number}\n");
+        obj += &format!("usemtl {name}\nf -3 -2 -1\n");
+    }
+    let folder = folder(&[("scene.obj", &obj), ("a.mtl", mtl)], &[]);
+    let scene = read(&folder);
+    let named = |scene: &Scene, name: &str| {
+        let mut all = scene.materials.iter();
+        all.find(|material| material.name == name).unwrap().clone()
+    };
+    // Scaled by the channel that reflects most.
+    let bright = named(&scene, "bright");
+    assert_near(bright.reflectance, Vec3::new(0.8, 0.4, 0.2) / 1.3, "Kd");
+    let specular = bright.specular.unwrap();
+    assert_near(specular.color(), Vec3::new(0.5, 0.1, 0.1) / 1.3, "Ks");
+    let scaled = "Kd and Ks) that add to more than 1 were scaled to 1";
+    assert!(said(&scene).iter().any(|said| said.contains(scaled)));
+    let roughness = match specular {
+        Specular::Gloss { roughness, .. } => roughness,
+        other => panic!("{other:?}"),
+    };
+    assert!((roughness - 0.02_f32.sqrt()).abs() < 1e-6);
+    // A pane passes what it neither reflects nor has of colour.
+    let pane = named(&scene, "pane");
+    let passed = 0.75 * pane.specular.unwrap().mean_transmittance();
+    assert_near(pane.transmission(), Vec3::splat(passed), "pane");
+    assert_near(named(&scene, "steel").reflectance, Vec3::ZERO, "steel");
+    assert!(named(&scene, "ball").transmission().y < 0.5);
+    // Written and read again.
+    let path = folder.path().join("again.obj");
+    vecrad::scene::write_obj(&scene, &path).unwrap();
+    let again = read_obj(&path, &SceneOptions::default()).unwrap();
+    for before in scene
+        .materials
+        .iter()
+        .filter(|material| material.specular.is_some())
+    {
+        let after = named(&again, &before.name);
+        assert_near(after.reflectance, before.reflectance, &before.name);
+        assert_near(after.transmission(), before.transmission(), &before.name);
+        let text = |material: &Material| format!("{:.3?}", material.specular);
+        assert_eq!(text(&after), text(before), "{}", before.name);
+    }
+    // Matt, as without those statements.
+    let options = SceneOptions {
+        is_matt: true,
+        ..SceneOptions::default()
+    };
+    let matt = read_obj(&folder.path().join("scene.obj"), &options).unwrap();
+    assert!(!matt.has_specular());
+    assert_near(
+        named(&matt, "bright").reflectance,
+        Vec3::new(0.8, 0.4, 0.2),
+        "matt",
+    );
+    assert_eq!(named(&matt, "ball").opacity, 1.0);
 }
 
 /// The opacity of each material of an MTL file, all of which faces show, and what is said of them.

@@ -98,7 +98,7 @@ fn mtl(chance: &mut Chance) -> String {
                 "C:\\maps\\one.png",
                 "leaf.png",
             ]);
-            match chance.below(8) {
+            match chance.below(11) {
                 0 => writeln!(text, "Kd {number} 0.5 0.2").unwrap(),
                 1 => writeln!(text, "Kd {number}").unwrap(),
                 2 => writeln!(text, "Ke {number} 1e6 0").unwrap(),
@@ -106,6 +106,9 @@ fn mtl(chance: &mut Chance) -> String {
                 4 => writeln!(text, "map_Ke {picture}").unwrap(),
                 5 => writeln!(text, "d {number}\nillum 2").unwrap(),
                 6 => writeln!(text, "Ks 1 1 1\nNs 10").unwrap(),
+                7 => writeln!(text, "Ks {number} 0.3 0.1\nNs {number}\nillum 3").unwrap(),
+                8 => writeln!(text, "Pr {number}\nPm {number}").unwrap(),
+                9 => writeln!(text, "Ni {number}\nillum 7\nTf {number} 1 1").unwrap(),
                 _ => writeln!(text, "Tr {number}").unwrap(),
             }
         }

@@ -9,8 +9,12 @@ use super::{
 };
 use crate::scene::TriangleId;
 
-/// Part of a ray's light below which it ends between mirrors.
+/// Part of a ray's light below which it ends between mirrors. Larger darkens rooms of mirrors; smaller takes time in them.
 const LEAST_LEFT: f32 = 1e-3;
+
+/// Mirrors on the way of a ray at most: between two that reflect everything it would never end. Fewer darken rooms of such
+/// mirrors; more take time in them.
+const MOST_REFLECTIONS: u32 = 256;
 
 /// A ray after the mirrors on its way.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +36,7 @@ impl RayTree {
     pub fn followed(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Followed {
         let mirrors = self.mirrors();
         let (mut origin, mut direction, mut from) = (origin, direction, from);
-        let (mut tint, mut length) = (Vec3::ONE, 0.0);
+        let (mut tint, mut length, mut reflections) = (Vec3::ONE, 0.0, 0);
         loop {
             let hit = self.closest(origin, direction, from);
             tint *= self.tint(origin, direction, from, hit);
@@ -42,7 +46,9 @@ impl RayTree {
             if let Some((hit, mirror)) = met {
                 let part = mirror.mirrored_part;
                 let reflects = part >= 1.0 || chance(origin, direction, !hit.triangle.0) < part;
-                if reflects && tint.max_element() > LEAST_LEFT {
+                let is_left = tint.max_element() > LEAST_LEFT && reflections < MOST_REFLECTIONS;
+                if reflects && is_left {
+                    reflections += 1;
                     origin += direction * hit.distance;
                     direction = mirror.reflected(direction);
                     from = Some(hit.triangle);
@@ -65,8 +71,8 @@ impl RayTree {
         }
     }
 
-    /// What passes from a point to one of the scene over all mirrors of an image, by channel, beside what they take, with the length of
-    /// the way to what blocks. The triangles are those of both ends.
+    /// What passes from a point to one of the scene over all mirrors of an image, by channel, beside what they take, with
+    /// the length of the way to what blocks. The triangles are those of both ends.
     pub fn passage_over(
         &self,
         image: &Image,
