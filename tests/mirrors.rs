@@ -13,7 +13,7 @@ use vecrad::{
     metrics::{MeshLookup, measure_error},
     reference::{PathSettings, PathTracer, ReferencePoint},
     scene::{Material, MaterialId, Scene, SceneBuilder, Sides, Specular, luminance},
-    solver::{SolveSettings, Solver},
+    solver::{Cancel, SolveSettings, Solver},
 };
 
 /// Extents of the room, from the plane x = 0.
@@ -282,6 +282,34 @@ fn mirrors_that_show_each_other_equal_path_tracing() {
         );
         assert!(error.relative_rms_trimmed < 0.05, "{mirrors:?}: {error:?}");
     }
+}
+
+#[test]
+fn other_lamps_and_walls_show_in_mirrors() {
+    let scene = room(&[Wall::Left], 0.9);
+    let mut appearances = scene.appearances();
+    for (appearance, material) in appearances.iter_mut().zip(&scene.materials) {
+        match &*material.name {
+            "lamp" => appearance.emission = Vec3::new(0.5, 2.0, 6.0),
+            "red" => appearance.reflectance = Vec3::new(0.1, 0.2, 0.7),
+            _ => {}
+        }
+    }
+    let (mut solver, _) = solve(&scene, SolveSettings::draft());
+    let relit = solver.relight(&appearances, &Cancel::default()).unwrap();
+    assert!(!relit.needs_restart);
+    let anew = Arc::new(scene.relit(&appearances));
+    let (fresh, _) = solve(&anew, SolveSettings::draft());
+    let points = traced(&scene, 1);
+    let mean = |solver: &Solver| {
+        let light = shown(solver, &points);
+        light.iter().sum::<Vec3>() / light.len() as f32
+    };
+    let (relit, fresh) = (mean(&solver), mean(&fresh));
+    assert!(
+        (relit / fresh - 1.0).abs().max_element() < 0.02,
+        "{relit} instead of {fresh}"
+    );
 }
 
 #[test]

@@ -2,7 +2,8 @@
 //!
 //! Per vertex: position, normal, `COLOR_0`, `_RADIANCE` and `_IRRADIANCE`, all floats. `COLOR_0` is exposed linear radiance
 //! cut off at 1, as the format demands, without a tone curve, which is the viewer's to apply; the other two keep the full
-//! range. The material is unlit (`KHR_materials_unlit`): the light is in the colours already.
+//! range. Materials are unlit (`KHR_materials_unlit`): the light is in the colours already. There is one for each finish, which
+//! carries its roughness and metalness for those who light the mesh themselves.
 //!
 //! Positions are world units from the node's place, so that single precision suffices far from the origin. glTF is Y-up: a
 //! scene with +Z up stands under a turned root node, its numbers stay. Each side of a two-sided face has triangles of its
@@ -21,7 +22,7 @@ use super::{
     mesh::{Light, write_vector},
 };
 use crate::{
-    scene::{Frame, UpAxis},
+    scene::{Finish, Frame, UpAxis},
     solver::{DisplayMesh, Snapshot},
 };
 
@@ -94,9 +95,40 @@ pub(super) fn write_glb(
         write_vector(out, light.radiance)?;
         write_vector(out, light.irradiance)?;
     }
-    mesh.indices
-        .iter()
-        .try_for_each(|corners| write_numbers(out, corners))
+    let parts = parts(mesh);
+    let mut triangles = parts.iter().flat_map(|part| &part.triangles);
+    triangles.try_for_each(|&triangle| write_numbers(out, &mesh.indices[triangle as usize]))
+}
+
+/// The triangles of one finish.
+struct Part {
+    finish: Finish,
+    triangles: Vec<u32>,
+}
+
+/// The triangles by finish, in the order in which finishes come.
+fn parts(mesh: &DisplayMesh) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    let mut of_material: Vec<Option<usize>> = vec![None; mesh.finishes.len().max(1)];
+    for triangle in 0..mesh.indices.len() {
+        let material = mesh.material_of.get(triangle).map_or(0, |&at| at as usize);
+        let finish = mesh.finishes.get(material).copied().unwrap_or(Finish::MATT);
+        let known = of_material.get_mut(material).and_then(|part| {
+            if part.is_none() {
+                *part = parts.iter().position(|part| part.finish == finish);
+            }
+            *part
+        });
+        let index = known.unwrap_or_else(|| {
+            parts.push(Part {
+                finish,
+                triangles: Vec::new(),
+            });
+            parts.len() - 1
+        });
+        parts[index].triangles.push(triangle as u32);
+    }
+    parts
 }
 
 /// How much there is to write.
@@ -151,6 +183,9 @@ fn from_node(position: Vec3, frame: &Frame) -> Vec3 {
 fn document(mesh: &DisplayMesh, frame: &Frame, options: &MeshOptions) -> Value {
     let nodes = nodes(frame, options.up);
     let sizes = Sizes::of(mesh);
+    let parts = parts(mesh);
+    let primitives: Vec<Value> = (0..parts.len()).map(primitive).collect();
+    let materials: Vec<Value> = parts.iter().map(|part| material(part.finish)).collect();
     json!({
         "asset": {
             "version": "2.0",
@@ -162,7 +197,7 @@ fn document(mesh: &DisplayMesh, frame: &Frame, options: &MeshOptions) -> Value {
         "nodes": nodes,
         "meshes": [{
             "name": "lit mesh",
-            "primitives": [primitive()],
+            "primitives": primitives,
             "extras": {
                 "exposure_ev": options.color.exposure_ev,
                 "emission_scale": options.emission_scale,
@@ -170,13 +205,8 @@ fn document(mesh: &DisplayMesh, frame: &Frame, options: &MeshOptions) -> Value {
                 "irradiance": "linear, W/m^2",
             },
         }],
-        "materials": [{
-            "name": "lit",
-            "doubleSided": false,
-            "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 1.0 },
-            "extensions": { "KHR_materials_unlit": {} },
-        }],
-        "accessors": accessors(mesh, frame),
+        "materials": materials,
+        "accessors": accessors(mesh, &parts, frame),
         "bufferViews": [
             {
                 "buffer": 0,
@@ -210,17 +240,36 @@ fn nodes(frame: &Frame, up: UpAxis) -> Vec<Value> {
     }
 }
 
-fn primitive() -> Value {
+/// An unlit material of a finish.
+fn material(finish: Finish) -> Value {
+    let name = if finish == Finish::MATT {
+        "lit"
+    } else {
+        "lit, glossy"
+    };
+    json!({
+        "name": name,
+        "doubleSided": false,
+        "pbrMetallicRoughness": {
+            "metallicFactor": finish.metalness,
+            "roughnessFactor": finish.roughness,
+        },
+        "extensions": { "KHR_materials_unlit": {} },
+    })
+}
+
+/// The triangles of a part.
+fn primitive(part: usize) -> Value {
     let attributes: serde_json::Map<String, Value> = ATTRIBUTES
         .iter()
         .enumerate()
         .map(|(accessor, name)| ((*name).to_owned(), json!(accessor)))
         .collect();
-    json!({ "attributes": attributes, "indices": ATTRIBUTES.len(), "material": 0 })
+    json!({ "attributes": attributes, "indices": ATTRIBUTES.len() + part, "material": part })
 }
 
-/// One for each of [`ATTRIBUTES`], then the indices.
-fn accessors(mesh: &DisplayMesh, frame: &Frame) -> Vec<Value> {
+/// One for each of [`ATTRIBUTES`], then the indices of each part.
+fn accessors(mesh: &DisplayMesh, parts: &[Part], frame: &Frame) -> Vec<Value> {
     let sizes = Sizes::of(mesh);
     let mut accessors: Vec<Value> = (0..ATTRIBUTES.len())
         .map(|attribute| {
@@ -242,12 +291,18 @@ fn accessors(mesh: &DisplayMesh, frame: &Frame) -> Vec<Value> {
     }
     accessors[0]["min"] = json!(least.to_array().map(f64::from));
     accessors[0]["max"] = json!(most.to_array().map(f64::from));
-    accessors.push(json!({
-        "bufferView": 1,
-        "componentType": UNSIGNED_INT,
-        "count": 3 * sizes.triangles,
-        "type": "SCALAR",
-    }));
+    let mut before = 0;
+    for part in parts {
+        let count = part.triangles.len() as u64;
+        accessors.push(json!({
+            "bufferView": 1,
+            "byteOffset": before * TRIANGLE_BYTES,
+            "componentType": UNSIGNED_INT,
+            "count": 3 * count,
+            "type": "SCALAR",
+        }));
+        before += count;
+    }
     accessors
 }
 
@@ -332,6 +387,41 @@ mod tests {
         assert_eq!(indices, [0, 1, 2]);
         assert_eq!(document["accessors"][5]["count"], 3);
         assert_eq!(document["accessors"][0]["count"], 3);
+    }
+
+    #[test]
+    fn each_finish_has_triangles_and_a_material_of_its_own() {
+        let steel = Finish {
+            roughness: 0.5,
+            metalness: 1.0,
+        };
+        let snapshot = changed(|snapshot| {
+            let mesh = Arc::make_mut(&mut snapshot.mesh);
+            mesh.indices = vec![[0, 1, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+            mesh.finishes = vec![Finish::MATT, steel, Finish::MATT];
+            mesh.material_of = vec![0, 1, 2, 1];
+        });
+        let (document, binary) = glb(&snapshot, &MeshOptions::default());
+        let number = |value: &Value| value.as_u64().unwrap() as usize;
+        let start = number(&document["bufferViews"][1]["byteOffset"]);
+        let indices = |part: usize| -> Vec<u32> {
+            let primitive = &document["meshes"][0]["primitives"][part];
+            let accessor = &document["accessors"][number(&primitive["indices"])];
+            let at = start + number(&accessor["byteOffset"]);
+            let bytes = &binary[at..at + 4 * number(&accessor["count"])];
+            let numbers = bytes.chunks_exact(4);
+            numbers
+                .map(|bytes| u32::from_le_bytes(bytes.try_into().unwrap()))
+                .collect()
+        };
+        assert_eq!(indices(0), [0, 1, 2, 2, 0, 1]);
+        assert_eq!(indices(1), [1, 2, 0, 2, 1, 0]);
+        let material = &document["materials"][1]["pbrMetallicRoughness"];
+        assert_eq!(
+            (&material["roughnessFactor"], &material["metallicFactor"]),
+            (&json!(0.5), &json!(1.0))
+        );
+        assert_eq!(document["materials"].as_array().unwrap().len(), 2);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    Environment, Material, Scene, Sky, Surface, Texture, TextureId, TriangleId,
+    Environment, Material, Scene, Sky, Specular, Surface, Texture, TextureId, TriangleId,
     means::TextureAverages, ranges::limited_emission,
 };
 
@@ -30,8 +30,14 @@ impl Scene {
                 even.emission_texture = None;
                 return even;
             }
-            // By part of the surface that reflects and emits.
-            let absorbing = (Vec3::ONE - even.transmission()) / even.opacity;
+            // By part of the surface that reflects and emits, what is neither passed nor reflected in other ways.
+            let most = match even.specular {
+                Some(Specular::Mirror { .. }) => Vec3::ONE,
+                _ => Vec3::splat(self.max_reflectance) - even.reflectance,
+            };
+            let specular = even.diffused_specular().min(most.max(Vec3::ZERO));
+            let otherwise = even.transmission() + specular * even.met_share();
+            let absorbing = (Vec3::ONE - otherwise) / even.opacity;
             let plain = (absorbing - even.reflectance).max(Vec3::splat(LEAST_EMISSION));
             even.emission = plain;
             even.emission_texture = even.reflectance_texture.map(|texture| {
@@ -58,6 +64,7 @@ impl Scene {
                 reflectance: Vec3::splat(reflectance),
                 reflectance_texture: None,
                 filter: Vec3::ONE,
+                specular: None,
                 ..material.clone()
             };
             if let Some(emission) = emission {

@@ -21,6 +21,7 @@ mod edges;
 mod emission;
 mod encoding;
 mod environment;
+mod finish;
 mod fit;
 mod frame;
 mod hosek;
@@ -69,6 +70,7 @@ pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_lin
 pub use cutout::{Cutout, SeeThrough};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use environment::{Environment, Sky, SkyPicture, SkySample, Sun};
+pub use finish::Finish;
 pub use frame::Frame;
 pub use hosek::HosekSky;
 pub use lighting::{Lamp, Lighting, SkySource, SunSource};

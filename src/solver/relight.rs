@@ -87,8 +87,7 @@ impl Solver {
         cancel.proceed()?;
         let appearances = self.scene.allowed(wished);
         let active = self.scene.active_materials(&appearances);
-        let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active)
-            || !self.linked.images.is_empty();
+        let needs_restart = !self.plan.holds_for(&self.scene, &self.hierarchy, &active);
         // Store the present light before it changes. Light from outside stays as it is.
         let has_outside = self.direct.brightest_outside() != Vec4::ZERO;
         let factor =
@@ -104,6 +103,10 @@ impl Solver {
                 cancel,
             };
             self.ray_count += self.relighting.mix_direct(field, shooting, &appearances)?;
+            let (rays, seed) = (&self.rays, self.settings.seed);
+            self.ray_count += self
+                .direct
+                .recolor_images(rays, &self.hierarchy, seed, cancel)?;
         }
         if let Some(estimator) = &mut self.estimator {
             estimator.forget_direct_light();

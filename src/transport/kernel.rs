@@ -163,14 +163,6 @@ impl Kernel<'_> {
             .map_or(direction, |image| image.direction(direction))
     }
 
-    /// Points or normals of receivers as sources see them.
-    fn sources_of(&self, values: &Vectors4, of: impl Fn(&Image, Vec3) -> Vec3) -> Vectors4 {
-        match self.image {
-            None => *values,
-            Some(image) => Vectors4::new(values.to_array().map(|value| of(image, value))),
-        }
-    }
-
     /// Where receivers see the centre of the power of a cluster.
     pub fn centre(&self, cluster: usize) -> Vec3 {
         self.seen_at(self.tables.centres[cluster])
@@ -297,21 +289,36 @@ impl Kernel<'_> {
 
 impl Kernel<'_> {
     /// As the function of this name.
+    #[inline]
     pub(super) fn element_form_factor(&self, source: usize, point: Vec3, normal: Vec3) -> f32 {
-        let (point, normal) = (self.source_of(point), self.source_direction(normal));
-        element_form_factor(self.hierarchy, source, point, normal)
+        match self.image {
+            None => element_form_factor(self.hierarchy, source, point, normal),
+            Some(image) => {
+                let (point, normal) = (image.source_of(point), image.source_direction(normal));
+                element_form_factor(self.hierarchy, source, point, normal)
+            }
+        }
     }
 
     /// As the function of this name.
+    #[inline]
     pub(super) fn element_form_factors(
         &self,
         source: usize,
         points: &Vectors4,
         normals: &Vectors4,
     ) -> Vec4 {
-        let points = self.sources_of(points, Image::source_of);
-        let normals = self.sources_of(normals, Image::source_direction);
-        element_form_factors(self.hierarchy, source, &points, &normals)
+        match self.image {
+            None => element_form_factors(self.hierarchy, source, points, normals),
+            Some(image) => {
+                let points = points.to_array().map(|point| image.source_of(point));
+                let normals = normals
+                    .to_array()
+                    .map(|normal| image.source_direction(normal));
+                let (points, normals) = (Vectors4::new(points), Vectors4::new(normals));
+                element_form_factors(self.hierarchy, source, &points, &normals)
+            }
+        }
     }
 
     /// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is undetermined,

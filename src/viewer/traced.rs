@@ -122,18 +122,18 @@ impl Traced {
         };
     }
 
-    /// Estimated noise of its pixels, root mean square relative to their mean luminance; `None` where it is black, or where
-    /// each pixel has one sample.
+    /// Estimated noise of its pixels that show surfaces alone, root mean square relative to their mean luminance; `None` where
+    /// they are black, or have one sample each. At the rims of lamps samples differ by right.
     pub fn noise(&self) -> Option<f32> {
-        let pixels = self.pixels.iter();
-        let squares: f64 = pixels.map(|pixel| f64::from(pixel.noise).powi(2)).sum();
-        let pixels = self.pixels.iter();
-        let light: f64 = pixels
-            .map(|pixel| f64::from(luminance(pixel.radiance())))
-            .sum();
-        let count = self.pixels.len().max(1) as f64;
-        let noise = ((squares / count).sqrt() / (light / count)) as f32;
-        (noise > 0.0 && noise.is_finite()).then_some(noise)
+        let (mut squares, mut light, mut count) = (0.0, 0.0, 0.0);
+        let surfaces = self.pixels.iter().filter(|pixel| pixel.source_part <= 0.0);
+        for pixel in surfaces {
+            squares += f64::from(pixel.noise).powi(2);
+            light += f64::from(luminance(pixel.radiance()));
+            count += 1.0;
+        }
+        let noise = (squares * count).sqrt() / light;
+        (noise > 0.0 && noise.is_finite()).then_some(noise as f32)
     }
 
     /// Its display colours over a background, display-linear.

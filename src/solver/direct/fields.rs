@@ -99,6 +99,29 @@ impl DirectFields {
             .find(|field| !field.lights.is_outside())
     }
 
+    /// Let the images of the emitters in mirrors have the light that the emitters have now, by new shadow rays. Returns the
+    /// rays shot; `None` when cancelled.
+    pub(crate) fn recolor_images(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        seed: u64,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        let Some(emitters) = self.emitters().map(|field| field.lights.clone()) else {
+            return Some(0);
+        };
+        let mut shot = 0;
+        for field in &mut self.fields {
+            let Some(image) = field.lights.image().filter(|_| !field.lights.is_outside()) else {
+                continue;
+            };
+            let lights = emitters.in_image(&image.clone());
+            shot += field.replace_lights(lights, rays, hierarchy, seed, cancel)?;
+        }
+        Some(shot)
+    }
+
     /// Direct irradiance of a leaf, W/m².
     pub(crate) fn element(&self, hierarchy: &Hierarchy, leaf: usize) -> Vec4 {
         self.sum(|field| field.element(hierarchy, leaf))

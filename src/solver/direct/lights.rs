@@ -129,6 +129,11 @@ impl Lights {
         }
     }
 
+    /// The image in which it is seen, where it comes over mirrors.
+    pub(super) fn image(&self) -> Option<&Arc<Image>> {
+        self.image.as_ref()
+    }
+
     /// Whether it comes over mirrors.
     pub(super) fn is_mirrored(&self) -> bool {
         self.image.is_some()
