@@ -295,11 +295,11 @@ fn other_lamps_and_walls_show_in_mirrors() {
             _ => {}
         }
     }
-    let (mut solver, _) = solve(&scene, SolveSettings::draft());
+    let (mut solver, _) = solve(&scene, SolveSettings::normal());
     let relit = solver.relight(&appearances, &Cancel::default()).unwrap();
     assert!(!relit.needs_restart);
     let anew = Arc::new(scene.relit(&appearances));
-    let (fresh, _) = solve(&anew, SolveSettings::draft());
+    let (fresh, _) = solve(&anew, SolveSettings::normal());
     let points = traced(&scene, 1);
     let mean = |solver: &Solver| {
         let light = shown(solver, &points);
@@ -307,7 +307,7 @@ fn other_lamps_and_walls_show_in_mirrors() {
     };
     let (relit, fresh) = (mean(&solver), mean(&fresh));
     assert!(
-        (relit / fresh - 1.0).abs().max_element() < 0.02,
+        (relit / fresh - 1.0).abs().max_element() < 0.01,
         "{relit} instead of {fresh}"
     );
 }

@@ -94,20 +94,15 @@ impl Solver {
             self.relighting
                 .keep_solved(&appearances, has_outside, &self.linked, &self.leaves);
         // Direct light, with new rays where they are needed.
-        if let Some(field) = self.direct.emitters_mut() {
-            let shooting = Shooting {
-                scene: &self.scene,
-                hierarchy: &self.hierarchy,
-                rays: &self.rays,
-                seed: self.settings.seed,
-                cancel,
-            };
-            self.ray_count += self.relighting.mix_direct(field, shooting, &appearances)?;
-            let (rays, seed) = (&self.rays, self.settings.seed);
-            self.ray_count += self
-                .direct
-                .recolor_images(rays, &self.hierarchy, seed, cancel)?;
-        }
+        let shooting = Shooting {
+            scene: &self.scene,
+            hierarchy: &self.hierarchy,
+            rays: &self.rays,
+            seed: self.settings.seed,
+            cancel,
+        };
+        let fields = self.direct.emitters_mut();
+        self.ray_count += self.relighting.mix_direct(fields, shooting, &appearances)?;
         if let Some(estimator) = &mut self.estimator {
             estimator.forget_direct_light();
         }

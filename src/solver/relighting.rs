@@ -39,8 +39,8 @@ struct Solved {
 pub(super) struct Relighting {
     /// Present appearance by material.
     pub(super) appearances: Vec<Appearance>,
-    /// Direct light in parts; made by the first relighting after a step.
-    parts: Option<LightParts>,
+    /// Direct light in parts, of each field of emitters; made by the first relighting after a step.
+    parts: Vec<LightParts>,
     /// The light from which other light is scaled.
     solved: Option<Solved>,
     /// Whether all leaves have gathered the present light.
@@ -56,7 +56,7 @@ impl Relighting {
     pub(super) fn new(scene: &Scene) -> Self {
         Self {
             appearances: scene.appearances(),
-            parts: None,
+            parts: Vec::new(),
             solved: None,
             is_solved: false,
             is_whole: false,
@@ -66,7 +66,7 @@ impl Relighting {
 
     /// Begin a step, which changes links and samples.
     pub(super) fn begin_step(&mut self) {
-        self.parts = None;
+        self.parts.clear();
         self.solved = None;
         (self.is_solved, self.is_whole) = (false, false);
     }
@@ -115,30 +115,33 @@ impl Relighting {
         factor_between(&self.solved.as_ref()?.appearances, appearances, has_outside)
     }
 
-    /// Change direct light to other appearances. Returns the rays shot; `None` when cancelled, with the light
-    /// unchanged.
-    pub(super) fn mix_direct(
+    /// Change the direct light of fields to other appearances. Returns the rays shot; `None` when cancelled, with the light
+    /// of some unchanged.
+    pub(super) fn mix_direct<'a>(
         &mut self,
-        field: &mut DirectField,
+        fields: impl Iterator<Item = &'a mut DirectField>,
         shooting: Shooting<'_>,
         appearances: &[Appearance],
     ) -> Option<u64> {
         let mut shot = 0;
-        if !self.is_whole {
-            // After a cancelled step, vertices may be without samples.
-            let Shooting {
-                hierarchy,
-                rays,
-                seed,
-                cancel,
-                ..
-            } = shooting;
-            shot += field.sample_vertices(rays, hierarchy, field.samples, seed, cancel)?;
+        for (number, field) in fields.enumerate() {
+            if !self.is_whole {
+                // After a cancelled step, vertices may be without samples.
+                let Shooting {
+                    hierarchy,
+                    rays,
+                    seed,
+                    cancel,
+                    ..
+                } = shooting;
+                shot += field.sample_vertices(rays, hierarchy, field.samples, seed, cancel)?;
+            }
+            if self.parts.len() <= number {
+                let whole = LightParts::whole(field, shooting.scene, &self.appearances);
+                self.parts.push(whole);
+            }
+            shot += self.parts[number].mix(field, shooting, appearances)?;
         }
-        let parts = self
-            .parts
-            .get_or_insert_with(|| LightParts::whole(field, shooting.scene, &self.appearances));
-        shot += parts.mix(field, shooting, appearances)?;
         Some(shot)
     }
 
@@ -173,7 +176,8 @@ impl Relighting {
         let solved = self.solved.as_ref().map_or(0, |solved| {
             size_of_val(solved.linked.as_slice()) + size_of_val(solved.leaves.as_slice())
         });
-        solved + self.parts.as_ref().map_or(0, LightParts::memory_bytes)
+        let parts = self.parts.iter().map(LightParts::memory_bytes);
+        solved + parts.sum::<usize>()
     }
 }
 

@@ -7,10 +7,8 @@ use rayon::prelude::*;
 
 use super::{lights::Lights, samples::DirectLight, smooth};
 use crate::{
-    geometry::RayTree,
     hierarchy::{Element, Hierarchy, luminance},
     solver::{
-        Cancel,
         coverage::SkyShare,
         places::{OffsetPlaces, carry_over, project},
         sums,
@@ -58,27 +56,6 @@ impl DirectField {
     ) {
         (self.lights, self.vertices, self.centres) = (Arc::new(lights), vertices, centres);
         self.unoccluded_at_centres.clear();
-    }
-
-    /// Replace the light by another one, and sample it at all vertices as often as before. Returns the rays shot; `None` when
-    /// cancelled.
-    pub(super) fn replace_lights(
-        &mut self,
-        lights: Lights,
-        rays: &RayTree,
-        hierarchy: &Hierarchy,
-        seed: u64,
-        cancel: &Cancel,
-    ) -> Option<u64> {
-        let samples = self.samples;
-        *self = Self {
-            offsets: std::mem::take(&mut self.offsets),
-            ..Self::new(lights)
-        };
-        if samples == 0 {
-            return Some(0);
-        }
-        self.sample_vertices(rays, hierarchy, samples, seed, cancel)
     }
 
     /// Direct irradiance of a leaf: the mean of its corners, or the quadrature rule of degree 2 with its centroid. For

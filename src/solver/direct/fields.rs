@@ -92,34 +92,11 @@ impl DirectFields {
         self.fields.iter().find(|field| !field.lights.is_outside())
     }
 
-    /// The same, to be recoloured.
-    pub(crate) fn emitters_mut(&mut self) -> Option<&mut DirectField> {
+    /// The fields of the emitters and of their images in mirrors, to be recoloured.
+    pub(crate) fn emitters_mut(&mut self) -> impl Iterator<Item = &mut DirectField> {
         self.fields
             .iter_mut()
-            .find(|field| !field.lights.is_outside())
-    }
-
-    /// Let the images of the emitters in mirrors have the light that the emitters have now, by new shadow rays. Returns the
-    /// rays shot; `None` when cancelled.
-    pub(crate) fn recolor_images(
-        &mut self,
-        rays: &RayTree,
-        hierarchy: &Hierarchy,
-        seed: u64,
-        cancel: &Cancel,
-    ) -> Option<u64> {
-        let Some(emitters) = self.emitters().map(|field| field.lights.clone()) else {
-            return Some(0);
-        };
-        let mut shot = 0;
-        for field in &mut self.fields {
-            let Some(image) = field.lights.image().filter(|_| !field.lights.is_outside()) else {
-                continue;
-            };
-            let lights = emitters.in_image(&image.clone());
-            shot += field.replace_lights(lights, rays, hierarchy, seed, cancel)?;
-        }
-        Some(shot)
+            .filter(|field| !field.lights.is_outside())
     }
 
     /// Direct irradiance of a leaf, W/m².

@@ -129,11 +129,6 @@ impl Lights {
         }
     }
 
-    /// The image in which it is seen, where it comes over mirrors.
-    pub(super) fn image(&self) -> Option<&Arc<Image>> {
-        self.image.as_ref()
-    }
-
     /// Whether it comes over mirrors.
     pub(super) fn is_mirrored(&self) -> bool {
         self.image.is_some()
@@ -195,7 +190,11 @@ impl Lights {
                 })
             })
             .collect();
-        Self::of(&emitters, self.is_sampled.clone())
+        let repainted = Self::of(&emitters, self.is_sampled.clone());
+        match &self.image {
+            None => repainted,
+            Some(image) => repainted.in_image(image),
+        }
     }
 
     /// The irradiance, bounded by the largest radiosity: with many emitters behind each other, few rays estimate their
