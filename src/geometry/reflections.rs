@@ -34,15 +34,22 @@ pub struct Followed {
 impl RayTree {
     /// Follow a ray to a surface that does not reflect it as a mirror. Where a mirror is diffuse as well, chance decides.
     pub fn followed(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Followed {
-        let mirrors = self.mirrors();
+        let Some(mirrors) = self.mirrors() else {
+            let hit = self.closest(origin, direction, from);
+            return Followed {
+                hit,
+                origin,
+                direction,
+                length: 0.0,
+                tint: self.tint(origin, direction, from, hit),
+            };
+        };
         let (mut origin, mut direction, mut from) = (origin, direction, from);
         let (mut tint, mut length, mut reflections) = (Vec3::ONE, 0.0, 0);
         loop {
             let hit = self.closest(origin, direction, from);
             tint *= self.tint(origin, direction, from, hit);
-            let met = hit.zip(mirrors);
-            let met =
-                met.and_then(|(hit, mirrors)| Some((hit, mirrors.met(hit.triangle, direction)?.1)));
+            let met = hit.and_then(|hit| Some((hit, mirrors.met(hit.triangle, direction)?.1)));
             if let Some((hit, mirror)) = met {
                 let part = mirror.mirrored_part;
                 let reflects = part >= 1.0 || chance(origin, direction, !hit.triangle.0) < part;

@@ -7,10 +7,7 @@ use super::{
     link::LEAST_RAYS,
     refiner::{Decision, Refinement, Refiner},
 };
-use crate::{
-    geometry::Vectors4,
-    hierarchy::{Channels as _, Kind, NodeId},
-};
+use crate::hierarchy::{Channels as _, Kind, NodeId};
 
 /// Most visibility rays of a link. Fewer, and strong links are noisy; more cost time.
 const MOST_RAYS: u32 = 8;
@@ -228,12 +225,8 @@ fn area_form_factor(kernel: Kernel<'_>, source: usize, receiver: usize) -> f32 {
     if distance > 2.0 * (from.radius + to.radius) {
         return kernel.element_form_factor(source, to.centroid, normal);
     }
-    let points = inner_points(hierarchy.mesh.corners(receiver));
-    let normals = Vectors4::splat(normal);
-    kernel
-        .element_form_factors(source, &points, &normals)
-        .element_sum()
-        * 0.25
+    let points = inner_points(hierarchy.mesh.corners(receiver)).to_array();
+    kernel.mean_element_form_factor(source, points, normal)
 }
 
 #[cfg(test)]

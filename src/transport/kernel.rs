@@ -142,39 +142,48 @@ impl Kernel<'_> {
     }
 
     /// The place of a source that a place of receivers stands for.
+    #[inline]
     pub(super) fn source_of(&self, place: Vec3) -> Vec3 {
         self.image.map_or(place, |image| image.source_of(place))
     }
 
     /// The same of directions.
+    #[inline]
     pub(super) fn source_direction(&self, direction: Vec3) -> Vec3 {
         self.image
             .map_or(direction, |image| image.source_direction(direction))
     }
 
     /// Where receivers see a place of a source.
+    #[inline]
     pub(super) fn seen_at(&self, point: Vec3) -> Vec3 {
         self.image.map_or(point, |image| image.place(point))
     }
 
     /// In which direction they see one.
+    #[inline]
     pub(super) fn seen_direction(&self, direction: Vec3) -> Vec3 {
         self.image
             .map_or(direction, |image| image.direction(direction))
     }
 
     /// Where receivers see the centre of the power of a cluster.
+    #[inline]
     pub fn centre(&self, cluster: usize) -> Vec3 {
         self.seen_at(self.tables.centres[cluster])
     }
 
     /// A cluster as seen from a point.
+    #[inline]
     pub fn sight(&self, cluster: usize, point: Vec3) -> Sight {
-        let centre = self.centre(cluster);
+        if let Some(image) = self.image {
+            return self.sight_in(image, cluster, point);
+        }
+        let centre = self.tables.centres[cluster];
         let extent = self.extent(self.hierarchy.clusters[cluster].radius);
         let separation = point - centre;
         let squared = separation.length_squared();
-        let unit = self.source_direction(separation / squared.sqrt());
+        let unit = separation / squared.sqrt();
         let spread = spread(extent, squared);
         let power = if squared <= 0.0 || !unit.is_finite() {
             Vec4::ZERO
@@ -202,16 +211,18 @@ impl Kernel<'_> {
     /// Vector irradiance (eq. 14, unoccluded) of a node at a point. Near the source the strength saturates towards the
     /// radiosity of its brightest patch, as that of a disc does on its axis: A/π r² becomes A/(π r² + A).
     pub fn vector_irradiance(&self, source: NodeId, point: Vec3) -> Incident {
+        if let Some(image) = self.image {
+            return self.vector_irradiance_in(image, source, point);
+        }
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => self.sight(index, point).incident(point),
             Kind::Element(index) => {
-                let point = self.source_of(point);
                 let squared = point.distance_squared(self.tables.centre(self.hierarchy, source));
                 let spread = spread(self.extent(self.hierarchy.radius(source)), squared);
                 let vector = element_vector(self.hierarchy, index, point);
                 let length = vector.length();
                 let towards_source = if length > 0.0 {
-                    self.seen_direction(vector / length)
+                    vector / length
                 } else {
                     Vec3::ZERO
                 };
@@ -254,16 +265,24 @@ impl Kernel<'_> {
 
     /// Irradiance (eqs 12 and 15, unoccluded) of a face with this unit normal at a point.
     pub fn irradiance(&self, source: NodeId, point: Vec3, normal: Vec3) -> Vec4 {
+        if let Some(image) = self.image {
+            let (point, normal) = (image.source_of(point), image.source_direction(normal));
+            return self.of_sources().irradiance(source, point, normal);
+        }
         match self.hierarchy.kind(source) {
             Kind::Cluster(_) => self.vector_irradiance(source, point).on_face(normal),
             Kind::Element(index) => {
-                self.tables.elements[index] * self.element_form_factor(index, point, normal)
+                self.tables.elements[index]
+                    * element_form_factor(self.hierarchy, index, point, normal)
             }
         }
     }
 
     /// As [`Self::irradiance`], at four points with a unit normal each.
     pub fn irradiances(&self, source: NodeId, points: &Vectors4, normals: &Vectors4) -> [Vec4; 4] {
+        if let Some(image) = self.image {
+            return self.irradiances_in(image, source, points, normals);
+        }
         match self.hierarchy.kind(source) {
             Kind::Cluster(index) => {
                 let (points, normals) = (points.to_array(), normals.to_array());
@@ -273,7 +292,7 @@ impl Kernel<'_> {
                 })
             }
             Kind::Element(index) => {
-                let factors = self.element_form_factors(index, points, normals);
+                let factors = element_form_factors(self.hierarchy, index, points, normals);
                 let radiosity = self.tables.elements[index];
                 // Written out: a `map` compiles to a call for every link.
                 [
@@ -288,37 +307,68 @@ impl Kernel<'_> {
 }
 
 impl Kernel<'_> {
-    /// As the function of this name.
-    #[inline]
-    pub(super) fn element_form_factor(&self, source: usize, point: Vec3, normal: Vec3) -> f32 {
-        match self.image {
-            None => element_form_factor(self.hierarchy, source, point, normal),
-            Some(image) => {
-                let (point, normal) = (image.source_of(point), image.source_direction(normal));
-                element_form_factor(self.hierarchy, source, point, normal)
-            }
+    /// The same without an image: for receivers at the places of sources that theirs stand for.
+    fn of_sources(&self) -> Self {
+        Self {
+            image: None,
+            ..*self
         }
     }
 
-    /// As the function of this name.
-    #[inline]
-    pub(super) fn element_form_factors(
+    // Apart from the functions that call them: those run for every link of scenes without mirrors.
+
+    #[cold]
+    fn sight_in(&self, image: &Image, cluster: usize, point: Vec3) -> Sight {
+        let sight = self.of_sources().sight(cluster, image.source_of(point));
+        Sight {
+            centre: image.place(sight.centre),
+            ..sight
+        }
+    }
+
+    #[cold]
+    fn vector_irradiance_in(&self, image: &Image, source: NodeId, point: Vec3) -> Incident {
+        let incident = self
+            .of_sources()
+            .vector_irradiance(source, image.source_of(point));
+        Incident {
+            towards_source: image.direction(incident.towards_source),
+            ..incident
+        }
+    }
+
+    #[cold]
+    fn irradiances_in(
         &self,
-        source: usize,
+        image: &Image,
+        source: NodeId,
         points: &Vectors4,
         normals: &Vectors4,
-    ) -> Vec4 {
-        match self.image {
-            None => element_form_factors(self.hierarchy, source, points, normals),
-            Some(image) => {
-                let points = points.to_array().map(|point| image.source_of(point));
-                let normals = normals
-                    .to_array()
-                    .map(|normal| image.source_direction(normal));
-                let (points, normals) = (Vectors4::new(points), Vectors4::new(normals));
-                element_form_factors(self.hierarchy, source, &points, &normals)
-            }
-        }
+    ) -> [Vec4; 4] {
+        let points = points.to_array().map(|point| image.source_of(point));
+        let normals = normals
+            .to_array()
+            .map(|normal| image.source_direction(normal));
+        let (points, normals) = (Vectors4::new(points), Vectors4::new(normals));
+        self.of_sources().irradiances(source, &points, &normals)
+    }
+
+    /// As the function of this name.
+    pub(super) fn element_form_factor(&self, source: usize, point: Vec3, normal: Vec3) -> f32 {
+        let (point, normal) = (self.source_of(point), self.source_direction(normal));
+        element_form_factor(self.hierarchy, source, point, normal)
+    }
+
+    /// Mean of the form factors at four points of a normal.
+    pub(super) fn mean_element_form_factor(
+        &self,
+        source: usize,
+        points: [Vec3; 4],
+        normal: Vec3,
+    ) -> f32 {
+        let points = Vectors4::new(points.map(|point| self.source_of(point)));
+        let normals = Vectors4::splat(self.source_direction(normal));
+        element_form_factors(self.hierarchy, source, &points, &normals).element_sum() * 0.25
     }
 
     /// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is undetermined,

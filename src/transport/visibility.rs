@@ -324,7 +324,10 @@ impl PairSampler<'_> {
         for _ in 0..CANDIDATES {
             let candidate = self.sample_source(source, random);
             let to = self.sample(receiver, random);
-            let weight = self.transfer(&candidate.from, &to);
+            let weight = match self.image {
+                None => transfer(&candidate.from, &to),
+                Some(image) => transfer(&candidate.from, &Self::as_sources_see(image, &to)),
+            };
             sum += weight;
             if chosen.is_none() || random.uniform() * sum < weight {
                 chosen = Some((candidate, to));
@@ -343,18 +346,13 @@ impl PairSampler<'_> {
         Some((candidate, sum, passing))
     }
 
-    /// Unoccluded transfer between two points for a radiosity of 1, up to a factor common to all pairs of points.
-    fn transfer(&self, from: &Sample, to: &Sample) -> f32 {
-        match self.image {
-            None => transfer(from, to),
-            Some(image) => {
-                let to = Sample {
-                    point: image.source_of(to.point),
-                    normal: image.source_direction(to.normal),
-                    ..*to
-                };
-                transfer(from, &to)
-            }
+    /// A point of a receiver where the sources see it, in an image.
+    #[cold]
+    fn as_sources_see(image: &Image, to: &Sample) -> Sample {
+        Sample {
+            point: image.source_of(to.point),
+            normal: image.source_direction(to.normal),
+            ..*to
         }
     }
 
@@ -457,7 +455,7 @@ impl PairSampler<'_> {
     }
 }
 
-/// See [`PairSampler::transfer`].
+/// Unoccluded transfer between two points for a radiosity of 1, up to a factor common to all pairs of points.
 fn transfer(from: &Sample, to: &Sample) -> f32 {
     let separation = to.point - from.point;
     let squared = separation.length_squared();
