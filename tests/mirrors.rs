@@ -1,7 +1,5 @@
 //! Plane mirrors: a room with one equals the room built twice, and mirrors that show each other equal path tracing.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 mod common;
 
 use std::sync::Arc;

@@ -28,7 +28,7 @@ use crate::{
     metrics::ErrorMeasures,
     reference::MatrixError,
     scene::Scene,
-    solver::{Snapshot, StepReport},
+    solver::{Note, Snapshot, StepReport},
     worker::{Event, StopReason, WorkerHandle},
 };
 
@@ -136,6 +136,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     );
     let run = drain(&worker, &interrupted, arguments)?;
     drop(worker);
+    say_what_is_diffused(&run);
     let totals = Totals {
         read_s,
         reference_s,
@@ -166,6 +167,15 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         StopReason::Converged => Outcome::Done,
         _ => Outcome::StoppedEarly,
     })
+}
+
+/// Say how much light counts as diffuse though it is not.
+fn say_what_is_diffused(run: &Run) {
+    let notes = run.steps.last().map_or(&[][..], |step| &step.notes);
+    let is_meant = |note: &&Note| matches!(note, Note::Diffused { .. });
+    if let Some(note) = notes.iter().find(is_meant) {
+        output::say(format_args!("note: {note}"));
+    }
 }
 
 /// Errors at the vertices, where a picture is to show them.

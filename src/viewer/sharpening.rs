@@ -69,8 +69,16 @@ struct Tracing {
     since: Instant,
     /// Begun once the view has rested.
     pictures: Option<(Cancel, Receiver<(u32, Traced)>)>,
-    /// The finest so far, with its texture and how that is exposed.
-    shown: Option<(u32, Traced, Option<(Look, TextureHandle)>)>,
+    /// The finest so far.
+    shown: Option<Shown>,
+}
+
+/// A traced picture in the window.
+struct Shown {
+    samples: u32,
+    picture: Traced,
+    /// How its texture is exposed.
+    texture: Option<(Look, TextureHandle)>,
 }
 
 impl Drop for Tracing {
@@ -193,13 +201,24 @@ impl Tracing {
         if let Some((_, pictures)) = &self.pictures {
             let newest = loop {
                 match pictures.try_recv() {
-                    Ok((samples, picture)) => self.shown = Some((samples, picture, None)),
+                    Ok((samples, picture)) => {
+                        self.shown = Some(Shown {
+                            samples,
+                            picture,
+                            texture: None,
+                        });
+                    }
                     Err(error) => break error,
                 }
             };
             is_done = newest == mpsc::TryRecvError::Disconnected;
         }
-        let Some((samples, picture, texture)) = &mut self.shown else {
+        let Some(Shown {
+            samples,
+            picture,
+            texture,
+        }) = &mut self.shown
+        else {
             state.sharpness = (!is_done).then_some(Sharpness {
                 samples: 0,
                 noise: None,
