@@ -52,7 +52,8 @@ pub struct SceneFlags {
     ///
     /// Otherwise map_d, or the alpha of map_Kd, cuts out where it is below 0.5, and d below 1 (or Tr above 0) lets the
     /// part 1 - d pass straight on, times Tf. d 0 (or Tr 1) counts only for materials without a picture, and where at
-    /// most half of the materials have it: many programs write it into opaque ones. illum alone makes nothing transparent.
+    /// most half of the materials have it: many programs write it into opaque ones. By
+    /// itself illum 6 and 7 alone make glass; see --matt.
     #[arg(long, help_heading = "Scene")]
     pub opaque: bool,
     /// Treat mirrors, gloss and glass as matt
