@@ -75,7 +75,10 @@ pub(super) fn write_glb(
 ) -> io::Result<()> {
     let mesh = &*snapshot.mesh;
     let sizes = Sizes::of(mesh);
-    let mut text = document(mesh, frame, options).to_string().into_bytes();
+    let parts = parts(mesh);
+    let mut text = document(mesh, &parts, frame, options)
+        .to_string()
+        .into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let length = sizes
         .file_length(text.len() as u64)
@@ -95,7 +98,6 @@ pub(super) fn write_glb(
         write_vector(out, light.radiance)?;
         write_vector(out, light.irradiance)?;
     }
-    let parts = parts(mesh);
     let mut triangles = parts.iter().flat_map(|part| &part.triangles);
     triangles.try_for_each(|&triangle| write_numbers(out, &mesh.indices[triangle as usize]))
 }
@@ -180,10 +182,9 @@ fn from_node(position: Vec3, frame: &Frame) -> Vec3 {
 }
 
 /// The JSON chunk.
-fn document(mesh: &DisplayMesh, frame: &Frame, options: &MeshOptions) -> Value {
+fn document(mesh: &DisplayMesh, parts: &[Part], frame: &Frame, options: &MeshOptions) -> Value {
     let nodes = nodes(frame, options.up);
     let sizes = Sizes::of(mesh);
-    let parts = parts(mesh);
     let primitives: Vec<Value> = (0..parts.len()).map(primitive).collect();
     let materials: Vec<Value> = parts.iter().map(|part| material(part.finish)).collect();
     json!({
@@ -206,7 +207,7 @@ fn document(mesh: &DisplayMesh, frame: &Frame, options: &MeshOptions) -> Value {
             },
         }],
         "materials": materials,
-        "accessors": accessors(mesh, &parts, frame),
+        "accessors": accessors(mesh, parts, frame),
         "bufferViews": [
             {
                 "buffer": 0,

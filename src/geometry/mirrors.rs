@@ -8,7 +8,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::{Mat3, Vec3};
 
-use crate::scene::{Scene, Specular, TriangleId, luminance};
+use crate::scene::{Scene, Specular, TriangleId, luminance, reflected};
 
 /// Most mirrors whose images are followed. Fewer, and rooms of mirrors are taken for diffuse; more take time for each.
 const MOST_MIRRORS: usize = 8;
@@ -187,7 +187,7 @@ impl Mirror {
     }
 
     pub(super) fn reflected(&self, direction: Vec3) -> Vec3 {
-        (direction - 2.0 * direction.dot(self.normal) * self.normal).normalize_or(-direction)
+        reflected(direction, self.normal)
     }
 
     /// Whether some of a box may be seen in it.
@@ -243,9 +243,8 @@ impl Image {
         let mut legs = self.legs.clone();
         legs.push(index as u32);
         let normal = mirror.normal;
-        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-        let reflection = axes.map(|axis| axis - 2.0 * axis.dot(normal) * normal);
-        let reflection = Mat3::from_cols(reflection[0], reflection[1], reflection[2]);
+        let [x, y, z] = Vec3::AXES.map(|axis| axis.reflect(normal));
+        let reflection = Mat3::from_cols(x, y, z);
         Self {
             index: 0,
             legs,

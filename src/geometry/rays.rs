@@ -2,10 +2,12 @@
 //!
 //! It serves rays only: clusters of light come from a tree of their own.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::{
-    mirrors::Mirrors,
+    mirrors::{Image, Mirrors},
     panes::{self, Panes},
     wide::{Ray, Reach, Tree},
 };
@@ -89,6 +91,16 @@ impl RayTree {
     /// The plane mirrors, if there are any.
     pub fn mirrors(&self) -> Option<&Mirrors> {
         self.mirrors.as_deref()
+    }
+
+    /// The images in plane mirrors, the strongest first.
+    pub fn images(&self) -> &[Arc<Image>] {
+        self.mirrors().map_or(&[], Mirrors::images)
+    }
+
+    /// Whether a triangle is of a plane mirror that rays follow.
+    pub fn follows(&self, triangle: TriangleId) -> bool {
+        self.mirrors().is_some_and(|mirrors| mirrors.has(triangle))
     }
 
     /// Whether rays to surfaces may lose some of their light, by colour, on the way.

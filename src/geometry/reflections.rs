@@ -32,17 +32,22 @@ pub struct Followed {
 }
 
 impl RayTree {
+    /// What a ray meets first, be it a mirror, with its tint.
+    pub fn met(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Followed {
+        let hit = self.closest(origin, direction, from);
+        Followed {
+            hit,
+            origin,
+            direction,
+            length: 0.0,
+            tint: self.tint(origin, direction, from, hit),
+        }
+    }
+
     /// Follow a ray to a surface that does not reflect it as a mirror. Where a mirror is diffuse as well, chance decides.
     pub fn followed(&self, origin: Vec3, direction: Vec3, from: Option<TriangleId>) -> Followed {
         let Some(mirrors) = self.mirrors() else {
-            let hit = self.closest(origin, direction, from);
-            return Followed {
-                hit,
-                origin,
-                direction,
-                length: 0.0,
-                tint: self.tint(origin, direction, from, hit),
-            };
+            return self.met(origin, direction, from);
         };
         let (mut origin, mut direction, mut from) = (origin, direction, from);
         let (mut tint, mut length, mut reflections) = (Vec3::ONE, 0.0, 0);
@@ -91,13 +96,7 @@ impl RayTree {
         let direction = (seen - from).normalize_or_zero();
         match self.over_mirrors(image, from, direction, from.distance(seen), start) {
             Err(blocked) => blocked,
-            Ok(leg) => {
-                let last = self.passage(leg.origin, to, [leg.from, end]);
-                Passage {
-                    transmittance: leg.tint * last.transmittance,
-                    end: leg.length + last.end,
-                }
-            }
+            Ok(leg) => leg.and(self.passage(leg.origin, to, [leg.from, end])),
         }
     }
 
@@ -112,13 +111,7 @@ impl RayTree {
         let seen = image.direction(direction);
         match self.over_mirrors(image, from, seen, f32::INFINITY, start) {
             Err(blocked) => blocked,
-            Ok(leg) => {
-                let last = self.passage_outward(leg.origin, direction, leg.from);
-                Passage {
-                    transmittance: leg.tint * last.transmittance,
-                    end: leg.length + last.end,
-                }
-            }
+            Ok(leg) => leg.and(self.passage_outward(leg.origin, direction, leg.from)),
         }
     }
 
@@ -133,14 +126,11 @@ impl RayTree {
         let leg = self
             .over_mirrors(image, from, direction, f32::INFINITY, start)
             .ok()?;
-        let direction = image.source_direction(direction);
-        let hit = self.closest(leg.origin, direction, leg.from);
+        let last = self.met(leg.origin, image.source_direction(direction), leg.from);
         Some(Followed {
-            hit,
-            origin: leg.origin,
-            direction,
             length: leg.length,
-            tint: leg.tint * self.tint(leg.origin, direction, leg.from, hit),
+            tint: leg.tint * last.tint,
+            ..last
         })
     }
 
@@ -193,6 +183,16 @@ struct Leg {
     /// Of the way so far.
     length: f32,
     tint: Vec3,
+}
+
+impl Leg {
+    /// What passes on the way so far and on the rest of it.
+    fn and(&self, rest: Passage) -> Passage {
+        Passage {
+            transmittance: self.tint * rest.transmittance,
+            end: self.length + rest.end,
+        }
+    }
 }
 
 #[cfg(test)]

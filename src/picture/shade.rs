@@ -12,7 +12,7 @@ use super::{
     turn::Lobe,
 };
 use crate::{
-    geometry::{Hit, Image, Mirrors},
+    geometry::{Hit, Image},
     scene::{Sky, Specular, TriangleId, luminance},
 };
 
@@ -215,7 +215,7 @@ impl Sight {
             Some(Specular::Mirror { reflectance }) => {
                 onward.direction = surface.mirrored(leg.direction);
                 let is_first = |chosen: &Chosen| !chosen.is_mirrored;
-                let is_plane = seen.lit.is_followed(hit.triangle);
+                let is_plane = seen.lit.rays.follows(hit.triangle);
                 let chosen = leg.chosen.filter(is_first).filter(|_| is_plane);
                 onward.chosen = chosen.map(|chosen| Chosen {
                     is_mirrored: true,
@@ -370,8 +370,7 @@ impl Seen<'_> {
     /// What gloss reflects from the sun, from a point of an emitter, and from one of its image in each mirror, as radiance; its
     /// colour apart.
     fn highlights(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
-        let mirrors = self.lit.rays.mirrors();
-        let images = mirrors.map_or(&[][..], Mirrors::images).iter();
+        let images = self.lit.rays.images().iter();
         let images = images.filter(|image| image.is_single());
         let all = iter::once(None).chain(images.map(|image| Some(&**image)));
         let emitters = all.map(|image| self.emitter_highlight(surface, lobe, image, chances));

@@ -117,15 +117,9 @@ impl LitScene<'_> {
             .emitted_at(point.triangle, emission, point.barycentric)
     }
 
-    /// Whether a triangle is of a plane mirror that rays follow.
-    pub(super) fn is_followed(&self, triangle: TriangleId) -> bool {
-        let mirrors = self.rays.mirrors();
-        mirrors.is_some_and(|mirrors| mirrors.has(triangle))
-    }
-
     /// What a surface reflects of light from all directions, in whatever directions, but for mirrors that rays follow.
     pub(super) fn reflectance(&self, surface: &Surface) -> Vec3 {
-        if surface.specular.is_none() || self.is_followed(surface.triangle) {
+        if surface.specular.is_none() || self.rays.follows(surface.triangle) {
             return surface.reflectance;
         }
         let diffused = self.scene.material(surface.triangle).diffused_specular();

@@ -82,6 +82,19 @@ struct Arrival {
     emission: Vec3,
 }
 
+/// Whether a path goes on after so many bounces: by Russian roulette, which the throughput makes up for.
+fn goes_on(throughput: &mut Vec3, bounces: u32, random: &mut Random) -> bool {
+    if bounces < SURE_BOUNCES {
+        return *throughput != Vec3::ZERO;
+    }
+    let survival = throughput.max_element().min(1.0);
+    let goes_on = random.uniform() < survival;
+    if goes_on {
+        *throughput /= survival;
+    }
+    goes_on
+}
+
 impl Estimator<'_> {
     /// Whether there is no light.
     pub(super) fn is_dark(&self) -> bool {
@@ -115,13 +128,7 @@ impl Estimator<'_> {
                 break;
             };
             throughput *= reflectance;
-            if depth + 1 >= SURE_BOUNCES {
-                let survival = throughput.max_element().min(1.0);
-                if random.uniform() >= survival {
-                    break;
-                }
-                throughput /= survival;
-            } else if throughput == Vec3::ZERO {
+            if !goes_on(&mut throughput, depth + 1, random) {
                 break;
             }
             at = point;
@@ -183,13 +190,7 @@ impl Estimator<'_> {
             };
             ray_count += 1;
             throughput *= weight;
-            if turns >= SURE_BOUNCES {
-                let survival = throughput.max_element().min(1.0);
-                if random.uniform() >= survival {
-                    break;
-                }
-                throughput /= survival;
-            } else if throughput == Vec3::ZERO {
+            if !goes_on(&mut throughput, turns, random) {
                 break;
             }
             flight = Flight {

@@ -226,9 +226,7 @@ impl Outside {
         }
         sun.irradiance * (toward.value * weight) * passing(rays, at, direction)
     }
-}
 
-impl Outside {
     /// As the sun's share, over one mirror.
     fn mirrored_sun_share(
         &self,
@@ -244,7 +242,7 @@ impl Outside {
         let mut sum = Vec3::ZERO;
         for (number, mirror) in self.mirrors.list.iter().enumerate() {
             let cosine = direction.dot(mirror.normal);
-            let toward_mirror = direction - 2.0 * cosine * mirror.normal;
+            let toward_mirror = direction.reflect(mirror.normal);
             let toward = scatter.toward(toward_mirror);
             if toward.value <= 0.0 {
                 continue;

@@ -83,7 +83,7 @@ impl Specular {
 
 /// The direction in which a mirror reflects a ray. `direction` is that of the ray, towards the surface.
 pub fn reflected(direction: Vec3, normal: Vec3) -> Vec3 {
-    (direction - 2.0 * direction.dot(normal) * normal).normalize_or(-direction)
+    direction.reflect(normal).normalize_or(-direction)
 }
 
 /// The direction in which a ray goes on behind a surface, and the part of it that is reflected instead (Fresnel's equations

@@ -106,9 +106,7 @@ impl Solver {
             },
         );
         let mut hierarchy = hierarchy?;
-        hierarchy.diffuse_specular(&scene, |triangle| {
-            rays.mirrors().is_some_and(|mirrors| mirrors.has(triangle))
-        });
+        hierarchy.diffuse_specular(&scene, |triangle| rays.follows(triangle));
         cancel.proceed()?;
         let ray_count = plan.probe_outside(&scene, &hierarchy, &rays, &settings);
         cancel.proceed()?;

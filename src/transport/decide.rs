@@ -55,7 +55,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if let Some(decision) = self.decide_by_plan(source, receiver, known, weight, out) {
             return decision;
         }
-        if self.is_own(source, receiver) {
+        if self.judge.kernel.is_own(source, receiver) {
             return self.decide_self(source, weight, known, out);
         }
         let mut random = self.random(source, receiver);

@@ -371,6 +371,11 @@ impl Kernel<'_> {
         element_form_factors(self.hierarchy, source, &points, &normals).element_sum() * 0.25
     }
 
+    /// Whether a pair is a cluster and itself, and not what a mirror shows it of itself.
+    pub fn is_own(&self, source: NodeId, receiver: NodeId) -> bool {
+        source == receiver && self.image.is_none()
+    }
+
     /// Whether two nodes may touch and one of them at least is a cluster: then the direction between them is undetermined,
     /// and the tables say nothing.
     pub fn is_too_near_for_tables(&self, source: NodeId, receiver: NodeId) -> bool {

@@ -175,7 +175,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
             Decision::DivideSource => {
                 pending.extend(self.hierarchy().children(source).rev().map(NodeId));
             }
-            Decision::DivideReceiver if self.is_own(source, receiver) => {
+            Decision::DivideReceiver if self.judge.kernel.is_own(source, receiver) => {
                 down.extend(self.hierarchy().children(receiver).map(NodeId));
             }
             Decision::DivideReceiver => {

@@ -106,11 +106,6 @@ impl<'a, F> Refiner<'a, F> {
         self.judge.kernel.hierarchy
     }
 
-    /// Whether a pair is a cluster and itself, and not what a mirror shows it of itself.
-    pub(super) fn is_own(&self, source: NodeId, receiver: NodeId) -> bool {
-        source == receiver && self.judge.kernel.image.is_none()
-    }
-
     pub(super) fn random(&self, source: NodeId, receiver: NodeId) -> Random {
         let image = self.judge.kernel.image;
         Random::new(

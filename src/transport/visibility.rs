@@ -393,21 +393,10 @@ impl PairSampler<'_> {
     /// The end of a ray from a receiver, behind the mirrors of the image; `None` where it misses them.
     fn end_of(&self, from: &Sample, direction: Vec3) -> Option<Followed> {
         let start = Some(from.triangle);
-        if let Some(image) = self.image {
-            return self.rays.met_over(image, from.point, direction, start);
+        match self.image {
+            Some(image) => self.rays.met_over(image, from.point, direction, start),
+            None => Some(self.rays.met(from.point, direction, start)),
         }
-        let hit = self.rays.closest(from.point, direction, start);
-        Some(Followed {
-            hit,
-            origin: from.point,
-            direction,
-            // Of what meets nothing there is no light.
-            tint: match hit {
-                Some(_) => self.rays.tint(from.point, direction, start, hit),
-                None => Vec3::ONE,
-            },
-            length: 0.0,
-        })
     }
 
     /// The part of the area of a cluster that rays meet, above 0: its radiosity is a mean over all of the area.

@@ -38,7 +38,6 @@ struct Wished {
     interior: Option<Interior>,
     camera: Camera,
     size: [u32; 2],
-    is_dark: bool,
     backs: bool,
     see_through: bool,
 }
@@ -49,7 +48,6 @@ impl PartialEq for Wished {
             && Arc::ptr_eq(&self.rays, &other.rays)
             && self.camera == other.camera
             && self.size == other.size
-            && self.is_dark == other.is_dark
             && self.backs == other.backs
             && self.see_through == other.see_through
     }
@@ -140,7 +138,6 @@ fn wished(state: &State) -> Option<Wished> {
         interior: loaded.interior,
         camera: state.rig.current,
         size: state.viewport_size,
-        is_dark: state.is_dark(),
         backs: view.backs,
         see_through: view.see_through,
     })
@@ -165,7 +162,7 @@ impl Tracing {
                 snapshot: &wanted.snapshot,
                 errors: None,
                 interior: wished.interior,
-                is_dark: wished.is_dark,
+                is_dark: false,
             };
             for (divisor, samples) in PASSES {
                 let exposure = Exposure {

@@ -9,7 +9,7 @@ use glam::Vec4;
 
 use super::{field::DirectField, lights::Lights, samples::DirectLight, scale::Surroundings};
 use crate::{
-    geometry::{Mirrors, RayTree},
+    geometry::RayTree,
     hierarchy::{Channels as _, Hierarchy},
     scene::Scene,
     solver::{
@@ -66,9 +66,8 @@ impl DirectFields {
         });
         let outside = outside.into_iter().flatten().flatten();
         let mut lights: Vec<Lights> = emitters.into_iter().chain(outside).collect();
-        let images = rays.mirrors().map_or(&[][..], Mirrors::images);
         let in_image = |image| lights.iter().map(move |lights| lights.in_image(image));
-        let mirrored: Vec<Lights> = images.iter().flat_map(in_image).collect();
+        let mirrored: Vec<Lights> = rays.images().iter().flat_map(in_image).collect();
         lights.extend(mirrored);
         Self {
             fields: lights.into_iter().map(DirectField::new).collect(),

@@ -226,7 +226,7 @@ fn cluster_incident(kernel: Kernel<'_>, links: &LinkStore, index: usize) -> Mome
     let cluster = &hierarchy.clusters[index];
     let mut sum = Moments::default();
     links.tinted(NodeId(index as u32)).for_each(|link| {
-        if link.source.index() == index && kernel.image.is_none() {
+        if kernel.is_own(link.source, NodeId(index as u32)) {
             sum.add_isotropic(
                 self_irradiance(hierarchy, index, kernel.tables.clusters[index].total())
                     * link.tinted_transmission(),
@@ -288,7 +288,7 @@ fn push_one(
     sums: &mut [Vec4],
 ) {
     let hierarchy = kernel.hierarchy;
-    if source.index() == cluster && kernel.image.is_none() {
+    if kernel.is_own(source, NodeId(cluster as u32)) {
         let irradiance =
             self_irradiance(hierarchy, cluster, kernel.tables.clusters[cluster].total())
                 * transmission;

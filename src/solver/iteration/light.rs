@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec3, Vec4};
 
 use crate::{
-    geometry::{Image, Mirrors, RayTree},
+    geometry::{Image, RayTree},
     hierarchy::{Channels as _, Hierarchy, Reading, Tables, luminance},
     solver::{direct::Surfaces, sums},
     transport::{Kernel, LinkStore},
@@ -36,8 +36,7 @@ pub(crate) struct ImageLinks {
 impl LinkedLight {
     /// Begin with links from all images in mirrors.
     pub(crate) fn show_images(&mut self, rays: &RayTree) {
-        let images = rays.mirrors().map_or(&[][..], Mirrors::images);
-        let unlinked = images.iter().map(|image| ImageLinks {
+        let unlinked = rays.images().iter().map(|image| ImageLinks {
             image: image.clone(),
             links: LinkStore::default(),
         });

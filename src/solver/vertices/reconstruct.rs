@@ -226,7 +226,7 @@ impl<'a> Walk<'a> {
         let far = SIGHT_DISTANCE * cluster.radius;
         let mut chain = self.spare.pop().unwrap_or_default();
         self.links.tinted(NodeId(index as u32)).for_each(|link| {
-            if link.source.index() == index && self.kernel.image.is_none() {
+            if self.kernel.is_own(link.source, NodeId(index as u32)) {
                 chain.even += own_irradiance(self.kernel, index, link);
             } else {
                 chain.add(self.kernel, link, cluster.centroid, far);
