@@ -6,7 +6,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec2, Vec3};
 
 use crate::scene::{Scene, Specular, TriangleId, luminance, reflected};
 
@@ -48,9 +48,11 @@ pub(super) struct Mirror {
     /// The part of the rays that it reflects as a mirror; of the others it is diffuse.
     pub(super) mirrored_part: f32,
     area: f32,
-    /// Box about its triangles.
-    min: Vec3,
-    max: Vec3,
+    /// A rectangle about its triangles: its lowest and highest places along `across`.
+    min: Vec2,
+    max: Vec2,
+    /// Two unit vectors in its plane, at a right angle.
+    across: [Vec3; 2],
 }
 
 /// An image of the scene in one mirror after another.
@@ -155,6 +157,8 @@ impl Mirror {
         let share = material.share_of_met();
         let reflectance = material.specular?.color() * share;
         let [mirrored, diffuse] = [reflectance, material.reflectance * share].map(luminance);
+        let across = <[Vec3; 2]>::from(normal.any_orthonormal_pair());
+        let [a, b, c] = corners.map(|corner| places_along(across, corner));
         Some(Self {
             normal,
             distance: (corners[0] + corners[1] + corners[2]).dot(normal) / 3.0,
@@ -162,8 +166,9 @@ impl Mirror {
             reflectance,
             mirrored_part: mirrored / (mirrored + diffuse).max(f32::MIN_POSITIVE),
             area: area_vector.length(),
-            min: corners[0].min(corners[1]).min(corners[2]),
-            max: corners[0].max(corners[1]).max(corners[2]),
+            min: a.min(b).min(c),
+            max: a.max(b).max(c),
+            across,
         })
     }
 
@@ -182,22 +187,81 @@ impl Mirror {
             .normalize_or(self.normal);
         self.distance += (other.distance - self.distance) * share;
         self.area += other.area;
-        self.min = self.min.min(other.min);
-        self.max = self.max.max(other.max);
+        for corner in other.corners() {
+            let place = places_along(self.across, corner);
+            self.min = self.min.min(place);
+            self.max = self.max.max(place);
+        }
+    }
+
+    /// Of the rectangle about it.
+    fn corners(&self) -> [Vec3; 4] {
+        let [u, v] = self.across;
+        let (min, max) = (self.min, self.max);
+        let foot = self.distance * self.normal;
+        [
+            [min.x, min.y],
+            [max.x, min.y],
+            [max.x, max.y],
+            [min.x, max.y],
+        ]
+        .map(|[x, y]| foot + x * u + y * v)
     }
 
     pub(super) fn reflected(&self, direction: Vec3) -> Vec3 {
         reflected(direction, self.normal)
     }
+}
 
-    /// Whether some of a box may be seen in it.
-    fn shows(&self, other: &Self) -> bool {
-        let (middle, half) = ((other.min + other.max) * 0.5, (other.max - other.min) * 0.5);
-        let reach = half.dot(self.normal.abs());
-        let height = middle.dot(self.normal) - self.distance;
-        let least = PLANE_STEPS[1];
-        height + reach > least || self.is_two_sided && height - reach < -least
+fn places_along(axes: [Vec3; 2], point: Vec3) -> Vec2 {
+    Vec2::from(axes.map(|axis| point.dot(axis)))
+}
+
+/// A mirror on the way to an image, where the mirrors before it show it: light passes it as a window.
+#[derive(Clone)]
+struct Window {
+    normal: Vec3,
+    distance: f32,
+    is_two_sided: bool,
+    corners: [Vec3; 4],
+}
+
+impl Window {
+    fn of(mirror: &Mirror, before: &Image) -> Self {
+        let corners = mirror.corners().map(|corner| before.place(corner));
+        let normal = before.direction(mirror.normal);
+        Self {
+            normal,
+            distance: corners[0].dot(normal),
+            is_two_sided: mirror.is_two_sided,
+            corners,
+        }
     }
+
+    /// Whether some of another window lies before it, and whether some lies behind it.
+    fn sides_of(&self, other: &Self) -> [bool; 2] {
+        let heights = other.corners.map(|at| at.dot(self.normal) - self.distance);
+        let least = PLANE_STEPS[1];
+        [
+            heights.map(|height| height > least),
+            heights.map(|height| height < -least),
+        ]
+        .map(|corners| corners.contains(&true))
+    }
+}
+
+/// Whether a straight line may pass all windows in this order, each from the side that reflects. A line passes a plane once:
+/// of all windows before one some must lie before it, and of all after it some behind it.
+fn may_be_passed(windows: &[Window]) -> bool {
+    windows.iter().enumerate().all(|(index, window)| {
+        let passes = |front: usize| {
+            let sides = |other: &Window| window.sides_of(other);
+            let (earlier, later) = (&windows[..index], &windows[index + 1..]);
+            earlier.iter().all(|other| sides(other)[front])
+                && later.iter().all(|other| sides(other)[1 - front])
+        };
+        passes(0) || window.is_two_sided && passes(1)
+    })
 }
 
 /// The images of a scene in its mirrors, the strongest first.
@@ -209,25 +273,19 @@ fn images(mirrors: &[Mirror]) -> Vec<Arc<Image>> {
         shift: Vec3::ZERO,
         reflectance: Vec3::ONE,
     };
-    let (mut all, mut last) = (Vec::new(), vec![none]);
+    let (mut all, mut last) = (Vec::new(), vec![(none, Vec::new())]);
     while !last.is_empty() && all.len() < MOST_IMAGES {
-        let longer = |image: &Image| -> Vec<Image> {
-            let numbered = mirrors.iter().enumerate();
-            let follows = numbered.filter(|(index, mirror)| match image.legs.last() {
-                None => true,
-                Some(&leg) => {
-                    let before = &mirrors[leg as usize];
-                    leg as usize != *index && before.shows(mirror) && mirror.shows(before)
-                }
-            });
-            follows
-                .map(|(index, mirror)| image.in_mirror(index, mirror))
-                .collect()
+        let longer = |(image, windows): &(Image, Vec<Window>)| -> Vec<(Image, Vec<Window>)> {
+            let with = |(index, mirror)| {
+                let windows = [windows.as_slice(), &[Window::of(mirror, image)]].concat();
+                may_be_passed(&windows).then(|| (image.in_mirror(index, mirror), windows))
+            };
+            mirrors.iter().enumerate().filter_map(with).collect()
         };
         last = last.iter().flat_map(longer).collect();
-        last.retain(|image| luminance(image.reflectance) >= LEAST_WEIGHT);
+        last.retain(|(image, _)| luminance(image.reflectance) >= LEAST_WEIGHT);
         last.truncate(8 * MOST_IMAGES);
-        all.extend_from_slice(&last);
+        all.extend(last.iter().map(|(image, _)| image.clone()));
     }
     all.sort_by(|a, b| luminance(b.reflectance).total_cmp(&luminance(a.reflectance)));
     all.truncate(MOST_IMAGES);

@@ -244,7 +244,7 @@ mod tests {
         let mirrors = rays.mirrors().expect("two");
         // One in each, and one in both in either order; a third reflection cannot come.
         let lengths = mirrors.images().iter().map(|image| image.legs.len());
-        assert!(lengths.clone().eq([1, 1, 2, 2, 3, 3, 4, 4]) || lengths.count() >= 4);
+        assert!(lengths.eq([1, 1, 2, 2]));
         let frame = &scene.frame;
         let point = frame.from_world(glam::DVec3::new(0.25, 0.5, 0.75));
         for image in mirrors.images() {
