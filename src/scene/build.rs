@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::builder::Skipped;
+use super::builder::{ObjectName, Skipped};
 use super::crossings::cut_crossings;
 use super::means::{Pictures, TextureAverages};
 use super::ranges::{finite_non_negative, limited_reflectance};
@@ -236,23 +236,23 @@ fn corner_values<T: Copy + Default>(
 }
 
 /// Runs of triangles from the first faces of objects; together they cover all triangles, and none is empty.
-fn object_ranges(starts: &[(String, usize)], triangle_count: usize) -> Vec<Object> {
+fn object_ranges(starts: &[(ObjectName, usize)], triangle_count: usize) -> Vec<Object> {
     let mut objects: Vec<Object> = Vec::new();
-    let mut push = |name: &str, start: usize, end: usize| {
+    let mut push = |name: &ObjectName, start: usize, end: usize| {
         if start >= end {
             return;
         }
         match objects.last_mut() {
-            Some(last) if last.name == name => last.end = TriangleId(end as u32),
+            Some(last) if last.name == *name => last.end = TriangleId(end as u32),
             _ => objects.push(Object {
-                name: name.to_owned(),
+                name: name.clone(),
                 start: TriangleId(start as u32),
                 end: TriangleId(end as u32),
             }),
         }
     };
     let first = starts.first().map_or(triangle_count, |(_, start)| *start);
-    push("", 0, first.min(triangle_count));
+    push(&ObjectName::default(), 0, first.min(triangle_count));
     for (index, (name, start)) in starts.iter().enumerate() {
         let end = starts
             .get(index + 1)
@@ -298,18 +298,21 @@ mod tests {
             ("c", [1, 1, 2]),
             ("d", [0, 2, 1]),
         ] {
-            builder.objects.push((name.to_owned(), builder.faces.len()));
+            builder.objects.push((name.into(), builder.faces.len()));
             builder.push_triangle(corners, MaterialId(0));
         }
         let scene = builder.finish(&SceneOptions::default()).unwrap();
-        let objects = scene.objects.iter().map(|o| (&*o.name, o.start.0, o.end.0));
+        let objects = scene
+            .objects
+            .iter()
+            .map(|o| (o.name.label(), o.start.0, o.end.0));
         assert_eq!(objects.collect::<Vec<_>>(), [("b", 0, 1), ("d", 1, 2)]);
         assert_eq!(scene.warnings[0].count, 2);
     }
 
     #[test]
     fn faces_before_the_first_object_have_a_nameless_one() {
-        let objects = object_ranges(&[("a".to_owned(), 2)], 3);
+        let objects = object_ranges(&[("a".into(), 2)], 3);
         assert_eq!(objects.len(), 2);
         assert_eq!(
             (objects[0].end, objects[1].end),

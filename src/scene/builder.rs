@@ -1,6 +1,6 @@
 //! Raw faces in world coordinates, on their way to a [`super::Scene`].
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -36,6 +36,34 @@ impl Face {
     }
 }
 
+/// What a run of faces is called in its file; empty where it has no name.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ObjectName {
+    /// The object (`o` in OBJ).
+    pub object: Arc<str>,
+    /// The group within the object (`g` in OBJ).
+    pub group: Arc<str>,
+}
+
+impl ObjectName {
+    /// The narrower of both names.
+    pub fn label(&self) -> &str {
+        match &*self.group {
+            "" => &self.object,
+            group => group,
+        }
+    }
+}
+
+impl From<&str> for ObjectName {
+    fn from(object: &str) -> Self {
+        Self {
+            object: object.into(),
+            group: Arc::default(),
+        }
+    }
+}
+
 /// Where the faces come from, for messages.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
@@ -64,8 +92,8 @@ pub struct SceneBuilder {
     pub textures: Vec<Texture>,
     /// Pictures of what is cut out that the materials name.
     pub cutouts: Vec<Cutout>,
-    /// Object names with the index of their first face, ascending.
-    pub objects: Vec<(String, usize)>,
+    /// Names of objects with the index of their first face, ascending.
+    pub objects: Vec<(ObjectName, usize)>,
     /// Warnings of the reader.
     pub warnings: Vec<Warning>,
     /// Textures that were not even read.

@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use std::io::BufRead;
 use std::sync::Arc;
 
+use super::builder::ObjectName;
 use super::lines::{LogicalLines, Notation, Number, decode, label, split_keyword, words};
 use super::up_axis::UpAxis;
 use super::upright::told_by;
@@ -18,8 +19,8 @@ use super::warning::{WarningKind, WarningLog};
 /// Faces that share an object name and a material.
 #[derive(Clone, Debug)]
 pub(super) struct Segment {
-    /// Name of the last `o` or `g`.
-    pub(super) object: Arc<str>,
+    /// Names of the last `o` and the last `g` after it.
+    pub(super) name: ObjectName,
     /// Index into [`Notes::materials`].
     pub(super) material: Option<usize>,
 }
@@ -98,8 +99,7 @@ pub(super) struct ObjCleaner<R> {
     normal_count: i64,
     /// Numbers of positions that are no points, ascending from 1.
     bad_positions: Vec<i64>,
-    object: Arc<str>,
-    group: Arc<str>,
+    name: ObjectName,
     material: Option<usize>,
     material_index: HashMap<String, usize>,
     segment_is_new: bool,
@@ -124,8 +124,7 @@ impl<R: BufRead> ObjCleaner<R> {
             texcoord_count: 0,
             normal_count: 0,
             bad_positions: Vec::new(),
-            object: Arc::from(""),
-            group: Arc::from(""),
+            name: ObjectName::default(),
             material: None,
             material_index: HashMap::new(),
             segment_is_new: true,
@@ -171,12 +170,11 @@ impl<R: BufRead> ObjCleaner<R> {
             b"vn" => self.normal_statement(rest, line),
             b"f" | b"fo" => self.face_statement(rest, line),
             b"o" => {
-                self.object = Arc::from(label(&decode(rest)));
-                self.group = Arc::from("");
+                self.name = ObjectName::from(&*label(&decode(rest)));
                 self.segment_is_new = true;
             }
             b"g" => {
-                self.group = Arc::from(label(&decode(rest)));
+                self.name.group = Arc::from(label(&decode(rest)));
                 self.segment_is_new = true;
             }
             b"usemtl" => self.material_statement(rest, line),
@@ -440,16 +438,11 @@ impl<R: BufRead> ObjCleaner<R> {
 
     /// Start a segment with the names in force.
     fn write_segment(&mut self) {
-        let object = if self.group.is_empty() {
-            &self.object
-        } else {
-            &self.group
-        };
         self.clean.extend_from_slice(b"o ");
         push_integer(&mut self.clean, self.notes.segments.len() as i64);
         self.clean.push(b'\n');
         self.notes.segments.push(Segment {
-            object: Arc::clone(object),
+            name: self.name.clone(),
             material: self.material,
         });
     }

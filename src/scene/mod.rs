@@ -65,7 +65,7 @@ mod write;
 
 pub use appearance::Appearance;
 pub use bsdf::{Gloss, LobeValue, Specular, reflected, reflected_by_pane, refracted};
-pub use builder::{BuildError, Face, SceneBuilder, Source};
+pub use builder::{BuildError, Face, ObjectName, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use cutout::{Cutout, SeeThrough};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
@@ -89,7 +89,8 @@ pub use up_axis::UpAxis;
 pub use upright::UpEvidence;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, try_writing, write_whole};
-pub use write::{write_builtin, write_obj};
+pub use write::{MaterialLibrary, write_builtin, write_obj};
+pub(crate) use write::{coordinates, write_name};
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -213,8 +214,8 @@ pub struct Surface {
 /// A named run of triangles (`o` or `g` in OBJ).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
-    /// Name in the file, empty if it has none.
-    pub name: String,
+    /// Its name in the file.
+    pub name: ObjectName,
     /// First triangle.
     pub start: TriangleId,
     /// One past the last triangle.

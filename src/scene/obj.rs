@@ -745,11 +745,8 @@ impl Import<'_> {
                 continue;
             };
             let objects = &mut self.builder.objects;
-            if objects
-                .last()
-                .is_none_or(|(name, _)| **name != *segment.object)
-            {
-                objects.push((segment.object.to_string(), self.builder.faces.len()));
+            if objects.last().is_none_or(|(name, _)| *name != segment.name) {
+                objects.push((segment.name.clone(), self.builder.faces.len()));
             }
             let slot = match segment.material {
                 Some(material) => self.slots[material],

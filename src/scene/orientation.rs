@@ -316,7 +316,9 @@ mod tests {
             ceiling: MaterialId,
         ) -> Self {
             let name = format!("cube {}", self.0.objects.len());
-            self.0.objects.push((name, self.0.faces.len()));
+            self.0
+                .objects
+                .push((name.as_str().into(), self.0.faces.len()));
             let corners: Vec<u32> = (0..8)
                 .map(|corner| {
                     let of_axis = |axis: usize| f64::from(corner >> axis & 1) - 0.5;
@@ -354,7 +356,7 @@ mod tests {
         fn sheet(mut self, at: [f64; 3], side: f64, material: MaterialId) -> Self {
             self.0
                 .objects
-                .push(("sheet".to_owned(), self.0.faces.len()));
+                .push(("sheet".into(), self.0.faces.len()));
             let [a, b, c, d] =
                 [(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)].map(|(x, y)| {
                     let offset = DVec3::new(x, y, 0.0);
@@ -402,7 +404,7 @@ mod tests {
     fn cubes(scene: &Scene) -> impl Iterator<Item = std::ops::Range<usize>> {
         let cubes = scene.objects.iter();
         cubes
-            .filter(|object| object.name.starts_with("cube"))
+            .filter(|object| object.name.label().starts_with("cube"))
             .map(|object| object.start.index()..object.end.index())
     }
 

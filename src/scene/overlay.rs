@@ -466,7 +466,7 @@ mod tests {
             .rectangle([0.0, 5.0], [4.0, 6.0], 1, true);
         let builder = &mut sheets.0;
         for (name, start) in [("carpet", 0), ("floor", 2), ("other", 4)] {
-            builder.objects.push((name.to_owned(), start));
+            builder.objects.push((name.into(), start));
         }
         builder.textures.push(crate::scene::Texture {
             name: String::new(),
@@ -482,7 +482,10 @@ mod tests {
         }
         let scene = sheets.scene(Sides::Auto);
         let floor = &scene.objects[1];
-        assert_eq!((&*floor.name, &*scene.objects[2].name), ("floor", "other"));
+        assert_eq!(
+            (floor.name.label(), scene.objects[2].name.label()),
+            ("floor", "other")
+        );
         assert_eq!(
             scene.objects[2].end.index() - scene.objects[2].start.index(),
             2

@@ -4,7 +4,7 @@
 //! renamed, the OBJ last, so that no half of a scene is ever found under its name. What OBJ cannot say (that a closed
 //! shell is two-sided) is omitted.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, Cursor};
@@ -14,8 +14,8 @@ use glam::{DVec3, Vec3};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb32FImage, RgbImage};
 
 use super::{
-    Cutout, Frame, Material, Scene, SceneOptions, Specular, Texture, TextureId, builtin,
-    mtl_specular::MIRROR_EXPONENT, srgb_byte, whole::write_whole,
+    Cutout, Frame, Material, ObjectName, Scene, SceneOptions, Specular, Texture, TextureId,
+    builtin, mtl_specular::MIRROR_EXPONENT, srgb_byte, whole::write_whole,
 };
 
 /// Write `scene` to `path`, its materials beside it under the same stem, and its textures beside both.
@@ -23,35 +23,82 @@ use super::{
 /// # Errors
 /// When the folder cannot be written to or `path` names no file.
 pub fn write_obj(scene: &Scene, path: &Path) -> io::Result<()> {
-    let no_name = || io::Error::new(io::ErrorKind::InvalidInput, "the path names no file");
-    let stem = path.file_stem().ok_or_else(no_name)?.to_string_lossy();
-    let stem = token(&stem);
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let textures: Vec<String> = scene
-        .textures
-        .iter()
-        .map(|texture| texture_file_name(&stem, texture))
-        .collect();
-    for (texture, file) in scene.textures.iter().zip(&textures) {
-        let encoded = encoded_texture(texture)?;
-        write_whole(&folder.join(file), |out| out.write_all(&encoded))?;
+    let library = MaterialLibrary::beside(path, scene)?;
+    library.write(scene)?;
+    write_whole(path, |out| write_geometry(scene, &library, out))
+}
+
+/// The MTL file of a scene and its textures, beside an OBJ file.
+pub struct MaterialLibrary {
+    folder: PathBuf,
+    /// Name of the MTL file.
+    name: String,
+    /// By material.
+    materials: Vec<String>,
+    /// Files by texture, and by cut-out.
+    textures: Vec<String>,
+    cutouts: Vec<String>,
+}
+
+impl MaterialLibrary {
+    /// Names of the files for an OBJ file of this path.
+    ///
+    /// # Errors
+    /// Where it names no file.
+    pub fn beside(path: &Path, scene: &Scene) -> io::Result<Self> {
+        let no_name = || io::Error::new(io::ErrorKind::InvalidInput, "the path names no file");
+        let stem = path.file_stem().ok_or_else(no_name)?.to_string_lossy();
+        let stem = token(&stem);
+        let cutouts = 0..scene.cutouts.len();
+        Ok(Self {
+            folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+            materials: material_names(&scene.materials),
+            textures: texture_files(&stem, scene),
+            cutouts: cutouts
+                .map(|index| format!("{stem}-cutout-{index}.png"))
+                .collect(),
+            name: format!("{stem}.mtl"),
+        })
     }
-    let cutouts: Vec<String> = (0..scene.cutouts.len())
-        .map(|index| format!("{stem}-cutout-{index}.png"))
-        .collect();
-    for (cutout, file) in scene.cutouts.iter().zip(&cutouts) {
-        let encoded = encoded_cutout(cutout)?;
-        write_whole(&folder.join(file), |out| out.write_all(&encoded))?;
+
+    /// All its files.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        let names = [&self.name].into_iter();
+        let names = names.chain(&self.textures).chain(&self.cutouts);
+        names.map(|name| self.folder.join(name)).collect()
     }
-    let names = material_names(&scene.materials);
-    let library = format!("{stem}.mtl");
-    write_whole(&folder.join(&library), |out| {
-        for (material, name) in scene.materials.iter().zip(&names) {
-            out.write_all(material_text(material, name, [&textures, &cutouts]).as_bytes())?;
+
+    /// Name of the MTL file.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Names by material: single words, all different.
+    pub(crate) fn material_names(&self) -> &[String] {
+        &self.materials
+    }
+
+    /// Write all files, each whole or not at all.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn write(&self, scene: &Scene) -> io::Result<()> {
+        let write = |name: &str, bytes: &[u8]| {
+            write_whole(&self.folder.join(name), |out| out.write_all(bytes))
+        };
+        for (texture, name) in scene.textures.iter().zip(&self.textures) {
+            write(name, &encoded_texture(texture)?)?;
         }
-        Ok(())
-    })?;
-    write_whole(path, |out| write_geometry(scene, &library, &names, out))
+        for (cutout, name) in scene.cutouts.iter().zip(&self.cutouts) {
+            write(name, &encoded_cutout(cutout)?)?;
+        }
+        let files = [self.textures.as_slice(), &self.cutouts];
+        let texts = scene.materials.iter().zip(&self.materials);
+        let texts: String = texts
+            .map(|(material, name)| material_text(material, name, files))
+            .collect();
+        write(&self.name, texts.as_bytes())
+    }
 }
 
 /// Write a built-in scene to `folder/NAME.obj`, making the folder if need be; returns the path of the OBJ file.
@@ -75,11 +122,10 @@ pub fn write_builtin(name: &str, folder: &Path) -> io::Result<PathBuf> {
 /// Vertices, texture coordinates, normals, objects and faces.
 fn write_geometry(
     scene: &Scene,
-    library: &str,
-    material_names: &[String],
+    library: &MaterialLibrary,
     out: &mut dyn io::Write,
 ) -> io::Result<()> {
-    writeln!(out, "mtllib {library}")?;
+    writeln!(out, "mtllib {}", library.name)?;
     for &position in &scene.positions {
         let [x, y, z] = coordinates(&scene.frame, position);
         writeln!(out, "v {x} {y} {z}")?;
@@ -93,17 +139,23 @@ fn write_geometry(
         writeln!(out, "vn {x} {y} {z}")?;
     }
     let mut objects = scene.objects.iter().peekable();
+    let mut named = None;
     let mut material = None;
     for id in scene.triangle_ids() {
         if let Some(object) = objects.next_if(|object| object.start <= id)
-            && !object.name.is_empty()
+            && named != Some(&object.name)
         {
-            writeln!(out, "o {}", object.name)?;
+            write_name(out, &object.name, named)?;
+            named = Some(&object.name);
         }
         let triangle = &scene.triangles[id.index()];
         if material != Some(triangle.material) {
             material = Some(triangle.material);
-            writeln!(out, "usemtl {}", material_names[triangle.material.index()])?;
+            writeln!(
+                out,
+                "usemtl {}",
+                library.materials[triangle.material.index()]
+            )?;
         }
         let mut line = String::from("f");
         for (k, corner) in triangle.corners.into_iter().enumerate() {
@@ -120,6 +172,24 @@ fn write_geometry(
         writeln!(out, "{line}")?;
     }
     Ok(())
+}
+
+/// The statements that give the next faces a name, after others had the name `before`.
+pub(crate) fn write_name(
+    out: &mut dyn io::Write,
+    name: &ObjectName,
+    before: Option<&ObjectName>,
+) -> io::Result<()> {
+    let before = before.cloned().unwrap_or_default();
+    let is_new_object = name.object != before.object;
+    if is_new_object || name.group.is_empty() && !before.group.is_empty() {
+        writeln!(out, "o {}", name.object)?;
+    }
+    match &*name.group {
+        "" => Ok(()),
+        group if is_new_object || name.group != before.group => writeln!(out, "g {group}"),
+        _ => Ok(()),
+    }
 }
 
 /// Equal corner values under one number, counted from 1 as OBJ does.
@@ -154,7 +224,7 @@ impl<const N: usize> Numbering<N> {
 }
 
 /// World coordinates in the fewest decimals that lead back to the same frame position.
-fn coordinates(frame: &Frame, position: Vec3) -> [String; 3] {
+pub(crate) fn coordinates(frame: &Frame, position: Vec3) -> [String; 3] {
     /// An f64 has no more digits to give.
     const MOST_DECIMALS: usize = 17;
     let world = frame.to_world(position);
@@ -230,18 +300,25 @@ fn specular_text(specular: Option<Specular>) -> String {
 
 /// One word for each material, all different: readers cut names at blanks.
 fn material_names(materials: &[Material]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for material in materials {
-        let base = token(&material.name);
-        let mut name = base.clone();
-        let mut number = 2;
-        while names.contains(&name) {
-            name = format!("{base}_{number}");
-            number += 1;
-        }
-        names.push(name);
-    }
+    unlike(materials.iter().map(|material| token(&material.name)))
+}
+
+/// The same names, with a number where one came before.
+fn unlike(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut taken: HashSet<String> = HashSet::new();
+    let mut next: HashMap<String, usize> = HashMap::new();
     names
+        .map(|base| {
+            let mut name = base.clone();
+            // File names that differ in case only are one file on some systems.
+            while !taken.insert(name.to_lowercase()) {
+                let number = next.entry(base.clone()).or_insert(1);
+                *number += 1;
+                name = format!("{base}_{number}");
+            }
+            name
+        })
+        .collect()
 }
 
 /// A name without blanks and separators, and never empty.
@@ -255,17 +332,21 @@ fn token(name: &str) -> String {
     }
 }
 
-/// The file a texture goes to: a PNG, or OpenEXR where it is brighter than a PNG can hold.
-fn texture_file_name(stem: &str, texture: &Texture) -> String {
-    let name = Path::new(&texture.name);
-    let name = name.file_stem().unwrap_or_default().to_string_lossy();
-    let name = token(&name);
-    let extension = if is_bright(texture) { "exr" } else { "png" };
-    if name.starts_with(stem) {
-        format!("{name}.{extension}")
-    } else {
-        format!("{stem}-{name}.{extension}")
-    }
+/// The files that textures go to: PNG, or OpenEXR where one is brighter than a PNG can hold.
+fn texture_files(stem: &str, scene: &Scene) -> Vec<String> {
+    let stems = unlike(scene.textures.iter().map(|texture| {
+        let name = Path::new(&texture.name);
+        let name = token(&name.file_stem().unwrap_or_default().to_string_lossy());
+        match name.starts_with(stem) {
+            true => name,
+            false => format!("{stem}-{name}"),
+        }
+    }));
+    let extension = |texture| if is_bright(texture) { "exr" } else { "png" };
+    let named = stems.iter().zip(&scene.textures);
+    named
+        .map(|(stem, texture)| format!("{stem}.{}", extension(texture)))
+        .collect()
 }
 
 fn is_bright(texture: &Texture) -> bool {

@@ -143,7 +143,7 @@ impl Mesh {
 
     /// Put the mesh into a scene as an object of its own.
     pub(super) fn add_to(self, builder: &mut SceneBuilder, name: &str) {
-        builder.objects.push((name.to_owned(), builder.faces.len()));
+        builder.objects.push((name.into(), builder.faces.len()));
         let base = builder.positions.len() as u32;
         builder.positions.extend(self.positions);
         builder

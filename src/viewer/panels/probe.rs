@@ -218,10 +218,10 @@ fn object_ui(ui: &mut egui::Ui, state: &State) {
     let light = selection.object_light;
     let scale = state.view.emission_scale * state.radiance_unit();
     let area = loaded.scene.frame.area_to_world(f64::from(light.area));
-    let name = if object.name.is_empty() {
+    let name = if object.name.label().is_empty() {
         "whole scene"
     } else {
-        &object.name
+        object.name.label()
     };
     ui.add_space(4.0);
     row::figures(ui, "object", |ui| {
