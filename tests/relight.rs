@@ -10,8 +10,11 @@ use common::{prepare, solve, step_to_end};
 use glam::{DVec3, Vec3};
 use vecrad::{
     geometry::area_vector,
-    scene::{Appearance, Material, Scene, SceneBuilder, SceneOptions, Sides, builtin},
-    solver::{Cancel, Direct, Snapshot, SolveSettings, Solver},
+    scene::{
+        Appearance, Environment, Material, Scene, SceneBuilder, SceneOptions, Sides, Sky, Sun,
+        builtin,
+    },
+    solver::{Cancel, Direct, Lamp, LampLight, Snapshot, SolveSettings, Solver, VertexLight},
 };
 
 /// Settings under which the iteration leaves next to nothing, in two steps.
@@ -33,6 +36,11 @@ fn cornell() -> Arc<Scene> {
 
 /// A room of six walls with a warm lamp and a cold one under its ceiling, between which a board hangs.
 fn two_lamps() -> Arc<Scene> {
+    Arc::new(two_lamps_under(true))
+}
+
+/// That room, or all of it but the ceiling.
+fn two_lamps_under(has_ceiling: bool) -> Scene {
     let mut builder = SceneBuilder::default();
     let mut paint = |name: &str, reflectance: [f32; 3], emission: [f32; 3]| {
         let [reflectance, emission] = [reflectance, emission].map(Vec3::from_array);
@@ -50,7 +58,9 @@ fn two_lamps() -> Arc<Scene> {
     let (x, y, z) = ([0.0, 4.0], [0.0, 2.5], [0.0, 3.0]);
     let at = |i: usize, j: usize, k: usize| [x[i], y[j], z[k]];
     quad([at(0, 0, 0), at(0, 0, 1), at(1, 0, 1), at(1, 0, 0)], white);
-    quad([at(0, 1, 0), at(1, 1, 0), at(1, 1, 1), at(0, 1, 1)], white);
+    if has_ceiling {
+        quad([at(0, 1, 0), at(1, 1, 0), at(1, 1, 1), at(0, 1, 1)], white);
+    }
     quad([at(0, 0, 0), at(1, 0, 0), at(1, 1, 0), at(0, 1, 0)], white);
     quad([at(0, 0, 1), at(0, 1, 1), at(1, 1, 1), at(1, 0, 1)], white);
     quad([at(0, 0, 0), at(0, 1, 0), at(0, 1, 1), at(0, 0, 1)], red);
@@ -85,7 +95,7 @@ fn two_lamps() -> Arc<Scene> {
         ],
         red,
     );
-    Arc::new(builder.finish(&one_sided()).unwrap())
+    builder.finish(&one_sided()).unwrap()
 }
 
 fn solved(scene: &Arc<Scene>, settings: SolveSettings) -> Solver {
@@ -399,4 +409,135 @@ fn the_preview_is_nearly_the_refined_light() {
         let error = difference(&rough.light.irradiance, &fine.light.irradiance);
         assert!(error < 0.3, "{error}");
     }
+}
+
+/// The light of each lamp, in the order in which lamps come; the solve is as it was.
+fn by_lamp(solver: &mut Solver) -> Vec<LampLight> {
+    let before = solver.snapshot();
+    let parts = solver.light_by_lamp(&Cancel::default()).unwrap();
+    let after = solver.snapshot();
+    assert_eq!(before.light.irradiance, after.light.irradiance);
+    assert_eq!(before.mesh, after.mesh);
+    let vertices = before.mesh.positions.len();
+    for part in &parts {
+        assert!(part.irradiance.iter().all(|light| light.is_finite()));
+        assert!(
+            part.irradiance
+                .iter()
+                .all(|light| light.min_element() >= 0.0)
+        );
+        assert_eq!([part.irradiance.len(), part.emission.len()], [vertices; 2]);
+    }
+    for vertex in 0..vertices {
+        let sum: Vec3 = parts.iter().map(|part| part.irradiance[vertex]).sum();
+        let whole = before.light.irradiance[vertex];
+        let error = (sum - whole).abs().max_element();
+        assert!(error <= 1e-4 * whole.max_element(), "{sum} for {whole}");
+        let sum: Vec3 = parts.iter().map(|part| part.emission[vertex]).sum();
+        let whole = before.mesh.emission[vertex];
+        assert!((sum - whole).abs().max_element() <= 1e-5 * whole.max_element());
+    }
+    parts
+}
+
+/// Mean irradiance of one lamp over the display mesh, by area.
+fn mean_of(part: &LampLight, snapshot: &Snapshot) -> DVec3 {
+    let alone = VertexLight {
+        irradiance: part.irradiance.clone(),
+        ..VertexLight::default()
+    };
+    mean_irradiance(&Snapshot {
+        light: Arc::new(alone),
+        ..snapshot.clone()
+    })
+}
+
+#[test]
+fn each_lamp_has_the_light_of_a_solve_under_it_alone() {
+    let scene = two_lamps();
+    for direct in [Direct::Sampled, Direct::Linked] {
+        let settings = SolveSettings {
+            direct,
+            ..settings()
+        };
+        let mut solver = solved(&scene, settings.clone());
+        let parts = by_lamp(&mut solver);
+        assert_eq!(parts.len(), 2);
+        for (part, name) in parts.iter().zip(["warm", "cold"]) {
+            let Lamp::Material(material) = part.lamp else {
+                panic!("{:?}", part.lamp);
+            };
+            assert_eq!(scene.materials[material].name, name);
+            let only = with_emission(&scene, |other| {
+                Vec3::splat(f32::from(u8::from(other == name)))
+            });
+            let alone = solved(&Arc::new(scene.relit(&only)), settings.clone());
+            let expected = mean_irradiance(&alone.snapshot());
+            let found = mean_of(part, &solver.snapshot());
+            let error = (found / expected - 1.0).abs().max_element();
+            assert!(error < 0.03, "{direct:?}, {name}: {found} for {expected}");
+        }
+        // A step after it is one as ever.
+        solver.step(&Cancel::default()).unwrap();
+    }
+}
+
+#[test]
+fn sky_and_sun_are_lamps_beside_those_of_the_scene() {
+    let [sky, sun] = [Vec3::new(0.2, 0.3, 0.5), Vec3::new(9.0, 8.0, 7.0)];
+    let under = |sky: Vec3, sun: Option<Vec3>| {
+        let sun = sun.map(|irradiance| Sun {
+            direction: Vec3::new(0.3, 1.0, 0.2).normalize(),
+            irradiance,
+            diameter: 0.01,
+        });
+        Environment {
+            sky: Sky::Uniform(sky),
+            sun,
+            ..Environment::default()
+        }
+    };
+    let open = two_lamps_under(false);
+    let dark = open.relit(&with_emission(&open, |_| Vec3::ZERO));
+    let scene = Arc::new(open.in_environment(under(sky, Some(sun))));
+    let mut solver = solved(&scene, settings());
+    let parts = by_lamp(&mut solver);
+    let lamps: Vec<Lamp> = parts.iter().map(|part| part.lamp).collect();
+    assert!(matches!(
+        lamps[..],
+        [Lamp::Material(_), Lamp::Material(_), Lamp::Sky, Lamp::Sun]
+    ));
+    for (part, environment) in [
+        (&parts[2], under(sky, None)),
+        (&parts[3], under(Vec3::ZERO, Some(sun))),
+    ] {
+        let alone = solved(
+            &Arc::new(dark.clone().in_environment(environment)),
+            settings(),
+        );
+        let expected = mean_irradiance(&alone.snapshot());
+        let found = mean_of(part, &solver.snapshot());
+        let error = (found / expected - 1.0).abs().max_element();
+        assert!(error < 0.03, "{:?}: {found} for {expected}", part.lamp);
+        assert!(part.emission.iter().all(|emission| *emission == Vec3::ZERO));
+    }
+}
+
+#[test]
+fn a_single_lamp_has_all_light_and_cancelling_leaves_the_solve() {
+    let scene = cornell();
+    let mut solver = solved(&scene, settings());
+    let parts = by_lamp(&mut solver);
+    assert_eq!(parts[0].irradiance, solver.snapshot().light.irradiance);
+    let scene = two_lamps();
+    let mut solver = solved(&scene, settings());
+    let before = solver.snapshot();
+    let cancel = Cancel::default();
+    cancel.cancel();
+    assert!(solver.light_by_lamp(&cancel).is_none());
+    assert_eq!(before.light.irradiance, solver.snapshot().light.irradiance);
+    let [warm, cold] = &by_lamp(&mut solver)[..] else {
+        panic!("two lamps");
+    };
+    assert!(difference(&warm.irradiance, &cold.irradiance) > 0.3);
 }

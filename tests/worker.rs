@@ -15,7 +15,7 @@ use glam::{DVec3, Vec3};
 use vecrad::{
     hierarchy::NodeId,
     scene::{Appearance, Material, Scene, SceneBuilder, SceneOptions},
-    solver::{Cancel, Inspection, Relit, Snapshot, SolveSettings, StepReport, Subject},
+    solver::{Cancel, Inspection, LampLight, Relit, Snapshot, SolveSettings, StepReport, Subject},
     worker::{Effect, Event, Generation, Job, RunOptions, Stepper, StopReason, WorkerHandle},
 };
 
@@ -146,6 +146,10 @@ impl Stepper for FakeSolver {
             step: self.step,
             ..StepReport::default()
         })
+    }
+
+    fn light_by_lamp(&mut self, cancel: &Cancel) -> Option<Vec<LampLight>> {
+        (!cancel.is_cancelled()).then(Vec::new)
     }
 }
 

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::{
     scene::{Appearance, Scene},
-    solver::{Cancel, Inspection, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject},
+    solver::{
+        Cancel, Inspection, LampLight, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject,
+    },
     worker::{Job, MakeStepper, Stepper},
 };
 
@@ -58,5 +60,9 @@ impl Stepper for ObservedSolver {
 
     fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
         self.solver.finish_relighting(cancel)
+    }
+
+    fn light_by_lamp(&mut self, cancel: &Cancel) -> Option<Vec<LampLight>> {
+        self.solver.light_by_lamp(cancel)
     }
 }

@@ -6,6 +6,7 @@
 
 mod accuracy;
 mod budget;
+mod by_lamp;
 mod cancel;
 mod coverage;
 mod direct;
@@ -32,8 +33,9 @@ pub use cancel::Cancel;
 pub use omission::{Keep, Omission};
 pub use output::{
     ClusterBox, DirectLights, DisplayMesh, ErrorPoint, EstimatedError, InspectedLink, Inspection,
-    LIGHT_KINDS, LightSampler, LitPoint, Note, Obstacle, Omitted, PathNode, Phase, PhaseObserver,
-    PhaseTimes, Place, Relit, SampledLight, Shadow, Snapshot, StepReport, Subject, VertexLight,
+    LIGHT_KINDS, Lamp, LampLight, LightSampler, LitPoint, Note, Obstacle, Omitted, PathNode, Phase,
+    PhaseObserver, PhaseTimes, Place, Relit, SampledLight, Shadow, Snapshot, StepReport, Subject,
+    VertexLight,
 };
 pub use settings::{Direct, Method, Oracle, Push, SolveSettings};
 pub use state::Solver;

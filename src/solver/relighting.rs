@@ -166,6 +166,12 @@ impl Relighting {
         self.is_solved = true;
     }
 
+    /// Forget all light: none that comes is to be derived from it.
+    pub(super) fn forget_light(&mut self) {
+        self.solved = None;
+        self.is_solved = false;
+    }
+
     /// Whether all leaves have gathered the present light.
     pub(super) fn is_solved(&self) -> bool {
         self.is_solved

@@ -284,7 +284,7 @@ impl Solver {
         Limits::new(&self.settings, &self.hierarchy, threshold_scale, most)
     }
 
-    fn pull(&mut self) {
+    pub(super) fn pull(&mut self) {
         let surfaces = Surfaces::new(&self.hierarchy, &self.direct);
         self.linked.pull(surfaces);
     }

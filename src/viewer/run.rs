@@ -109,7 +109,7 @@ impl Run {
                 }
             }
             // Inspections are kept apart: they are of what is selected, not of the run.
-            Event::Inspected(_) | Event::Interrupted { .. } => {}
+            Event::Inspected(_) | Event::ByLamp(_) | Event::Interrupted { .. } => {}
             Event::Paused => self.status = RunStatus::Paused,
             Event::Continued => self.status = RunStatus::Running,
             Event::Finished(reason) => self.status = RunStatus::Finished(reason),

@@ -331,6 +331,10 @@ impl Controller {
                 self.outbox.send(generation, event);
             }
             Outcome::RelitFinely(None, _) => run.is_rough = true,
+            Outcome::ByLamp(lamps) => {
+                let lamps = lamps.map(Arc::from);
+                self.outbox.send(generation, Event::ByLamp(lamps));
+            }
             Outcome::Inspected(inspections) => {
                 for inspection in inspections {
                     let event = Event::Inspected(Arc::new(inspection));
@@ -391,6 +395,11 @@ impl Controller {
                 // Nodes of an older run are other nodes in this one.
                 if let Some(run) = self.run.as_mut().filter(|run| run.generation == generation) {
                     run.ask(subjects);
+                }
+            }
+            Command::LightByLamp(generation) => {
+                if let Some(run) = self.run.as_mut().filter(|run| run.generation == generation) {
+                    run.is_asked_by_lamp = true;
                 }
             }
             Command::Shutdown => {}

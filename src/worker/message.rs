@@ -8,7 +8,7 @@ use super::{Effect, Generation, request::Returned};
 use crate::{
     geometry::RayTree,
     scene::{Appearance, Scene},
-    solver::{Inspection, SolveSettings, StepReport, Subject},
+    solver::{Inspection, LampLight, SolveSettings, StepReport, Subject},
 };
 
 /// How to run, apart from what to compute: nothing here changes a finished result.
@@ -82,6 +82,8 @@ pub enum Event {
     },
     /// An answer to [`super::WorkerHandle::inspect`].
     Inspected(Arc<Inspection>),
+    /// An answer to [`super::WorkerHandle::light_by_lamp`]; `None` when it was cancelled.
+    ByLamp(Option<Arc<[LampLight]>>),
     /// The run rests until it is continued.
     Paused,
     /// The run goes on from where it stood.
@@ -148,6 +150,8 @@ pub(super) enum Command {
         /// The nodes, now and after each step, instead of those of the last such command.
         subjects: Vec<Subject>,
     },
+    /// Find the light of each lamp of a run.
+    LightByLamp(Generation),
     /// End the thread.
     Shutdown,
 }

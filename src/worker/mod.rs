@@ -215,6 +215,12 @@ impl WorkerHandle {
         });
     }
 
+    /// Find the light of each lamp, see [`Solver::light_by_lamp`](crate::solver::Solver::light_by_lamp); answered by
+    /// [`Event::ByLamp`]. A step comes first where the run goes on.
+    pub fn light_by_lamp(&self) {
+        self.send(Command::LightByLamp(self.generation));
+    }
+
     /// Hand every snapshot from here on to `watch`, too; the slot keeps only the newest.
     pub fn watch(&self, watch: Option<Watch>) {
         *self.watch.lock().unwrap_or_else(PoisonError::into_inner) = watch;

@@ -10,7 +10,7 @@ use std::{
 use super::{Generation, Job, MakeStepper, Stepper};
 use crate::{
     scene::Appearance,
-    solver::{Cancel, Inspection, Relit, Snapshot, StepReport, Subject},
+    solver::{Cancel, Inspection, LampLight, Relit, Snapshot, StepReport, Subject},
 };
 
 /// A task for the pool, with the solve that it is about.
@@ -33,6 +33,8 @@ pub(super) enum Task {
     Relight(Box<dyn Stepper>, Arc<[Appearance]>, Cancel),
     /// Compute the light that a relighting omitted, unless cancelled.
     FinishRelighting(Box<dyn Stepper>, Cancel),
+    /// Find the light of each lamp, unless cancelled.
+    LightByLamp(Box<dyn Stepper>, Cancel),
     /// Inspect nodes.
     Inspect(Box<dyn Stepper>, Vec<Subject>),
 }
@@ -67,6 +69,8 @@ pub(super) enum Outcome {
     Relit(Option<Relit>, Snapshot),
     /// The light that a relighting omitted is there, or the task was cancelled.
     RelitFinely(Option<StepReport>, Snapshot),
+    /// The light of each lamp is there, or the task was cancelled.
+    ByLamp(Option<Vec<LampLight>>),
     /// Nodes were inspected.
     Inspected(Vec<Inspection>),
 }
@@ -132,6 +136,11 @@ impl Task {
                     spent,
                 }
             }
+            Self::LightByLamp(mut stepper, cancel) => Completed {
+                outcome: Outcome::ByLamp(stepper.light_by_lamp(&cancel)),
+                stepper,
+                spent: begin.elapsed(),
+            },
             Self::Inspect(stepper, subjects) => {
                 let found = subjects
                     .iter()

@@ -59,6 +59,8 @@ pub(super) struct Run {
     subjects: Vec<Subject>,
     /// Whether an answer is due.
     is_asked: bool,
+    /// Whether the light of each lamp is asked for.
+    pub is_asked_by_lamp: bool,
     /// The state that it is to reach. Changed by [`Run::turn_to`].
     pub aim: Aim,
     /// Whether it was announced that the aim is reached.
@@ -91,6 +93,7 @@ impl Run {
             stepper: None,
             subjects: Vec::new(),
             is_asked: false,
+            is_asked_by_lamp: false,
             aim: Aim::Run,
             announced: false,
             since: Instant::now(),
@@ -104,7 +107,10 @@ impl Run {
     /// Whether there is a task for the solve, which is not in the pool.
     pub(super) fn has_task(&self) -> bool {
         self.aim == Aim::Run
-            || ((self.is_asked || self.appearances_changed || self.is_rough)
+            || ((self.is_asked
+                || self.is_asked_by_lamp
+                || self.appearances_changed
+                || self.is_rough)
                 && self.stepper.is_some())
     }
 
@@ -154,6 +160,9 @@ impl Run {
             }
             Some(stepper) if std::mem::take(&mut self.is_rough) && self.aim != Aim::Run => {
                 Task::FinishRelighting(stepper, cancel)
+            }
+            Some(stepper) if self.aim != Aim::Run && std::mem::take(&mut self.is_asked_by_lamp) => {
+                Task::LightByLamp(stepper, cancel)
             }
             Some(stepper) if self.is_last_in_time() => {
                 self.last_step = None;

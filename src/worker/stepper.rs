@@ -6,7 +6,8 @@ use crate::{
     geometry::RayTree,
     scene::{Appearance, Scene},
     solver::{
-        Cancel, Inspection, Phase, Relit, Snapshot, SolveSettings, Solver, StepReport, Subject,
+        Cancel, Inspection, LampLight, Phase, Relit, Snapshot, SolveSettings, Solver, StepReport,
+        Subject,
     },
 };
 
@@ -33,6 +34,9 @@ pub trait Stepper: Send {
 
     /// Refine the preview that a relighting made; `None` when cancelled on the way.
     fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport>;
+
+    /// The present light by lamp; `None` when cancelled on the way.
+    fn light_by_lamp(&mut self, cancel: &Cancel) -> Option<Vec<LampLight>>;
 }
 
 /// The input of a stepper.
@@ -102,5 +106,9 @@ impl Stepper for Solver {
 
     fn finish_relighting(&mut self, cancel: &Cancel) -> Option<StepReport> {
         Self::finish_relighting(self, cancel)
+    }
+
+    fn light_by_lamp(&mut self, cancel: &Cancel) -> Option<Vec<LampLight>> {
+        Self::light_by_lamp(self, cancel)
     }
 }

@@ -126,6 +126,7 @@ fn drain(
                 | Event::Interrupted { .. }
                 | Event::Relit { .. }
                 | Event::Inspected(_)
+                | Event::ByLamp(_)
                 | Event::Paused
                 | Event::Continued,
             ) => {}

@@ -7,7 +7,12 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec4;
 
-use super::{field::DirectField, lights::Lights, samples::DirectLight, scale::Surroundings};
+use super::{
+    field::DirectField,
+    lights::{LightKind, Lights},
+    samples::DirectLight,
+    scale::Surroundings,
+};
 use crate::{
     geometry::RayTree,
     hierarchy::{Channels as _, Hierarchy},
@@ -25,6 +30,8 @@ use crate::{
 #[derive(Default)]
 pub(crate) struct DirectFields {
     fields: Vec<DirectField>,
+    /// The kind that is lit, if others are turned off.
+    only: Option<LightKind>,
     /// To which errors are relative.
     surroundings: Surroundings,
     /// Stands for the offset places where nothing is sampled.
@@ -71,6 +78,7 @@ impl DirectFields {
         lights.extend(mirrored);
         Self {
             fields: lights.into_iter().map(DirectField::new).collect(),
+            only: None,
             surroundings: Surroundings::default(),
             no_offsets: OffsetPlaces::default(),
         }
@@ -79,6 +87,23 @@ impl DirectFields {
     /// Make errors relative to the light of these surroundings from now on.
     pub(crate) fn set_surroundings(&mut self, surroundings: Surroundings) {
         self.surroundings = surroundings;
+    }
+
+    /// Turn all light off that is not of this kind; for `None`, turn all on.
+    pub(crate) fn light_only(&mut self, kind: Option<LightKind>) {
+        self.only = kind;
+    }
+
+    /// Whether there is light of a kind.
+    pub(crate) fn has(&self, kind: LightKind) -> bool {
+        self.fields.iter().any(|field| field.lights.kind() == kind)
+    }
+
+    /// The fields that are turned on.
+    fn lit(&self) -> impl Iterator<Item = &DirectField> {
+        let is_lit =
+            |field: &&DirectField| self.only.is_none_or(|kind| field.lights.kind() == kind);
+        self.fields.iter().filter(is_lit)
     }
 
     /// Whether nothing is sampled.
@@ -110,16 +135,12 @@ impl DirectFields {
 
     /// The sum over the fields; exactly the value of a single one.
     fn sum(&self, of: impl Fn(&DirectField) -> Vec4) -> Vec4 {
-        self.fields
-            .iter()
-            .map(of)
-            .reduce(|a, b| a + b)
-            .unwrap_or_default()
+        self.lit().map(of).reduce(|a, b| a + b).unwrap_or_default()
     }
 
     /// Direct irradiance at each vertex for display, as [`DirectField::shown`]; `None` if nothing is sampled.
     pub(crate) fn shown(&self, hierarchy: &Hierarchy) -> Option<Vec<Vec4>> {
-        let all = self.fields.iter().map(|field| field.shown(hierarchy));
+        let all = self.lit().map(|field| field.shown(hierarchy));
         all.reduce(|mut sum, other| {
             for (sum, light) in sum.iter_mut().zip(other) {
                 *sum += light;
@@ -139,7 +160,7 @@ impl DirectFields {
     }
 
     fn outside(&self) -> impl Iterator<Item = &DirectField> {
-        self.fields.iter().filter(|field| field.lights.is_outside())
+        self.lit().filter(|field| field.lights.is_outside())
     }
 
     /// Power that arrives from outside, summed over the colours.
@@ -153,7 +174,7 @@ impl DirectFields {
     pub(crate) fn sky_shares(&self, hierarchy: &Hierarchy) -> Option<SkyShares> {
         let even =
             |field: &DirectField| Some((field.lights.even_radiosity()?, field.shares(hierarchy)?));
-        let (radiosity, [vertices, elements]) = self.outside().find_map(even)?;
+        let (radiosity, [vertices, elements]) = self.fields.iter().find_map(even)?;
         Some(SkyShares {
             radiosity,
             vertices,

@@ -33,6 +33,14 @@ use crate::{
 /// rounding changes the streams; smaller, and neighbouring points share them.
 const PLACES: f32 = 16_384.0;
 
+/// A kind of light that is sampled; as a number, its place among the kinds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LightKind {
+    Emitters,
+    Sky,
+    Sun,
+}
+
 /// What gives the light.
 #[derive(Clone, Debug)]
 pub(super) enum Source {
@@ -134,12 +142,12 @@ impl Lights {
         self.image.is_some()
     }
 
-    /// Index of its kind among the kinds of light.
-    pub(super) fn kind(&self) -> usize {
+    /// Its kind.
+    pub(super) fn kind(&self) -> LightKind {
         match self.source {
-            Source::Emitters(_) => 0,
-            Source::Sky(..) => 1,
-            Source::Sun(_) => 2,
+            Source::Emitters(_) => LightKind::Emitters,
+            Source::Sky(..) => LightKind::Sky,
+            Source::Sun(_) => LightKind::Sun,
         }
     }
 

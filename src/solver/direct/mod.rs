@@ -30,5 +30,6 @@ pub(crate) use border::SPREAD_SHARE;
 pub(crate) use field::DirectField;
 pub(crate) use fields::{DirectFields, PointLight};
 pub(crate) use light_parts::{LightParts, Shooting, common_ratio};
+pub(crate) use lights::LightKind;
 pub(crate) use scale::Surroundings;
 pub(crate) use surfaces::Surfaces;

@@ -106,7 +106,7 @@ impl LightSampler for Sampler<'_> {
             if part.exact == Vec4::ZERO {
                 continue;
             }
-            let shadow = &mut light.shadows[part.lights.kind()];
+            let shadow = &mut light.shadows[part.lights.kind() as usize];
             let mut light = DirectLight::expected(part.exact);
             let (shot, rays) = (&mut part.shot, samples.clone());
             part.lights
