@@ -267,7 +267,10 @@ fn a_misspelt_scene_gets_a_suggestion() {
 fn wrong_usage_ends_with_code_2_and_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, sentence) in [
-        (&["--export", "lit.obj"][..], "must end in .ply or .glb"),
+        (
+            &["--export", "lit.fbx"][..],
+            "must end in .ply, .glb or .obj",
+        ),
         (&["--export", "missing/lit.ply"], "there is no such folder"),
         (&["--epsilon", "-1"], "at least 0"),
         (&["--threads", "0"], "--threads"),

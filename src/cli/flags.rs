@@ -332,6 +332,7 @@ impl RunFlags {
             up,
             emission_scale: self.emission_scale.unwrap_or(1.0),
             radiance_unit,
+            merge: false,
         }
     }
 }

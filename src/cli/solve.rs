@@ -24,11 +24,11 @@ use super::{
     truth::{self, Errors, Truth},
 };
 use crate::{
-    export::MeshFormat,
+    export::{LitMesh, MeshFormat, MeshOptions},
     metrics::ErrorMeasures,
     reference::MatrixError,
     scene::Scene,
-    solver::{Note, Snapshot, StepReport},
+    solver::{LampLight, Note, Snapshot, StepReport},
     worker::{Event, StopReason, WorkerHandle},
 };
 
@@ -46,9 +46,15 @@ pub struct SolveArguments {
     /// Built-in scene to light
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
-    /// Write the lit mesh (.ply or .glb)
+    /// Write the lit mesh (.ply, .glb or .obj)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub export: Option<PathBuf>,
+    /// Export all objects of the scene as one
+    #[arg(long, requires = "export", help_heading = "Output")]
+    pub merge: bool,
+    /// Export the light of each lamp by itself, too: of each material that emits, the sky and the sun (.ply or .glb)
+    #[arg(long, requires = "export", help_heading = "Output")]
+    pub export_lamps: bool,
     /// Write the report (JSON; - for standard output)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub report: Option<PathBuf>,
@@ -99,6 +105,8 @@ struct Run {
     times: (f64, f64),
     stop_reason: StopReason,
     snapshot: Arc<Snapshot>,
+    /// The light of each lamp, where that is asked for.
+    lamps: Arc<[LampLight]>,
 }
 
 /// Light the scene, write the files, say how it ended.
@@ -119,6 +127,9 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     let interrupted = interruption.flag;
     let read_s = begin.elapsed().as_secs_f64();
     output::check_inputs_kept(&destinations, &scene.files)?;
+    let companions = companions(arguments, &scene)?;
+    output::check_inputs_kept(&companions, &scene.files)?;
+    output::check_distinct(&[destinations, companions].concat())?;
     for warning in &scene.warnings {
         output::say(format_args!("warning: {warning}"));
     }
@@ -134,7 +145,10 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         arguments.setting_flags.settings(),
         arguments.run_flags.options(),
     );
-    let run = drain(&worker, &interrupted, arguments)?;
+    let mut run = drain(&worker, &interrupted, arguments)?;
+    if arguments.export_lamps && !run.snapshot.mesh.positions.is_empty() {
+        run.lamps = light_by_lamp(&worker)?;
+    }
     drop(worker);
     say_what_is_diffused(&run);
     let totals = Totals {
@@ -203,7 +217,11 @@ fn errors_of(
 /// Refuse what cannot be written before the work begins; else the files that will be.
 fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
     if let Some(path) = &arguments.export {
-        MeshFormat::of(path).map_err(|error| UsageError(error.to_string()))?;
+        let format = MeshFormat::of(path).map_err(|error| UsageError(error.to_string()))?;
+        if arguments.export_lamps && !format.holds_lamps() {
+            let message = "--export-lamps needs a file that ends in .ply or .glb: OBJ has room for one colour";
+            bail!(UsageError(message.to_owned()));
+        }
         output::check(path)?;
     }
     #[cfg(feature = "viewer")]
@@ -232,6 +250,32 @@ fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
     #[cfg(feature = "viewer")]
     arguments.picture.check_size()?;
     Ok(destinations)
+}
+
+/// The light of each lamp of a run that has ended.
+fn light_by_lamp(worker: &WorkerHandle) -> Result<Arc<[LampLight]>> {
+    worker.light_by_lamp();
+    loop {
+        match worker.next_event(POLL) {
+            Some(Event::ByLamp(Some(lamps))) => return Ok(lamps),
+            Some(Event::ByLamp(None)) => bail!("the light of the lamps was interrupted"),
+            Some(Event::Failed(message)) => bail!("the solver failed: {message}"),
+            _ => {}
+        }
+    }
+}
+
+/// The files that are written beside those that are asked for.
+fn companions(arguments: &SolveArguments, scene: &Scene) -> Result<Vec<Destination>> {
+    let Some(path) = &arguments.export else {
+        return Ok(Vec::new());
+    };
+    let library = MeshFormat::of(path)?.companions(path, scene)?;
+    let paths = library.map_or(Vec::new(), |library| library.paths());
+    let destinations = paths.iter();
+    Ok(destinations
+        .filter_map(|path| Destination::new("a file beside --export", path))
+        .collect())
 }
 
 /// Whether files with light are asked for.
@@ -345,7 +389,8 @@ fn drain(
                 | Event::Paused
                 | Event::Continued
                 | Event::Relit { .. }
-                | Event::Inspected(_),
+                | Event::Inspected(_)
+                | Event::ByLamp(_),
             ) => {}
         }
     };
@@ -356,6 +401,7 @@ fn drain(
         times,
         stop_reason,
         snapshot: worker.latest().unwrap_or_default(),
+        lamps: Arc::default(),
     })
 }
 
@@ -373,11 +419,22 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
     let Some(path) = &arguments.export else {
         return Ok(());
     };
-    let export = arguments.run_flags.export(scene.up, scene.radiance_unit);
+    let export = MeshOptions {
+        merge: arguments.merge,
+        ..arguments.run_flags.export(scene.up, scene.radiance_unit)
+    };
     let format = MeshFormat::of(path)?;
-    output::write_whole(path, |out| {
-        format.write(out, &run.snapshot, &scene.frame, &export)
-    })
+    let lit = LitMesh {
+        snapshot: &run.snapshot,
+        scene,
+        options: &export,
+        lamps: &run.lamps,
+    };
+    if let Some(companions) = format.companions(path, scene)? {
+        let written = companions.write(scene);
+        written.with_context(|| format!("cannot write the materials beside {}", path.display()))?;
+    }
+    output::write_whole(path, |out| format.write(out, path, lit))
 }
 
 fn write_report(

@@ -5,7 +5,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::srgb_byte;
+use crate::scene::{srgb_byte, srgb_from_linear};
 
 /// How radiance above the range of the display is brought into it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -19,6 +19,14 @@ pub enum ToneMap {
 }
 
 impl ToneMap {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Neutral => "Khronos PBR Neutral",
+        }
+    }
+
     /// Bring a colour of finite, not negative channels towards 0…1.
     pub fn apply(self, color: Vec3) -> Vec3 {
         match self {
@@ -45,10 +53,18 @@ impl ColorOptions {
 
     /// The sRGB bytes that show a radiance.
     pub fn encode(&self, radiance: Vec3) -> [u8; 3] {
-        self.tone_map
-            .apply(self.exposed(radiance))
-            .to_array()
-            .map(srgb_byte)
+        self.mapped(radiance).to_array().map(srgb_byte)
+    }
+
+    /// The sRGB values that show a radiance, 0…1.
+    pub fn displayed(&self, radiance: Vec3) -> Vec3 {
+        self.mapped(radiance)
+            .clamp(Vec3::ZERO, Vec3::ONE)
+            .map(srgb_from_linear)
+    }
+
+    fn mapped(&self, radiance: Vec3) -> Vec3 {
+        self.tone_map.apply(self.exposed(radiance))
     }
 }
 

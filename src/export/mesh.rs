@@ -8,7 +8,10 @@ use std::{
 use glam::Vec3;
 
 use super::ColorOptions;
-use crate::{scene::UpAxis, solver::Snapshot};
+use crate::{
+    scene::{Scene, UpAxis},
+    solver::{Lamp, LampLight, Snapshot},
+};
 
 /// Options of an exported mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +24,32 @@ pub struct MeshOptions {
     pub emission_scale: f32,
     /// Of the scene: see [`crate::scene::Scene::radiance_unit`].
     pub radiance_unit: f32,
+    /// Whether all objects of the scene become one.
+    pub merge: bool,
+}
+
+/// A mesh with light, to be written.
+#[derive(Clone, Copy)]
+pub struct LitMesh<'a> {
+    /// Mesh and light.
+    pub snapshot: &'a Snapshot,
+    /// The scene that it shows.
+    pub scene: &'a Scene,
+    /// How it is written.
+    pub options: &'a MeshOptions,
+    /// The light of its lamps, each by itself, where it is to be written, too.
+    pub lamps: &'a [LampLight],
+}
+
+impl LitMesh<'_> {
+    /// What a lamp is called.
+    pub(super) fn lamp_name(&self, lamp: Lamp) -> &str {
+        match lamp {
+            Lamp::Material(material) => &self.scene.materials[material].name,
+            Lamp::Sky => "sky",
+            Lamp::Sun => "sun",
+        }
+    }
 }
 
 impl Default for MeshOptions {
@@ -30,6 +59,7 @@ impl Default for MeshOptions {
             up: UpAxis::default(),
             emission_scale: 1.0,
             radiance_unit: 1.0,
+            merge: false,
         }
     }
 }
@@ -47,8 +77,30 @@ impl Light {
     pub(super) fn at(snapshot: &Snapshot, index: usize, options: &MeshOptions) -> Self {
         let mesh = &snapshot.mesh;
         let arriving = snapshot.light.irradiance.get(index).copied();
+        Self::of(snapshot, index, mesh.emission[index], arriving, options)
+    }
+
+    /// That of a lamp alone.
+    pub(super) fn of_lamp(
+        snapshot: &Snapshot,
+        lamp: &LampLight,
+        index: usize,
+        options: &MeshOptions,
+    ) -> Self {
+        let arriving = lamp.irradiance.get(index).copied();
+        let emission = lamp.emission.get(index).copied().unwrap_or_default();
+        Self::of(snapshot, index, emission, arriving, options)
+    }
+
+    fn of(
+        snapshot: &Snapshot,
+        index: usize,
+        emission: Vec3,
+        arriving: Option<Vec3>,
+        options: &MeshOptions,
+    ) -> Self {
         let irradiance = presentable(arriving.unwrap_or_default());
-        let radiance = mesh.emission[index] + mesh.reflectance[index] * irradiance * FRAC_1_PI;
+        let radiance = emission + snapshot.mesh.reflectance[index] * irradiance * FRAC_1_PI;
         let scale = [options.emission_scale, options.radiance_unit].map(f64::from);
         Self {
             radiance: scaled(radiance, scale),

@@ -5,8 +5,8 @@ use std::{
     path::Path,
 };
 
-use super::{MeshOptions, glb::write_glb, ply::write_ply};
-use crate::{scene::Frame, solver::Snapshot};
+use super::{LitMesh, glb::write_glb, obj::write_obj, ply::write_ply};
+use crate::scene::{MaterialLibrary, Scene};
 
 /// A file format of lit meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,22 +15,33 @@ pub enum MeshFormat {
     Ply,
     /// Binary glTF 2.0.
     Glb,
+    /// OBJ with colours of vertices, and its MTL file.
+    Obj,
 }
 
 /// The name of a file has no known extension.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the exported file must end in .ply or .glb: {0}")]
+#[error("the exported file must end in .ply, .glb or .obj: {0}")]
 pub struct UnknownMeshFormat(String);
 
 impl MeshFormat {
     /// All, in the order in which they are offered.
-    pub const ALL: [Self; 2] = [Self::Ply, Self::Glb];
+    pub const ALL: [Self; 3] = [Self::Ply, Self::Glb, Self::Obj];
 
     /// How names of such files end, without the dot.
     pub const fn extension(self) -> &'static str {
         match self {
             Self::Ply => "ply",
             Self::Glb => "glb",
+            Self::Obj => "obj",
+        }
+    }
+
+    /// Whether it has room for the light of single lamps.
+    pub const fn holds_lamps(self) -> bool {
+        match self {
+            Self::Ply | Self::Glb => true,
+            Self::Obj => false,
         }
     }
 
@@ -49,20 +60,32 @@ impl MeshFormat {
             .ok_or_else(|| UnknownMeshFormat(path.display().to_string()))
     }
 
-    /// Write the display mesh of a snapshot.
+    /// The files that belong beside the one of this path: materials and textures of an OBJ.
+    ///
+    /// # Errors
+    /// Where the path names no file.
+    pub fn companions(self, path: &Path, scene: &Scene) -> io::Result<Option<MaterialLibrary>> {
+        match self {
+            Self::Ply | Self::Glb => Ok(None),
+            Self::Obj => MaterialLibrary::beside(path, scene).map(Some),
+        }
+    }
+
+    /// Write a mesh into the file of this path, whose companions are written already.
     ///
     /// # Errors
     /// Those of `out`, and one sentence where the mesh does not fit into the format.
-    pub fn write(
-        self,
-        out: &mut dyn Write,
-        snapshot: &Snapshot,
-        frame: &Frame,
-        options: &MeshOptions,
-    ) -> io::Result<()> {
+    pub fn write(self, out: &mut dyn Write, path: &Path, lit: LitMesh<'_>) -> io::Result<()> {
+        let LitMesh {
+            snapshot,
+            scene,
+            options,
+            ..
+        } = lit;
         match self {
-            Self::Ply => write_ply(out, snapshot, frame, options),
-            Self::Glb => write_glb(out, snapshot, frame, options),
+            Self::Ply => write_ply(out, snapshot, &scene.frame, options),
+            Self::Glb => write_glb(out, snapshot, &scene.frame, options),
+            Self::Obj => write_obj(out, lit, &MaterialLibrary::beside(path, scene)?),
         }
     }
 }
@@ -76,9 +99,10 @@ mod tests {
         let of = |name: &str| MeshFormat::of(Path::new(name));
         assert_eq!(of("a/lit.PLY"), Ok(MeshFormat::Ply));
         assert_eq!(of("lit.ply.glb"), Ok(MeshFormat::Glb));
-        for name in ["lit.obj", "glb", "lit.", ".ply"] {
+        assert_eq!(of("lit.Obj"), Ok(MeshFormat::Obj));
+        for name in ["lit.fbx", "glb", "lit.", ".ply"] {
             let said = of(name).unwrap_err().to_string();
-            assert!(said.contains(".ply or .glb") && said.ends_with(name));
+            assert!(said.contains(".ply, .glb or .obj") && said.ends_with(name));
         }
     }
 }

@@ -4,12 +4,14 @@ mod color;
 mod glb;
 mod mesh;
 mod mesh_format;
+mod obj;
+mod parts;
 mod plot;
 mod ply;
 mod table;
 
 pub use color::{ColorOptions, ToneMap};
-pub use mesh::MeshOptions;
+pub use mesh::{LitMesh, MeshOptions};
 pub use mesh_format::{MeshFormat, UnknownMeshFormat};
 pub use plot::{Curve, CurvePlot};
 pub use table::write_csv;

@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    MeshOptions, ToneMap,
+    MeshOptions,
     mesh::{Light, write_vector},
 };
 use crate::{
@@ -106,10 +106,7 @@ fn header(
     options: &MeshOptions,
 ) -> String {
     let (vertex_count, face_count) = (mesh.positions.len(), mesh.indices.len());
-    let tone_map = match options.color.tone_map {
-        ToneMap::None => "none",
-        ToneMap::Neutral => "Khronos PBR Neutral",
-    };
+    let tone_map = options.color.tone_map.name();
     let properties = |kind: &str, names: &[&str]| -> String {
         names
             .iter()

@@ -15,9 +15,9 @@ use super::{
     render::{CutoutTarget, Gpu, ReadError, Target},
 };
 use crate::{
-    export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    export::{self, MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
     metrics::SceneComparison,
-    scene::{Frame, folder_of, write_whole},
+    scene::{MaterialLibrary, Scene, folder_of, write_whole},
     solver::Snapshot,
     worker::Wake,
 };
@@ -110,8 +110,8 @@ pub enum Content {
 pub struct LitMesh {
     /// Mesh and light.
     pub snapshot: Arc<Snapshot>,
-    /// Of the scene.
-    pub frame: Frame,
+    /// The scene that it shows.
+    pub scene: Arc<Scene>,
     /// Options of the file.
     pub options: MeshOptions,
 }
@@ -119,11 +119,35 @@ pub struct LitMesh {
 impl LitMesh {
     fn save(&self, path: &Path) -> Result<(), SaveError> {
         let format = MeshFormat::of(path)?;
-        write_whole(path, |out| {
-            format.write(out, &self.snapshot, &self.frame, &self.options)
-        })
-        .map_err(SaveError::Write)
+        let lit = export::LitMesh {
+            snapshot: &self.snapshot,
+            scene: &self.scene,
+            options: &self.options,
+            lamps: &[],
+        };
+        let library = format
+            .companions(path, &self.scene)
+            .map_err(SaveError::Write)?;
+        let companions = library.as_ref().map_or(Vec::new(), MaterialLibrary::paths);
+        for path in [path.to_owned()].into_iter().chain(companions) {
+            if is_one_of(&path, &self.scene.files) {
+                return Err(SaveError::Input(path));
+            }
+        }
+        if let Some(library) = library {
+            library.write(&self.scene).map_err(SaveError::Write)?;
+        }
+        write_whole(path, |out| format.write(out, path, lit)).map_err(SaveError::Write)
     }
+}
+
+/// Whether a path leads to one of some files.
+fn is_one_of(path: &Path, files: &[PathBuf]) -> bool {
+    let Ok(place) = path.canonicalize() else {
+        return false;
+    };
+    let mut places = files.iter().filter_map(|file| file.canonicalize().ok());
+    places.any(|other| other == place)
 }
 
 /// Something on its way to a file.
@@ -194,6 +218,9 @@ pub enum SaveError {
     /// The format is none of meshes.
     #[error(transparent)]
     MeshFormat(#[from] UnknownMeshFormat),
+    /// It would replace what the scene is read from.
+    #[error("it would replace a file that the scene is read from, {}; choose another name", .0.display())]
+    Input(PathBuf),
     /// The system refuses.
     #[error(transparent)]
     Write(std::io::Error),

@@ -85,12 +85,15 @@ impl App {
         };
         let mesh = saver::LitMesh {
             snapshot: snapshot.clone(),
-            frame: loaded.scene.frame,
-            options: mesh_options(
-                &self.state.view,
-                self.state.rig.target.up,
-                loaded.scene.radiance_unit,
-            ),
+            scene: loaded.scene.clone(),
+            options: MeshOptions {
+                merge: self.state.panels.mesh_merged,
+                ..mesh_options(
+                    &self.state.view,
+                    self.state.rig.target.up,
+                    loaded.scene.radiance_unit,
+                )
+            },
         };
         let saving = saver::Saving {
             path,
@@ -145,6 +148,7 @@ impl App {
         };
         let saved = Session {
             camera: Some(self.state.rig.target),
+            bookmarks: self.state.bookmarks.clone(),
             view: self.state.view.clone(),
             settings: self.state.settings.clone(),
             light: session::saved_light(&loaded.source, &self.state.lighting),
@@ -170,5 +174,6 @@ fn mesh_options(view: &ViewSettings, up: Vec3, radiance_unit: f32) -> MeshOption
         up: if up == Vec3::Z { UpAxis::Z } else { UpAxis::Y },
         emission_scale: view.emission_scale,
         radiance_unit,
+        merge: false,
     }
 }

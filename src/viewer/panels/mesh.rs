@@ -12,14 +12,20 @@ use crate::{
 
 /// Show the dialog where it is open; requested actions go into `actions`.
 pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
-    let text = &mut state.panels.mesh_text;
-    dialog(ctx, "Export lit mesh", &mut state.panels.mesh, |ui| {
-        mesh_ui(ui, text, actions)
+    let panels = &mut state.panels;
+    let (text, is_merged) = (&mut panels.mesh_text, &mut panels.mesh_merged);
+    dialog(ctx, "Export lit mesh", &mut panels.mesh, |ui| {
+        mesh_ui(ui, text, is_merged, actions)
     });
 }
 
 /// Format and place; whether it was confirmed.
-fn mesh_ui(ui: &mut egui::Ui, text: &mut String, actions: &mut Vec<Action>) -> bool {
+fn mesh_ui(
+    ui: &mut egui::Ui,
+    text: &mut String,
+    is_merged: &mut bool,
+    actions: &mut Vec<Action>,
+) -> bool {
     let present = MeshFormat::of(Path::new(text.trim()));
     ui.horizontal(|ui| {
         ui.label("Format");
@@ -34,8 +40,13 @@ fn mesh_ui(ui: &mut egui::Ui, text: &mut String, actions: &mut Vec<Action>) -> b
         }
     });
     file_field(ui, "File", text);
-    ui.weak("Exposure and up axis are those of the view, in a PLY the tone map, too.");
-    let hint = "The name must end in .ply or .glb.";
+    // A PLY is one mesh always.
+    if present != Ok(MeshFormat::Ply) {
+        ui.checkbox(is_merged, "One object")
+            .on_hover_text("All objects of the scene as one; else each keeps its name");
+    }
+    ui.weak("Exposure and up axis are those of the view, in a PLY and an OBJ the tone map, too.");
+    let hint = "The name must end in .ply, .glb or .obj.";
     let confirmed = confirm(ui, "Export", present.is_ok(), hint);
     if confirmed {
         actions.push(Action::SaveMesh(PathBuf::from(text.trim())));
@@ -49,6 +60,10 @@ fn label(format: MeshFormat) -> (&'static str, &'static str) {
         MeshFormat::Ply => (
             "PLY",
             "For MeshLab, CloudCompare and tools that compute: displayed colours as bytes, light as floats",
+        ),
+        MeshFormat::Obj => (
+            "OBJ",
+            "For modellers: displayed colours at vertices, with the materials and textures of the scene beside it",
         ),
         MeshFormat::Glb => (
             "GLB",
