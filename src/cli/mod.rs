@@ -14,6 +14,7 @@ mod picture;
 mod progress;
 mod report;
 mod scenes;
+mod shell;
 mod solve;
 mod sweep;
 mod truth;
@@ -56,6 +57,10 @@ pub enum Command {
     Check(Box<check::CheckArguments>),
     /// List the built-in scenes, or write them as OBJ and MTL
     Scenes(scenes::ScenesArguments),
+    /// Print the completions of a shell
+    Completions(shell::CompletionsArguments),
+    /// Print the manual page, or write one for each command
+    Man(shell::ManArguments),
 }
 
 /// A usage error that clap cannot see.
@@ -80,6 +85,8 @@ pub fn run() -> ExitCode {
         Some(Command::Report(report)) => sweep::report(&report),
         Some(Command::Check(check)) => check::check(&check),
         Some(Command::Scenes(scenes)) => scenes::scenes(&scenes),
+        Some(Command::Completions(completions)) => shell::completions(&completions),
+        Some(Command::Man(man)) => shell::man(&man),
         #[cfg(feature = "viewer")]
         None => window::open(arguments.path, &arguments.window),
         #[cfg(not(feature = "viewer"))]

@@ -22,6 +22,9 @@ pub struct WindowFlags {
     /// Built-in scene to open
     #[arg(long, value_name = "NAME", conflicts_with = "path")]
     pub scene: Option<String>,
+    /// Read the scene again whenever its files change
+    #[arg(long)]
+    pub watch: bool,
     /// What it shows
     #[command(flatten)]
     pub view: ViewFlags,
@@ -60,6 +63,7 @@ pub(super) fn open(path: Option<PathBuf>, flags: &WindowFlags) -> Result<Outcome
     viewer::run(viewer::Options {
         source: Some(source),
         scene_options: flags.scene_flags.options(),
+        watches_files: flags.watch,
         lighting: flags.scene_flags.lighting()?,
         settings: flags.setting_flags.settings(),
         settings_are_asked_for: flags.setting_flags.are_given(),

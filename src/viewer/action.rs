@@ -18,6 +18,8 @@ pub enum Action {
     Load(SceneSource),
     /// Read the present scene again, keeping camera and settings.
     Reload,
+    /// Read the present scene again whenever its files are written, or no longer.
+    ToggleWatch,
     /// Run, rest or go on, whichever comes next.
     PauseContinue,
     /// End the run.
@@ -82,6 +84,18 @@ pub enum Action {
     FrameSelected,
     /// Look along an axis.
     LookFrom(AxisView),
+    /// Keep the camera as a bookmark.
+    AddBookmark,
+    /// The camera of a bookmark.
+    GoTo(usize),
+    /// Forget a bookmark.
+    RemoveBookmark(usize),
+    /// Copy the camera as flags of the command line.
+    CopyCamera,
+    /// Ask the system for the text that was copied last.
+    RequestPaste,
+    /// The camera that a text describes by such flags.
+    PasteCamera(String),
     /// Parallel or central projection.
     ToggleProjection,
     /// Which axis is up.

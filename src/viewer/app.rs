@@ -31,6 +31,7 @@ use super::{
     state::State,
     theme,
     viewport::{Viewport, viewport_ui},
+    watch::SceneWatch,
 };
 use crate::scene::Lighting;
 use crate::worker::{RunOptions, Wake, WorkerHandle};
@@ -57,6 +58,9 @@ pub struct App {
     faults: Arc<Faults>,
     /// Files chosen in the dialog.
     chosen: (Sender<Option<PathBuf>>, Receiver<Option<PathBuf>>),
+    /// Tells when the files of the scene change, where that is asked for.
+    watch: Option<SceneWatch>,
+    guide: panels::guide::Guide,
     /// Since when the file dialog is open.
     dialog_since: Option<Instant>,
     notices: (Sender<Notice>, Receiver<Notice>),
@@ -109,6 +113,7 @@ impl App {
                 ..options.run.clone()
             },
             scene_options: options.scene_options,
+            watches_files: options.watches_files,
             view: options.view.apply(&preferences.view()),
             panels: preferences.panels(),
             recent,
@@ -127,6 +132,8 @@ impl App {
             wake,
             faults,
             chosen: mpsc::channel(),
+            watch: None,
+            guide: panels::guide::Guide::default(),
             dialog_since: None,
             notices: mpsc::channel(),
             unfinished: Unfinished::default(),
@@ -161,6 +168,7 @@ impl eframe::App for App {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         self.drain();
+        self.follow_files(ctx);
         if let Some(title) = self.title.take() {
             ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
         }
@@ -177,7 +185,13 @@ impl eframe::App for App {
         let before = self.state.view.clone();
         if self.state.panels.shown {
             egui::Panel::top("menu").show(ui, |ui| {
-                panels::menu::menu_ui(ui, &mut self.state, &self.table, &mut actions);
+                panels::menu::menu_ui(
+                    ui,
+                    &mut self.state,
+                    &mut self.guide,
+                    &self.table,
+                    &mut actions,
+                );
             });
             egui::Panel::top("toolbar").show(ui, |ui| {
                 ui.add_space(2.0);
@@ -207,6 +221,7 @@ impl eframe::App for App {
         panels::mesh::mesh_window(&ctx, &mut self.state, &mut actions);
         panels::table::table_window(&ctx, &mut self.state.panels, &mut actions);
         panels::help::help_window(&ctx, &mut self.state, &self.table);
+        self.guide.window(&ctx);
         dropping::hover_ui(&ctx);
         if self.state.loading.is_some() {
             ctx.request_repaint_after(PROGRESS);

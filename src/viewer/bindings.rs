@@ -109,6 +109,19 @@ pub const FOCUS: [(&str, &str); 3] = [
 /// Keys that move the camera while the right button is held; Ctrl slows it then, and means nothing else.
 const FLYING: [Key; 6] = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E];
 
+/// Keys of the first bookmarks.
+const BOOKMARK_KEYS: [Key; 9] = [
+    Key::Num1,
+    Key::Num2,
+    Key::Num3,
+    Key::Num4,
+    Key::Num5,
+    Key::Num6,
+    Key::Num7,
+    Key::Num8,
+    Key::Num9,
+];
+
 /// What two keys do, since one of them needs Shift on some keyboards.
 const LARGER: &str = "Larger text and panels";
 
@@ -138,19 +151,19 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Num1,
             Camera,
-            "From the front",
+            "From the front, again from behind",
             Action::LookFrom(AxisView::Front),
         ),
         plain(
             Key::Num3,
             Camera,
-            "From the right",
+            "From the right, again from the left",
             Action::LookFrom(AxisView::Right),
         ),
         plain(
             Key::Num7,
             Camera,
-            "From above",
+            "From above, again from below",
             Action::LookFrom(AxisView::Top),
         ),
         plain(
@@ -158,6 +171,19 @@ pub fn bindings() -> Vec<Binding> {
             Camera,
             "Isometric",
             Action::LookFrom(AxisView::Isometric),
+        ),
+        command(
+            Key::D,
+            Camera,
+            "Keep this view as a bookmark",
+            Action::AddBookmark,
+        ),
+        bind(
+            Modifiers::COMMAND | Modifiers::SHIFT,
+            Key::C,
+            Camera,
+            "Copy the camera as flags of the command line",
+            Action::CopyCamera,
         ),
         plain(
             Key::Num5,
@@ -300,6 +326,14 @@ pub fn bindings() -> Vec<Binding> {
         plain(Key::Questionmark, File, "This sheet", Action::ToggleHelp),
         command(Key::Q, File, "Quit", Action::Quit),
     ];
+    for (index, key) in BOOKMARK_KEYS.into_iter().enumerate() {
+        all.push(command(
+            key,
+            Camera,
+            "Bookmark of this number",
+            Action::GoTo(index),
+        ));
+    }
     // In the order of the keyboard.
     const ROW: [Key; ViewMode::ALL.len()] = [
         Key::Num1,

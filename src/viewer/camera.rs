@@ -13,10 +13,31 @@ pub enum AxisView {
     Front,
     /// From the right.
     Right,
+    /// From behind.
+    Back,
+    /// From the left.
+    Left,
     /// From above.
     Top,
+    /// From below.
+    Bottom,
     /// From above, front and right.
     Isometric,
+}
+
+impl AxisView {
+    /// From the other side; the same where there is none.
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Front => Self::Back,
+            Self::Back => Self::Front,
+            Self::Right => Self::Left,
+            Self::Left => Self::Right,
+            Self::Top => Self::Bottom,
+            Self::Bottom => Self::Top,
+            Self::Isometric => Self::Isometric,
+        }
+    }
 }
 
 /// Closest distance to the pivot. Smaller, and single precision makes the picture tremble.
@@ -243,14 +264,26 @@ impl Camera {
         self.distance = needed.min(MAX_DISTANCE);
     }
 
-    /// Look along an axis.
+    /// Look along an axis; the other way along it where the camera does so already.
     pub fn look_from(&mut self, view: AxisView) {
-        (self.yaw, self.pitch) = match view {
-            AxisView::Front => (0.0, 0.0),
-            AxisView::Right => (FRAC_PI_2, 0.0),
-            AxisView::Top => (0.0, MAX_PITCH),
-            AxisView::Isometric => (PI / 4.0, (1.0 / 3_f32.sqrt()).asin()),
+        let along = Self::angles_from(view);
+        (self.yaw, self.pitch) = match (self.yaw, self.pitch) == along {
+            true => Self::angles_from(view.opposite()),
+            false => along,
         };
+    }
+
+    /// Yaw and pitch.
+    fn angles_from(view: AxisView) -> (f32, f32) {
+        match view {
+            AxisView::Front => (0.0, 0.0),
+            AxisView::Back => (PI, 0.0),
+            AxisView::Right => (FRAC_PI_2, 0.0),
+            AxisView::Left => (-FRAC_PI_2, 0.0),
+            AxisView::Top => (0.0, MAX_PITCH),
+            AxisView::Bottom => (0.0, -MAX_PITCH),
+            AxisView::Isometric => (PI / 4.0, (1.0 / 3_f32.sqrt()).asin()),
+        }
     }
 
     /// Whether all figures are finite and in range.

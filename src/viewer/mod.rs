@@ -7,6 +7,7 @@ pub mod action;
 pub mod app;
 pub mod bindings;
 pub mod camera;
+pub mod camera_text;
 pub mod cluster_lines;
 pub mod clusters;
 #[cfg(target_os = "linux")]
@@ -51,6 +52,7 @@ pub mod traced;
 pub mod truth;
 pub mod view;
 pub mod viewport;
+mod watch;
 pub mod wording;
 
 pub use options::{CameraRequest, Options};

@@ -16,6 +16,8 @@ pub struct Options {
     pub source: Option<SceneSource>,
     /// How it is read.
     pub scene_options: SceneOptions,
+    /// Whether it is read again when its files change.
+    pub watches_files: bool,
     /// The light that it has beside its own.
     pub lighting: Lighting,
     /// Settings of the solve.

@@ -52,6 +52,33 @@ struct SavedCamera {
     view_up: [f32; 3],
 }
 
+impl SavedCamera {
+    fn of(camera: &Camera, frame: &Frame) -> Self {
+        Self {
+            position: frame.to_world(camera.eye()).to_array(),
+            focal_point: frame.to_world(camera.pivot).to_array(),
+            view_angle_degrees: camera.fov_y_radians.to_degrees(),
+            parallel: camera.orthographic,
+            view_up: camera.up.to_array(),
+        }
+    }
+
+    /// The camera in a frame, where it is valid.
+    fn in_frame(&self, frame: &Frame) -> Option<Camera> {
+        let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };
+        let camera = Camera {
+            fov_y_radians: self.view_angle_degrees.to_radians(),
+            orthographic: self.parallel,
+            ..Camera::looking(
+                in_frame(self.position),
+                in_frame(self.focal_point),
+                Vec3::from_array(self.view_up).normalize_or(Vec3::Y),
+            )
+        };
+        Some(camera).filter(Camera::is_valid)
+    }
+}
+
 /// Of sidecars that say nothing.
 fn y_up() -> [f32; 3] {
     Vec3::Y.to_array()
@@ -62,6 +89,8 @@ fn y_up() -> [f32; 3] {
 #[serde(default)]
 struct Sidecar {
     camera: Option<SavedCamera>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    bookmarks: Vec<SavedCamera>,
     view: ViewSettings,
     settings: SolveSettings,
     #[serde(skip_serializing_if = "SavedLight::is_empty")]
@@ -75,6 +104,8 @@ struct Sidecar {
 pub struct Session {
     /// The camera, where it is valid.
     pub camera: Option<Camera>,
+    /// Cameras that were kept, as far as they are valid.
+    pub bookmarks: Vec<Camera>,
     /// How the light is shown.
     pub view: ViewSettings,
     /// How it is computed.
@@ -95,13 +126,12 @@ pub fn sidecar_path(source: &SceneSource) -> Option<PathBuf> {
 /// The sidecar as text.
 pub fn to_toml(session: &Session, frame: &Frame) -> Result<String, String> {
     let saved = Sidecar {
-        camera: session.camera.map(|camera| SavedCamera {
-            position: frame.to_world(camera.eye()).to_array(),
-            focal_point: frame.to_world(camera.pivot).to_array(),
-            view_angle_degrees: camera.fov_y_radians.to_degrees(),
-            parallel: camera.orthographic,
-            view_up: camera.up.to_array(),
-        }),
+        camera: session.camera.map(|camera| SavedCamera::of(&camera, frame)),
+        bookmarks: session
+            .bookmarks
+            .iter()
+            .map(|camera| SavedCamera::of(camera, frame))
+            .collect(),
         view: session.view.clone(),
         settings: session.settings.clone(),
         light: session.light.clone(),
@@ -123,18 +153,12 @@ pub fn from_toml(text: &str, frame: &Frame) -> Result<Session, String> {
     saved.view.check()?;
     saved.light.check()?;
     saved.materials.iter().try_for_each(SavedMaterial::check)?;
-    let in_frame = |point: [f64; 3]| -> Vec3 { frame.from_world(DVec3::from_array(point)) };
-    let camera = saved.camera.map(|camera| Camera {
-        fov_y_radians: camera.view_angle_degrees.to_radians(),
-        orthographic: camera.parallel,
-        ..Camera::looking(
-            in_frame(camera.position),
-            in_frame(camera.focal_point),
-            Vec3::from_array(camera.view_up).normalize_or(Vec3::Y),
-        )
-    });
+    let bookmarks = saved.bookmarks.iter();
     Ok(Session {
-        camera: camera.filter(Camera::is_valid),
+        camera: saved.camera.and_then(|camera| camera.in_frame(frame)),
+        bookmarks: bookmarks
+            .filter_map(|camera| camera.in_frame(frame))
+            .collect(),
         view: saved.view,
         settings: saved.settings,
         light: saved.light,
@@ -229,12 +253,14 @@ mod tests {
             centre: DVec3::new(1000.0, -5.0, 3.0),
             scale: 12.5,
         };
+        let camera = Camera::looking(
+            Vec3::new(10.0, 20.0, 30.0),
+            Vec3::new(1.0, 0.0, -2.0),
+            Vec3::new(0.0, -0.6, 0.8),
+        );
         let session = Session {
-            camera: Some(Camera::looking(
-                Vec3::new(10.0, 20.0, 30.0),
-                Vec3::new(1.0, 0.0, -2.0),
-                Vec3::new(0.0, -0.6, 0.8),
-            )),
+            camera: Some(camera),
+            bookmarks: vec![camera, Camera::default()],
             view: ViewSettings {
                 exposure: 1.5,
                 fixed_range: Some([0.5, 20.0]),
@@ -257,6 +283,11 @@ mod tests {
         let text = to_toml(&session, &frame).expect("plain values");
         let read = from_toml(&text, &frame).expect("our own text");
         assert_eq!(read.view, session.view);
+        let [first, second] = &read.bookmarks[..] else {
+            panic!("{text}");
+        };
+        assert!(first.eye().distance(camera.eye()) < 1e-3);
+        assert!(second.eye().distance(Camera::default().eye()) < 1e-3);
         assert_eq!(read.settings, session.settings);
         assert_eq!(read.light, session.light);
         assert_eq!(read.materials, session.materials);

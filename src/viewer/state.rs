@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{
-    camera::CameraRig,
+    camera::{Camera, CameraRig},
     clusters::ShownClusters,
     exposure::Follower,
     frame_time::FrameTimes,
@@ -55,8 +55,12 @@ pub struct State {
     pub settings: SolveSettings,
     /// Limits in force.
     pub options: RunOptions,
+    /// Cameras that were kept for this scene.
+    pub bookmarks: Vec<Camera>,
     /// How scenes are read.
     pub scene_options: SceneOptions,
+    /// Whether they are read again when their files change.
+    pub watches_files: bool,
     /// The light that they have beside their own.
     pub lighting: Lighting,
     /// Its lights and materials, as they were changed.

@@ -7,7 +7,9 @@ use eframe::egui;
 use super::{
     super::{
         action::{Action, Scale},
-        bindings, clusters, focus,
+        bindings,
+        camera::Camera,
+        camera_text, clusters, focus,
         materials::{Lights, Materials},
         messages::Severity,
         navigation::Picked,
@@ -30,6 +32,19 @@ impl App {
             Action::OpenDialog => self.open_dialog(),
             Action::Load(source) => self.load(source),
             Action::Reload => self.reload(),
+            Action::ToggleWatch => {
+                self.state.watches_files = !self.state.watches_files;
+                self.watch_files();
+            }
+            Action::CopyCamera => {
+                if let Some(loaded) = &self.state.loaded {
+                    let camera = &self.state.rig.target;
+                    ctx.copy_text(camera_text::to_flags(camera, &loaded.scene.frame));
+                    let text = "the camera was copied as flags of the command line";
+                    self.state.messages.push_lasting(Severity::Note, text);
+                }
+            }
+            Action::RequestPaste => ctx.send_viewport_cmd(egui::ViewportCommand::RequestPaste),
             Action::PauseContinue => self.pause_or_continue(),
             Action::Stop => self.stop(),
             Action::Reset => self.begin_again(),
@@ -139,9 +154,20 @@ impl App {
             ctx.input_mut(|input| input.consume_key(egui::Modifiers::NONE, egui::Key::Escape));
         }
         let in_use = focus::keys_in_use(ctx);
+        let pasted = ctx.input(|input| {
+            let text = |event: &egui::Event| match event {
+                egui::Event::Paste(text) => Some(text.clone()),
+                _ => None,
+            };
+            input.events.iter().find_map(text)
+        });
+        if let Some(text) = pasted {
+            self.perform(ctx, Action::PasteCamera(text));
+        }
         for action in ctx.input_mut(|input| bindings::pressed(input, &self.table, in_use)) {
             // The key that stops closes what lies over the scene first.
-            if action != Action::Stop || !self.state.panels.close_dialogs() {
+            let stops = action == Action::Stop;
+            if !(stops && (self.guide.close() || self.state.panels.close_dialogs())) {
                 self.perform(ctx, action);
             }
         }
@@ -201,6 +227,28 @@ impl App {
             Action::FirstLook => state.look_first(),
             Action::FrameAll => state.frame_all(),
             Action::LookFrom(view) => state.rig.target.look_from(*view),
+            Action::AddBookmark => {
+                state.bookmarks.push(state.rig.target);
+                let text = format!(
+                    "bookmark {} is kept; saving the camera saves it, too",
+                    state.bookmarks.len()
+                );
+                state.messages.push_lasting(Severity::Note, text);
+            }
+            Action::GoTo(index) => match state.bookmarks.get(*index) {
+                Some(camera) => {
+                    state.rig.target = *camera;
+                    state.rig.current.orthographic = camera.orthographic;
+                }
+                None => {
+                    let text = format!("there is no bookmark {}", index + 1);
+                    state.messages.push(Severity::Note, text);
+                }
+            },
+            Action::RemoveBookmark(index) if *index < state.bookmarks.len() => {
+                state.bookmarks.remove(*index);
+            }
+            Action::PasteCamera(text) => paste_camera(state, text),
             Action::ToggleProjection => {
                 state.rig.target.orthographic = !state.rig.target.orthographic;
                 state.rig.current.orthographic = state.rig.target.orthographic;
@@ -403,5 +451,19 @@ fn toggle_normals(state: &mut State) {
         *mode = state.mode_before_normals;
     } else {
         state.mode_before_normals = std::mem::replace(mode, ViewMode::Normals);
+    }
+}
+
+/// Take the camera from flags in a text.
+fn paste_camera(state: &mut State, text: &str) {
+    let Some(loaded) = &state.loaded else { return };
+    let request = camera_text::from_flags(text);
+    let camera = request.map(|request| request.apply(state.rig.target, &loaded.scene.frame));
+    match camera.filter(Camera::is_valid) {
+        Some(camera) => state.rig.target = camera,
+        None => {
+            let text = "what was pasted is no camera: copy flags such as --camera-position 1,2,3";
+            state.messages.push(Severity::Note, text);
+        }
     }
 }

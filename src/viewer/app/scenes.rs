@@ -2,8 +2,11 @@
 
 use std::{sync::Arc, thread, time::Instant};
 
+use eframe::egui;
+
 use super::{
     super::{
+        camera::Camera,
         exposure::Follower,
         loader::{LoadedScene, Loader, SceneSource},
         materials::{History, Materials, SavedMaterial},
@@ -11,6 +14,7 @@ use super::{
         session,
         truth::Truth,
         view::ViewMode,
+        watch::SceneWatch,
         wording,
     },
     App,
@@ -57,11 +61,12 @@ impl App {
         if let Some(path) = loaded.source.path() {
             self.state.recent.push(path);
         }
-        let mut changed = Vec::new();
-        if !self.keeps_view {
+        let changed = if self.keeps_view {
+            self.keep_view(&loaded)
+        } else {
             self.state.exposure = Follower::default();
-            changed = self.open_view(&loaded);
-        }
+            self.open_view(&loaded)
+        };
         self.keeps_view = true;
         self.title = Some(loaded.source.window_title());
         self.state.selection = None;
@@ -82,10 +87,36 @@ impl App {
         self.state.history = History::default();
         self.state.loaded = Some(Arc::new(loaded));
         self.restore(&changed);
+        self.watch_files();
         // The view of errors is nothing without a reference.
         if self.state.view.mode == ViewMode::Error {
             self.trace_reference();
         }
+    }
+
+    /// The camera of the scene before in the frame of this one. Returns the materials that are changed.
+    fn keep_view(&mut self, loaded: &LoadedScene) -> Vec<SavedMaterial> {
+        let Some(before) = &self.state.loaded else {
+            return Vec::new();
+        };
+        let (from, to) = (&before.scene.frame, &loaded.scene.frame);
+        if from != to {
+            let place = |point| to.from_world(from.to_world(point));
+            let moved = |camera: &Camera| {
+                let [eye, pivot] = [camera.eye(), camera.pivot].map(place);
+                let moved = Camera {
+                    fov_y_radians: camera.fov_y_radians,
+                    orthographic: camera.orthographic,
+                    ..Camera::looking(eye, pivot, camera.up)
+                };
+                Some(moved).filter(Camera::is_valid)
+            };
+            if let Some(camera) = moved(&self.state.rig.target) {
+                self.state.rig.jump(camera);
+            }
+            self.state.bookmarks = self.state.bookmarks.iter().filter_map(moved).collect();
+        }
+        self.state.materials.changes(&[])
     }
 
     /// Nothing of the scene before is to be shown.
@@ -103,11 +134,13 @@ impl App {
     /// Returns the materials that its sidecar changes.
     fn open_view(&mut self, loaded: &LoadedScene) -> Vec<SavedMaterial> {
         let mut changed = Vec::new();
+        self.state.bookmarks = Vec::new();
         let frame = &loaded.scene.frame;
         let mut camera = loaded.viewpoint;
         match session::load(&loaded.source, frame) {
             Some(Ok(saved)) => {
                 camera = saved.camera.unwrap_or(camera);
+                self.state.bookmarks = saved.bookmarks;
                 let first = self.first.as_ref();
                 if first.is_some_and(|first| first.settings_are_asked_for) {
                     let text = "the settings saved beside the scene were not used: the command line has its own";
@@ -162,6 +195,32 @@ impl App {
             self.keeps_view = true;
             let lighting = self.state.lighting.clone();
             self.start_loader(source, || lighting);
+        }
+    }
+
+    /// Watch the files of the present scene, if that is asked for.
+    pub(super) fn watch_files(&mut self) {
+        self.watch = None;
+        let loaded = self.state.loaded.as_ref();
+        let files = loaded.map(|loaded| loaded.scene.files.as_slice());
+        let files = files.filter(|files| self.state.watches_files && !files.is_empty());
+        let Some(files) = files else { return };
+        match SceneWatch::start(files, self.wake.clone()) {
+            Ok(watch) => self.watch = Some(watch),
+            Err(error) => {
+                self.state.watches_files = false;
+                self.state.messages.push(Severity::Warning, error);
+            }
+        }
+    }
+
+    /// Read the scene again where its files have changed.
+    pub(super) fn follow_files(&mut self, ctx: &egui::Context) {
+        let Some(watch) = &self.watch else { return };
+        if watch.take() {
+            self.reload();
+        } else if let Some(wait) = watch.wait() {
+            ctx.request_repaint_after(wait);
         }
     }
 

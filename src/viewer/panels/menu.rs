@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::scene;
+use super::{guide::Guide, scene};
 use crate::{
     export::ToneMap,
     scene::UpAxis,
@@ -17,7 +17,13 @@ use crate::{
 };
 
 /// Show the bar; requested actions go into `actions`.
-pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &mut Vec<Action>) {
+pub fn menu_ui(
+    ui: &mut egui::Ui,
+    state: &mut State,
+    guide: &mut Guide,
+    table: &[Binding],
+    actions: &mut Vec<Action>,
+) {
     egui::MenuBar::new().ui(ui, |ui| {
         ui.menu_button("File", |ui| file_menu(ui, state, table, actions));
         ui.menu_button("Scenes", |ui| scene::builtin_menu(ui, actions));
@@ -43,6 +49,7 @@ pub fn menu_ui(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions:
             );
         });
         ui.menu_button("Help", |ui| {
+            ui.menu_button("Guide", |ui| guide.menu_ui(ui));
             item(ui, table, actions, "Keys and mouse", Action::ToggleHelp);
             ui.separator();
             ui.weak(concat!("vecrad ", env!("CARGO_PKG_VERSION")));
@@ -83,6 +90,9 @@ fn file_menu(ui: &mut egui::Ui, state: &mut State, table: &[Binding], actions: &
         });
     });
     item(ui, table, actions, "Reload", Action::Reload);
+    let is_watched = state.watches_files;
+    let label = "Reload when files change";
+    toggle(ui, table, actions, label, is_watched, Action::ToggleWatch);
     ui.separator();
     item(
         ui,
@@ -243,8 +253,11 @@ fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mu
     ui.separator();
     for (label, view) in [
         ("From the front", AxisView::Front),
+        ("From behind", AxisView::Back),
         ("From the right", AxisView::Right),
+        ("From the left", AxisView::Left),
         ("From above", AxisView::Top),
+        ("From below", AxisView::Bottom),
         ("Isometric", AxisView::Isometric),
     ] {
         item(ui, table, actions, label, Action::LookFrom(view));
@@ -256,6 +269,20 @@ fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mu
         "Perspective or parallel",
         Action::ToggleProjection,
     );
+    ui.separator();
+    item(ui, table, actions, "Keep as bookmark", Action::AddBookmark);
+    for index in 0..state.bookmarks.len() {
+        let label = format!("Bookmark {}", index + 1);
+        ui.horizontal(|ui| {
+            item(ui, table, actions, &label, Action::GoTo(index));
+            let remove = ui.small_button("×").on_hover_text("Forget this bookmark");
+            if remove.clicked() {
+                actions.push(Action::RemoveBookmark(index));
+            }
+        });
+    }
+    item(ui, table, actions, "Copy as flags", Action::CopyCamera);
+    item(ui, table, actions, "Paste", Action::RequestPaste);
     ui.separator();
     for (label, up) in [("Y is up", UpAxis::Y), ("Z is up", UpAxis::Z)] {
         let button = egui::Button::selectable(state.rig.target.up == up.vector(), label)

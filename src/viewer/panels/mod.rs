@@ -6,6 +6,7 @@ pub mod dark;
 pub mod dialog;
 pub mod emission;
 pub mod error;
+pub mod guide;
 pub mod help;
 pub mod legend;
 pub mod links;
