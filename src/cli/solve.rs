@@ -24,11 +24,13 @@ use super::{
     truth::{self, Errors, Truth},
 };
 use crate::{
-    export::MeshFormat,
+    export::{LitMesh, MeshFormat},
+    geometry::RayTree,
     metrics::ErrorMeasures,
+    picture::harmonics_at_vertices,
     reference::MatrixError,
     scene::Scene,
-    solver::{Note, Snapshot, StepReport},
+    solver::{Cancel, Note, Snapshot, StepReport},
     worker::{Event, StopReason, WorkerHandle},
 };
 
@@ -49,6 +51,9 @@ pub struct SolveArguments {
     /// Write the lit mesh (.ply or .glb)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub export: Option<PathBuf>,
+    /// Add the light that arrives at each vertex by direction, as first-order spherical harmonics
+    #[arg(long, help_heading = "Output")]
+    pub export_sh: bool,
     /// Write the report (JSON; - for standard output)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub report: Option<PathBuf>,
@@ -205,6 +210,9 @@ fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
     if let Some(path) = &arguments.export {
         MeshFormat::of(path).map_err(|error| UsageError(error.to_string()))?;
         output::check(path)?;
+    } else if arguments.export_sh {
+        let message = "--export-sh adds to the exported mesh: add --export FILE.glb or FILE.ply";
+        bail!(UsageError(message.to_owned()));
     }
     #[cfg(feature = "viewer")]
     {
@@ -375,9 +383,17 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
     };
     let export = arguments.run_flags.export(scene.up, scene.radiance_unit);
     let format = MeshFormat::of(path)?;
-    output::write_whole(path, |out| {
-        format.write(out, &run.snapshot, &scene.frame, &export)
-    })
+    let harmonics = || {
+        let (rays, seed) = (RayTree::new(scene), arguments.setting_flags.settings().seed);
+        harmonics_at_vertices(scene, &rays, &run.snapshot, seed, &Cancel::default())
+    };
+    let harmonics = arguments.export_sh.then(harmonics).flatten();
+    let lit = LitMesh {
+        snapshot: &run.snapshot,
+        frame: &scene.frame,
+        harmonics: harmonics.as_deref(),
+    };
+    output::write_whole(path, |out| format.write(out, lit, &export))
 }
 
 fn write_report(

@@ -1,8 +1,8 @@
 //! Binary glTF 2.0 (GLB) of the display mesh with light at its vertices.
 //!
-//! Per vertex: position, normal, `COLOR_0`, `_RADIANCE` and `_IRRADIANCE`, all floats. `COLOR_0` is exposed linear radiance
-//! cut off at 1, as the format demands, without a tone curve, which is the viewer's to apply; the other two keep the full
-//! range. Materials are unlit (`KHR_materials_unlit`): the light is in the colours already. There is one for each finish, which
+//! Per vertex: position, normal, `COLOR_0`, `_RADIANCE` and `_IRRADIANCE`, all floats, and `_SH0` to `_SH3` where light by
+//! direction is asked for. `COLOR_0` is exposed linear radiance cut off at 1, as the format demands, without a tone curve,
+//! which is the viewer's to apply; the others keep the full range. Materials are unlit (`KHR_materials_unlit`): the light is in the colours already. There is one for each finish, which
 //! carries its roughness and metalness for those who light the mesh themselves.
 //!
 //! Positions are world units from the node's place, so that single precision suffices far from the origin. glTF is Y-up: a
@@ -19,18 +19,30 @@ use serde_json::{Value, json};
 
 use super::{
     MeshOptions,
-    mesh::{Light, write_vector},
+    mesh::{HARMONICS_MEANING, Light, LitMesh, write_vector},
 };
 use crate::{
     scene::{Finish, Frame, UpAxis},
-    solver::{DisplayMesh, Snapshot},
+    solver::DisplayMesh,
 };
 
-/// Floats of a vertex, three for each of [`ATTRIBUTES`].
-const VERTEX_BYTES: u64 = 4 * 3 * ATTRIBUTES.len() as u64;
+/// Attributes of a vertex, three floats each, in the order of the file; those of light by direction come last.
+const ATTRIBUTES: [&str; 9] = [
+    "POSITION",
+    "NORMAL",
+    "COLOR_0",
+    "_RADIANCE",
+    "_IRRADIANCE",
+    "_SH0",
+    "_SH1",
+    "_SH2",
+    "_SH3",
+];
 
-/// Attributes of a vertex, in the order of the file.
-const ATTRIBUTES: [&str; 5] = ["POSITION", "NORMAL", "COLOR_0", "_RADIANCE", "_IRRADIANCE"];
+/// Number of attributes without light by direction.
+const PLAIN_ATTRIBUTES: usize = 5;
+
+const ATTRIBUTE_BYTES: u64 = 12;
 
 /// Three indices of 32 bits.
 const TRIANGLE_BYTES: u64 = 12;
@@ -63,22 +75,19 @@ enum GlbError {
     },
 }
 
-/// Write the display mesh of a snapshot.
+/// Write a lit mesh.
 ///
 /// # Errors
 /// Those of `out`, and one sentence where the mesh is empty or does not fit.
 pub(super) fn write_glb(
     out: &mut dyn Write,
-    snapshot: &Snapshot,
-    frame: &Frame,
+    lit: LitMesh<'_>,
     options: &MeshOptions,
 ) -> io::Result<()> {
-    let mesh = &*snapshot.mesh;
-    let sizes = Sizes::of(mesh);
+    let (mesh, frame) = (&*lit.snapshot.mesh, lit.frame);
+    let sizes = Sizes::of(lit);
     let parts = parts(mesh);
-    let mut text = document(mesh, &parts, frame, options)
-        .to_string()
-        .into_bytes();
+    let mut text = document(lit, &parts, options).to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let length = sizes
         .file_length(text.len() as u64)
@@ -91,12 +100,15 @@ pub(super) fn write_glb(
     write_numbers(out, &[sizes.buffer_length() as u32])?;
     out.write_all(b"BIN\0")?;
     for (index, &position) in mesh.positions.iter().enumerate() {
-        let light = Light::at(snapshot, index, options);
+        let light = Light::at(lit, index, options);
         write_vector(out, from_node(position, frame))?;
         write_vector(out, mesh.normals[index].normalize_or(Vec3::Y))?;
         write_vector(out, options.color.exposed(light.radiance).min(Vec3::ONE))?;
         write_vector(out, light.radiance)?;
         write_vector(out, light.irradiance)?;
+        for coefficient in light.harmonics.into_iter().flatten() {
+            write_vector(out, coefficient)?;
+        }
     }
     let mut triangles = parts.iter().flat_map(|part| &part.triangles);
     triangles.try_for_each(|&triangle| write_numbers(out, &mesh.indices[triangle as usize]))
@@ -138,18 +150,29 @@ fn parts(mesh: &DisplayMesh) -> Vec<Part> {
 struct Sizes {
     vertices: u64,
     triangles: u64,
+    /// Of a vertex.
+    attributes: usize,
 }
 
 impl Sizes {
-    fn of(mesh: &DisplayMesh) -> Self {
+    fn of(lit: LitMesh<'_>) -> Self {
+        let mesh = &lit.snapshot.mesh;
         Self {
             vertices: mesh.positions.len() as u64,
             triangles: mesh.indices.len() as u64,
+            attributes: match lit.harmonics {
+                Some(_) => ATTRIBUTES.len(),
+                None => PLAIN_ATTRIBUTES,
+            },
         }
     }
 
+    fn vertex_bytes(self) -> u64 {
+        self.attributes as u64 * ATTRIBUTE_BYTES
+    }
+
     fn vertices_length(self) -> u64 {
-        self.vertices * VERTEX_BYTES
+        self.vertices * self.vertex_bytes()
     }
 
     fn indices_length(self) -> u64 {
@@ -182,11 +205,22 @@ fn from_node(position: Vec3, frame: &Frame) -> Vec3 {
 }
 
 /// The JSON chunk.
-fn document(mesh: &DisplayMesh, parts: &[Part], frame: &Frame, options: &MeshOptions) -> Value {
-    let nodes = nodes(frame, options.up);
-    let sizes = Sizes::of(mesh);
-    let primitives: Vec<Value> = (0..parts.len()).map(primitive).collect();
+fn document(lit: LitMesh<'_>, parts: &[Part], options: &MeshOptions) -> Value {
+    let nodes = nodes(lit.frame, options.up);
+    let sizes = Sizes::of(lit);
+    let names = &ATTRIBUTES[..sizes.attributes];
+    let primitives = (0..parts.len()).map(|part| primitive(names, part));
+    let primitives: Vec<Value> = primitives.collect();
     let materials: Vec<Value> = parts.iter().map(|part| material(part.finish)).collect();
+    let mut extras = json!({
+        "exposure_ev": options.color.exposure_ev,
+        "emission_scale": options.emission_scale,
+        "radiance": "linear, W/(sr m^2)",
+        "irradiance": "linear, W/m^2",
+    });
+    if lit.harmonics.is_some() {
+        extras["spherical_harmonics"] = json!(HARMONICS_MEANING);
+    }
     json!({
         "asset": {
             "version": "2.0",
@@ -199,21 +233,16 @@ fn document(mesh: &DisplayMesh, parts: &[Part], frame: &Frame, options: &MeshOpt
         "meshes": [{
             "name": "lit mesh",
             "primitives": primitives,
-            "extras": {
-                "exposure_ev": options.color.exposure_ev,
-                "emission_scale": options.emission_scale,
-                "radiance": "linear, W/(sr m^2)",
-                "irradiance": "linear, W/m^2",
-            },
+            "extras": extras,
         }],
         "materials": materials,
-        "accessors": accessors(mesh, parts, frame),
+        "accessors": accessors(lit, parts),
         "bufferViews": [
             {
                 "buffer": 0,
                 "byteOffset": 0,
                 "byteLength": sizes.vertices_length(),
-                "byteStride": VERTEX_BYTES,
+                "byteStride": sizes.vertex_bytes(),
                 "target": ARRAY_BUFFER,
             },
             {
@@ -259,24 +288,24 @@ fn material(finish: Finish) -> Value {
     })
 }
 
-/// The triangles of a part.
-fn primitive(part: usize) -> Value {
-    let attributes: serde_json::Map<String, Value> = ATTRIBUTES
+/// The triangles of a part, whose vertices have attributes of these names.
+fn primitive(names: &[&str], part: usize) -> Value {
+    let attributes: serde_json::Map<String, Value> = names
         .iter()
         .enumerate()
         .map(|(accessor, name)| ((*name).to_owned(), json!(accessor)))
         .collect();
-    json!({ "attributes": attributes, "indices": ATTRIBUTES.len() + part, "material": part })
+    json!({ "attributes": attributes, "indices": names.len() + part, "material": part })
 }
 
-/// One for each of [`ATTRIBUTES`], then the indices of each part.
-fn accessors(mesh: &DisplayMesh, parts: &[Part], frame: &Frame) -> Vec<Value> {
-    let sizes = Sizes::of(mesh);
-    let mut accessors: Vec<Value> = (0..ATTRIBUTES.len())
+/// One for each attribute, then the indices of each part.
+fn accessors(lit: LitMesh<'_>, parts: &[Part]) -> Vec<Value> {
+    let sizes = Sizes::of(lit);
+    let mut accessors: Vec<Value> = (0..sizes.attributes as u64)
         .map(|attribute| {
             json!({
                 "bufferView": 0,
-                "byteOffset": 12 * attribute,
+                "byteOffset": ATTRIBUTE_BYTES * attribute,
                 "componentType": FLOAT,
                 "count": sizes.vertices,
                 "type": "VEC3",
@@ -285,8 +314,8 @@ fn accessors(mesh: &DisplayMesh, parts: &[Part], frame: &Frame) -> Vec<Value> {
         .collect();
     let mut least = Vec3::MAX;
     let mut most = Vec3::MIN;
-    for &position in &mesh.positions {
-        let place = from_node(position, frame);
+    for &position in &lit.snapshot.mesh.positions {
+        let place = from_node(position, lit.frame);
         least = least.min(place);
         most = most.max(place);
     }
@@ -320,6 +349,7 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::{super::mesh::tests::triangle, *};
+    use crate::{geometry::Harmonics, solver::Snapshot};
 
     const FAR: Frame = Frame {
         centre: DVec3::new(4.0e6, -1.0e7, 0.125),
@@ -341,8 +371,21 @@ mod tests {
     }
 
     fn glb(snapshot: &Snapshot, options: &MeshOptions) -> (Value, Vec<u8>) {
+        glb_with(snapshot, options, None)
+    }
+
+    fn glb_with(
+        snapshot: &Snapshot,
+        options: &MeshOptions,
+        harmonics: Option<&[Harmonics]>,
+    ) -> (Value, Vec<u8>) {
         let mut bytes = Vec::new();
-        write_glb(&mut bytes, snapshot, &FAR, options).unwrap();
+        let lit = LitMesh {
+            snapshot,
+            frame: &FAR,
+            harmonics,
+        };
+        write_glb(&mut bytes, lit, options).unwrap();
         chunks(&bytes)
     }
 
@@ -478,7 +521,7 @@ mod tests {
             ];
         });
         let file = glb(&broken, &MeshOptions::default());
-        for name in ATTRIBUTES {
+        for name in &ATTRIBUTES[..PLAIN_ATTRIBUTES] {
             assert!(attribute(&file, name).iter().all(|value| value.is_finite()));
         }
         let normals = attribute(&file, "NORMAL");
@@ -487,6 +530,32 @@ mod tests {
         for color in attribute(&file, "COLOR_0") {
             assert_eq!(color.clamp(*unit.start(), *unit.end()), color);
         }
+    }
+
+    #[test]
+    fn light_by_direction_follows_where_it_is_asked_for() {
+        let value = |vertex: usize, order: usize| Vec3::new(vertex as f32, -(order as f32), 0.5);
+        let harmonics = [0, 1, 2].map(|vertex| Harmonics([0, 1, 2, 3].map(|k| value(vertex, k))));
+        let options = MeshOptions {
+            emission_scale: 2.0,
+            ..MeshOptions::default()
+        };
+        let file = glb_with(&triangle(), &options, Some(&harmonics));
+        for order in 0..4 {
+            let found = attribute(&file, &format!("_SH{order}"));
+            assert_eq!(found, [0, 1, 2].map(|vertex| 2.0 * value(vertex, order)));
+        }
+        let plain = glb(&triangle(), &options);
+        assert_eq!(
+            attribute(&file, "_RADIANCE"),
+            attribute(&plain, "_RADIANCE")
+        );
+        let (primitive, mesh) = (&file.0["meshes"][0]["primitives"][0], &plain.0["meshes"][0]);
+        let indices = primitive["indices"].as_u64().unwrap() as usize;
+        assert_eq!(file.0["accessors"][indices]["count"], 3);
+        assert!(file.0["meshes"][0]["extras"]["spherical_harmonics"].is_string());
+        assert!(mesh["extras"]["spherical_harmonics"].is_null());
+        assert!(mesh["primitives"][0]["attributes"]["_SH0"].is_null());
     }
 
     #[test]
@@ -515,6 +584,7 @@ mod tests {
         let sizes = |vertices, triangles| Sizes {
             vertices,
             triangles,
+            attributes: PLAIN_ATTRIBUTES,
         };
         assert_eq!(sizes(3, 1).file_length(1000), Ok(28 + 1000 + 180 + 12));
         for (vertices, triangles) in [(1 << 27, 1), (3, 1 << 29), (1 << 32, 1)] {
@@ -523,7 +593,12 @@ mod tests {
         }
         let mut bytes = Vec::new();
         let options = MeshOptions::default();
-        let empty = write_glb(&mut bytes, &Snapshot::default(), &FAR, &options).unwrap_err();
+        let lit = LitMesh {
+            snapshot: &Snapshot::default(),
+            frame: &FAR,
+            harmonics: None,
+        };
+        let empty = write_glb(&mut bytes, lit, &options).unwrap_err();
         assert_eq!(empty.to_string(), GlbError::Empty.to_string());
         assert!(bytes.is_empty());
     }

@@ -8,7 +8,26 @@ use std::{
 use glam::Vec3;
 
 use super::ColorOptions;
-use crate::{scene::UpAxis, solver::Snapshot};
+use crate::{
+    geometry::Harmonics,
+    scene::{Frame, UpAxis},
+    solver::Snapshot,
+};
+
+/// A lit mesh to be written.
+#[derive(Clone, Copy, Debug)]
+pub struct LitMesh<'a> {
+    /// Mesh and light.
+    pub snapshot: &'a Snapshot,
+    /// Of the scene.
+    pub frame: &'a Frame,
+    /// Light by direction at its vertices, where that is asked for.
+    pub harmonics: Option<&'a [Harmonics]>,
+}
+
+/// What the coefficients of light by direction are, in a sentence for files.
+pub(super) const HARMONICS_MEANING: &str = "incident radiance, linear, W/m^2: integral of L Y over the hemisphere of the vertex normal, \
+     in the axes of the positions; Y = 0.282095, 0.488603 y, 0.488603 z, 0.488603 x";
 
 /// Options of an exported mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,19 +59,26 @@ pub(super) struct Light {
     pub(super) radiance: Vec3,
     /// Arriving, W·m⁻².
     pub(super) irradiance: Vec3,
+    /// The same by direction, as [`Harmonics`]; of either sign.
+    pub(super) harmonics: Option<[Vec3; 4]>,
 }
 
 impl Light {
-    /// Light at the vertex of this index; dark where the snapshot knows none.
-    pub(super) fn at(snapshot: &Snapshot, index: usize, options: &MeshOptions) -> Self {
-        let mesh = &snapshot.mesh;
-        let arriving = snapshot.light.irradiance.get(index).copied();
+    /// Light at the vertex of this index; dark where none is known.
+    pub(super) fn at(lit: LitMesh<'_>, index: usize, options: &MeshOptions) -> Self {
+        let mesh = &lit.snapshot.mesh;
+        let arriving = lit.snapshot.light.irradiance.get(index).copied();
         let irradiance = presentable(arriving.unwrap_or_default());
         let radiance = mesh.emission[index] + mesh.reflectance[index] * irradiance * FRAC_1_PI;
         let scale = [options.emission_scale, options.radiance_unit].map(f64::from);
         Self {
             radiance: scaled(radiance, scale),
             irradiance: scaled(irradiance, scale),
+            harmonics: lit.harmonics.map(|harmonics| {
+                let Harmonics(values) = harmonics.get(index).copied().unwrap_or_default();
+                let scaled = |value: Vec3| scaled(value, scale) - scaled(-value, scale);
+                values.map(scaled)
+            }),
         }
     }
 }
@@ -77,8 +103,16 @@ pub(super) fn write_vector(out: &mut dyn Write, vector: Vec3) -> io::Result<()> 
 pub(super) mod tests {
     use std::{f32::consts::PI, sync::Arc};
 
+    use glam::DVec3;
+
     use super::*;
     use crate::solver::{DisplayMesh, VertexLight};
+
+    /// World units about the origin.
+    pub(in crate::export) const UNMOVED: Frame = Frame {
+        centre: DVec3::ZERO,
+        scale: 1.0,
+    };
 
     /// One triangle that reflects half of an irradiance of π; its second corner emits 1.
     pub(in crate::export) fn triangle() -> Snapshot {
@@ -111,7 +145,12 @@ pub(super) mod tests {
             emission_scale: 2.0,
             ..MeshOptions::default()
         };
-        let light = Light::at(&triangle(), 1, &options);
+        let lit = LitMesh {
+            snapshot: &triangle(),
+            frame: &UNMOVED,
+            harmonics: None,
+        };
+        let light = Light::at(lit, 1, &options);
         assert!((light.irradiance.x - 2.0 * PI).abs() < 1e-5);
         assert!((light.radiance.x - 3.0).abs() < 1e-5);
         for (value, expected) in [(f32::NAN, 0.0), (-1.0, 0.0), (f32::INFINITY, f32::MAX)] {

@@ -5,8 +5,7 @@ use std::{
     path::Path,
 };
 
-use super::{MeshOptions, glb::write_glb, ply::write_ply};
-use crate::{scene::Frame, solver::Snapshot};
+use super::{MeshOptions, glb::write_glb, mesh::LitMesh, ply::write_ply};
 
 /// A file format of lit meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,20 +48,19 @@ impl MeshFormat {
             .ok_or_else(|| UnknownMeshFormat(path.display().to_string()))
     }
 
-    /// Write the display mesh of a snapshot.
+    /// Write a lit mesh.
     ///
     /// # Errors
     /// Those of `out`, and one sentence where the mesh does not fit into the format.
     pub fn write(
         self,
         out: &mut dyn Write,
-        snapshot: &Snapshot,
-        frame: &Frame,
+        lit: LitMesh<'_>,
         options: &MeshOptions,
     ) -> io::Result<()> {
         match self {
-            Self::Ply => write_ply(out, snapshot, frame, options),
-            Self::Glb => write_glb(out, snapshot, frame, options),
+            Self::Ply => write_ply(out, lit, options),
+            Self::Glb => write_glb(out, lit, options),
         }
     }
 }

@@ -9,7 +9,7 @@ mod ply;
 mod table;
 
 pub use color::{ColorOptions, ToneMap};
-pub use mesh::MeshOptions;
+pub use mesh::{LitMesh, MeshOptions};
 pub use mesh_format::{MeshFormat, UnknownMeshFormat};
 pub use plot::{Curve, CurvePlot};
 pub use table::write_csv;

@@ -40,6 +40,8 @@ pub struct PanelState {
     pub picture_text: String,
     /// The typed path of the lit mesh.
     pub mesh_text: String,
+    /// Whether the lit mesh has light by direction.
+    pub mesh_has_harmonics: bool,
     /// Size of a picture in pixels.
     pub picture_size: [u32; 2],
     /// Whether a picture has no background.
@@ -161,6 +163,7 @@ impl Default for PanelState {
             path_is_asked: false,
             picture_text: String::new(),
             mesh_text: String::new(),
+            mesh_has_harmonics: false,
             picture_size: [1920, 1080],
             picture_is_transparent: false,
             table: false,

@@ -15,11 +15,13 @@ use super::{
     render::{CutoutTarget, Gpu, ReadError, Target},
 };
 use crate::{
-    export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    export::{self, MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    geometry::RayTree,
     metrics::SceneComparison,
-    scene::{Frame, folder_of, write_whole},
-    solver::Snapshot,
-    worker::Wake,
+    picture::harmonics_at_vertices,
+    scene::{Scene, folder_of, write_whole},
+    solver::{Cancel, Snapshot},
+    worker::{self, Wake},
 };
 
 /// A sentence from another thread.
@@ -110,8 +112,12 @@ pub enum Content {
 pub struct LitMesh {
     /// Mesh and light.
     pub snapshot: Arc<Snapshot>,
-    /// Of the scene.
-    pub frame: Frame,
+    /// Their scene, and all of its triangles.
+    pub scene: Arc<Scene>,
+    /// See above.
+    pub rays: Arc<RayTree>,
+    /// Whether light by direction is added, and the seed of its random numbers.
+    pub harmonics: Option<u64>,
     /// Options of the file.
     pub options: MeshOptions,
 }
@@ -119,10 +125,20 @@ pub struct LitMesh {
 impl LitMesh {
     fn save(&self, path: &Path) -> Result<(), SaveError> {
         let format = MeshFormat::of(path)?;
-        write_whole(path, |out| {
-            format.write(out, &self.snapshot, &self.frame, &self.options)
-        })
-        .map_err(SaveError::Write)
+        let harmonics = self.harmonics.and_then(|seed| {
+            let (scene, rays, snapshot) = (&self.scene, &self.rays, &self.snapshot);
+            let work = || harmonics_at_vertices(scene, rays, snapshot, seed, &Cancel::default());
+            match worker::pool_that_gives_way("harmonics", 0) {
+                Some(pool) => pool.install(work),
+                None => work(),
+            }
+        });
+        let lit = export::LitMesh {
+            snapshot: &self.snapshot,
+            frame: &self.scene.frame,
+            harmonics: harmonics.as_deref(),
+        };
+        write_whole(path, |out| format.write(out, lit, &self.options)).map_err(SaveError::Write)
     }
 }
 

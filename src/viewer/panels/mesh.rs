@@ -13,13 +13,19 @@ use crate::{
 /// Show the dialog where it is open; requested actions go into `actions`.
 pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let text = &mut state.panels.mesh_text;
+    let has_harmonics = &mut state.panels.mesh_has_harmonics;
     dialog(ctx, "Export lit mesh", &mut state.panels.mesh, |ui| {
-        mesh_ui(ui, text, actions)
+        mesh_ui(ui, text, has_harmonics, actions)
     });
 }
 
 /// Format and place; whether it was confirmed.
-fn mesh_ui(ui: &mut egui::Ui, text: &mut String, actions: &mut Vec<Action>) -> bool {
+fn mesh_ui(
+    ui: &mut egui::Ui,
+    text: &mut String,
+    has_harmonics: &mut bool,
+    actions: &mut Vec<Action>,
+) -> bool {
     let present = MeshFormat::of(Path::new(text.trim()));
     ui.horizontal(|ui| {
         ui.label("Format");
@@ -34,6 +40,9 @@ fn mesh_ui(ui: &mut egui::Ui, text: &mut String, actions: &mut Vec<Action>) -> b
         }
     });
     file_field(ui, "File", text);
+    ui.checkbox(has_harmonics, "Light by direction").on_hover_text(
+        "Adds to each vertex the light that arrives, as first-order spherical harmonics: four colours, found by rays",
+    );
     ui.weak("Exposure and up axis are those of the view, in a PLY the tone map, too.");
     let hint = "The name must end in .ply or .glb.";
     let confirmed = confirm(ui, "Export", present.is_ok(), hint);
