@@ -6,6 +6,7 @@
 //! Needs no graphics adapter; on all processors, and the same bits on any number of them.
 
 mod film;
+mod gloss;
 mod incoming;
 mod lamps;
 mod lens;
@@ -17,6 +18,7 @@ mod surface;
 mod turn;
 
 pub use film::Developed;
+pub use gloss::{GLOSS_LAMPS, GlossLamp, GlossLight, GlossVertex, gloss_at_vertices};
 pub use incoming::harmonics_at_vertices;
 pub use lens::Lens;
 

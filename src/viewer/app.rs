@@ -22,6 +22,7 @@ use super::{
     bindings::{self, Binding},
     faults::Faults,
     focus,
+    glossing::Glossing,
     options::Options,
     panels,
     preferences::Preferences,
@@ -59,6 +60,7 @@ pub struct App {
     chosen: (Sender<Option<PathBuf>>, Receiver<Option<PathBuf>>),
     /// Since when the file dialog is open.
     dialog_since: Option<Instant>,
+    glossing: Glossing,
     notices: (Sender<Notice>, Receiver<Notice>),
     unfinished: Unfinished,
     /// Set from the command line for the first scene only.
@@ -128,6 +130,7 @@ impl App {
             faults,
             chosen: mpsc::channel(),
             dialog_since: None,
+            glossing: Glossing::default(),
             notices: mpsc::channel(),
             unfinished: Unfinished::default(),
             first: None,
