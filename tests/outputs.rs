@@ -76,6 +76,15 @@ fn outputs_that_share_a_file_are_refused_before_the_work() {
 }
 
 #[test]
+fn light_by_direction_needs_a_mesh_to_go_with() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path());
+    let arguments = ["solve", "s.obj", "--export-sh", "--report", "r.json"];
+    assert_refused(folder.path(), &arguments, 2, "add --export FILE");
+    assert!(!folder.path().join("r.json").exists());
+}
+
+#[test]
 fn files_of_the_scene_are_not_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();

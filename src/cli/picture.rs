@@ -36,6 +36,9 @@ pub struct ViewFlags {
     /// Draw the edges of the elements
     #[arg(long, help_heading = "Picture")]
     pub edges: bool,
+    /// Leave out what mirrors, gloss and glass send to the eye where light at vertices is drawn
+    #[arg(long, help_heading = "Picture")]
+    pub no_gloss: bool,
     /// Logarithmic scale for false colours
     #[arg(long, help_heading = "Picture")]
     pub logarithmic: bool,
@@ -87,6 +90,7 @@ impl ViewFlags {
             logarithmic: self.logarithmic,
             fixed_range: self.range.map(|range| range.0),
             edges: self.edges,
+            lacks_gloss: self.no_gloss,
             clusters: self.clusters.map(|clusters| clusters.0),
         }
     }

@@ -25,10 +25,12 @@ use super::{
 };
 use crate::{
     export::{LitMesh, MeshFormat, MeshOptions},
+    geometry::RayTree,
     metrics::ErrorMeasures,
+    picture::harmonics_at_vertices,
     reference::MatrixError,
     scene::Scene,
-    solver::{LampLight, Note, Snapshot, StepReport},
+    solver::{Cancel, LampLight, Note, Snapshot, StepReport},
     worker::{Event, StopReason, WorkerHandle},
 };
 
@@ -55,6 +57,9 @@ pub struct SolveArguments {
     /// Export the light of each lamp by itself, too: of each material that emits, the sky and the sun (.ply or .glb)
     #[arg(long, requires = "export", help_heading = "Output")]
     pub export_lamps: bool,
+    /// Export the light that arrives at each vertex by direction, too, as first-order spherical harmonics (.ply or .glb)
+    #[arg(long, help_heading = "Output")]
+    pub export_sh: bool,
     /// Write the report (JSON; - for standard output)
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub report: Option<PathBuf>,
@@ -218,11 +223,19 @@ fn errors_of(
 fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
     if let Some(path) = &arguments.export {
         let format = MeshFormat::of(path).map_err(|error| UsageError(error.to_string()))?;
-        if arguments.export_lamps && !format.holds_lamps() {
-            let message = "--export-lamps needs a file that ends in .ply or .glb: OBJ has room for one colour";
-            bail!(UsageError(message.to_owned()));
+        for (flag, is_asked) in [
+            ("--export-lamps", arguments.export_lamps),
+            ("--export-sh", arguments.export_sh),
+        ] {
+            if is_asked && !format.holds_attributes() {
+                let reason = "needs a file that ends in .ply or .glb: OBJ has room for one colour";
+                bail!(UsageError(format!("{flag} {reason}")));
+            }
         }
         output::check(path)?;
+    } else if arguments.export_sh {
+        let message = "--export-sh adds to the exported mesh: add --export FILE.glb or FILE.ply";
+        bail!(UsageError(message.to_owned()));
     }
     #[cfg(feature = "viewer")]
     {
@@ -424,17 +437,22 @@ fn write_export(arguments: &SolveArguments, scene: &Scene, run: &Run) -> Result<
         ..arguments.run_flags.export(scene.up, scene.radiance_unit)
     };
     let format = MeshFormat::of(path)?;
+    let harmonics = || {
+        let (rays, seed) = (RayTree::new(scene), arguments.setting_flags.settings().seed);
+        harmonics_at_vertices(scene, &rays, &run.snapshot, seed, &Cancel::default())
+    };
+    let harmonics = arguments.export_sh.then(harmonics).flatten();
     let lit = LitMesh {
         snapshot: &run.snapshot,
         scene,
-        options: &export,
+        harmonics: harmonics.as_deref(),
         lamps: &run.lamps,
     };
     if let Some(companions) = format.companions(path, scene)? {
         let written = companions.write(scene);
         written.with_context(|| format!("cannot write the materials beside {}", path.display()))?;
     }
-    output::write_whole(path, |out| format.write(out, path, lit))
+    output::write_whole(path, |out| format.write(out, path, lit, &export))
 }
 
 fn write_report(

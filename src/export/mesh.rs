@@ -9,9 +9,38 @@ use glam::Vec3;
 
 use super::ColorOptions;
 use crate::{
+    geometry::Harmonics,
     scene::{Scene, UpAxis},
     solver::{Lamp, LampLight, Snapshot},
 };
+
+/// A lit mesh to be written.
+#[derive(Clone, Copy, Debug)]
+pub struct LitMesh<'a> {
+    /// Mesh and light.
+    pub snapshot: &'a Snapshot,
+    /// The scene that it shows.
+    pub scene: &'a Scene,
+    /// Light by direction at its vertices, where that is asked for.
+    pub harmonics: Option<&'a [Harmonics]>,
+    /// The light of each of its lamps, where that is asked for.
+    pub lamps: &'a [LampLight],
+}
+
+impl LitMesh<'_> {
+    /// What a lamp is called.
+    pub(super) fn lamp_name(&self, lamp: Lamp) -> &str {
+        match lamp {
+            Lamp::Material(material) => &self.scene.materials[material].name,
+            Lamp::Sky => "sky",
+            Lamp::Sun => "sun",
+        }
+    }
+}
+
+/// What the coefficients of light by direction are, in a sentence for files.
+pub(super) const HARMONICS_MEANING: &str = "incident radiance, linear, W/m^2: integral of L Y over the hemisphere of the vertex normal, \
+     in the axes of the positions; Y = 0.282095, 0.488603 y, 0.488603 z, 0.488603 x";
 
 /// Options of an exported mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,27 +57,10 @@ pub struct MeshOptions {
     pub merge: bool,
 }
 
-/// A mesh with light, to be written.
-#[derive(Clone, Copy)]
-pub struct LitMesh<'a> {
-    /// Mesh and light.
-    pub snapshot: &'a Snapshot,
-    /// The scene that it shows.
-    pub scene: &'a Scene,
-    /// How it is written.
-    pub options: &'a MeshOptions,
-    /// The light of its lamps, each by itself, where it is to be written, too.
-    pub lamps: &'a [LampLight],
-}
-
-impl LitMesh<'_> {
-    /// What a lamp is called.
-    pub(super) fn lamp_name(&self, lamp: Lamp) -> &str {
-        match lamp {
-            Lamp::Material(material) => &self.scene.materials[material].name,
-            Lamp::Sky => "sky",
-            Lamp::Sun => "sun",
-        }
+impl MeshOptions {
+    /// Factors of all light.
+    fn scale(&self) -> [f64; 2] {
+        [self.emission_scale, self.radiance_unit].map(f64::from)
     }
 }
 
@@ -70,26 +82,37 @@ pub(super) struct Light {
     pub(super) radiance: Vec3,
     /// Arriving, W·m⁻².
     pub(super) irradiance: Vec3,
+    /// The same by direction, as [`Harmonics`]; of either sign.
+    pub(super) harmonics: Option<[Vec3; 4]>,
 }
 
 impl Light {
-    /// Light at the vertex of this index; dark where the snapshot knows none.
-    pub(super) fn at(snapshot: &Snapshot, index: usize, options: &MeshOptions) -> Self {
-        let mesh = &snapshot.mesh;
+    /// Light at the vertex of this index; dark where none is known.
+    pub(super) fn at(lit: LitMesh<'_>, index: usize, options: &MeshOptions) -> Self {
+        let snapshot = lit.snapshot;
         let arriving = snapshot.light.irradiance.get(index).copied();
-        Self::of(snapshot, index, mesh.emission[index], arriving, options)
+        let emission = snapshot.mesh.emission[index];
+        let harmonics = lit.harmonics.map(|harmonics| {
+            let Harmonics(values) = harmonics.get(index).copied().unwrap_or_default();
+            let scale = options.scale();
+            values.map(|value| scaled(value, scale) - scaled(-value, scale))
+        });
+        Self {
+            harmonics,
+            ..Self::of(snapshot, index, emission, arriving, options)
+        }
     }
 
     /// That of a lamp alone.
     pub(super) fn of_lamp(
-        snapshot: &Snapshot,
+        lit: LitMesh<'_>,
         lamp: &LampLight,
         index: usize,
         options: &MeshOptions,
     ) -> Self {
         let arriving = lamp.irradiance.get(index).copied();
         let emission = lamp.emission.get(index).copied().unwrap_or_default();
-        Self::of(snapshot, index, emission, arriving, options)
+        Self::of(lit.snapshot, index, emission, arriving, options)
     }
 
     fn of(
@@ -101,10 +124,11 @@ impl Light {
     ) -> Self {
         let irradiance = presentable(arriving.unwrap_or_default());
         let radiance = emission + snapshot.mesh.reflectance[index] * irradiance * FRAC_1_PI;
-        let scale = [options.emission_scale, options.radiance_unit].map(f64::from);
+        let scale = options.scale();
         Self {
             radiance: scaled(radiance, scale),
             irradiance: scaled(irradiance, scale),
+            harmonics: None,
         }
     }
 }
@@ -129,8 +153,46 @@ pub(super) fn write_vector(out: &mut dyn Write, vector: Vec3) -> io::Result<()> 
 pub(super) mod tests {
     use std::{f32::consts::PI, sync::Arc};
 
+    use glam::DVec3;
+
     use super::*;
-    use crate::solver::{DisplayMesh, VertexLight};
+    use crate::{
+        scene::{Frame, Material, MaterialId, SceneBuilder, SceneOptions},
+        solver::{DisplayMesh, VertexLight},
+    };
+
+    /// World units about the origin.
+    pub(in crate::export) const UNMOVED: Frame = Frame {
+        centre: DVec3::ZERO,
+        scale: 1.0,
+    };
+
+    /// Triangles side by side, each of an object of this name and the material of this index, in world units.
+    pub(in crate::export) fn named_scene(triangles: &[(&str, usize)]) -> Scene {
+        let mut builder = SceneBuilder::default();
+        let count = triangles.iter().map(|(_, material)| material + 1).max();
+        for material in 0..count.unwrap_or(1) {
+            let name = format!("material {material}");
+            builder.push_material(Material::plain(&name, Vec3::splat(0.5), Vec3::ZERO));
+        }
+        for (place, (name, material)) in triangles.iter().enumerate() {
+            let x = 2.0 * place as f64;
+            let corners = [[x, 0.0], [x + 1.0, 0.0], [x, 1.0]];
+            let corners = corners.map(|[x, y]| builder.push_position(DVec3::new(x, y, 0.0)));
+            builder.objects.push(((*name).into(), builder.faces.len()));
+            builder.push_triangle(corners, MaterialId(*material as u32));
+        }
+        let mut scene = builder.finish(&SceneOptions::default()).unwrap();
+        scene.frame = UNMOVED;
+        scene
+    }
+
+    /// The scene of [`triangle`] in a frame.
+    pub(in crate::export) fn scene_in(frame: Frame) -> Scene {
+        let mut scene = named_scene(&[("", 0)]);
+        scene.frame = frame;
+        scene
+    }
 
     /// One triangle that reflects half of an irradiance of π; its second corner emits 1.
     pub(in crate::export) fn triangle() -> Snapshot {
@@ -163,7 +225,13 @@ pub(super) mod tests {
             emission_scale: 2.0,
             ..MeshOptions::default()
         };
-        let light = Light::at(&triangle(), 1, &options);
+        let lit = LitMesh {
+            snapshot: &triangle(),
+            scene: &scene_in(UNMOVED),
+            harmonics: None,
+            lamps: &[],
+        };
+        let light = Light::at(lit, 1, &options);
         assert!((light.irradiance.x - 2.0 * PI).abs() < 1e-5);
         assert!((light.radiance.x - 3.0).abs() < 1e-5);
         for (value, expected) in [(f32::NAN, 0.0), (-1.0, 0.0), (f32::INFINITY, f32::MAX)] {

@@ -5,7 +5,7 @@ use std::{
     path::Path,
 };
 
-use super::{LitMesh, glb::write_glb, obj::write_obj, ply::write_ply};
+use super::{LitMesh, MeshOptions, glb::write_glb, obj::write_obj, ply::write_ply};
 use crate::scene::{MaterialLibrary, Scene};
 
 /// A file format of lit meshes.
@@ -37,8 +37,8 @@ impl MeshFormat {
         }
     }
 
-    /// Whether it has room for the light of single lamps.
-    pub const fn holds_lamps(self) -> bool {
+    /// Whether vertices have room for more than a colour: the light of single lamps, and light by direction.
+    pub const fn holds_attributes(self) -> bool {
         match self {
             Self::Ply | Self::Glb => true,
             Self::Obj => false,
@@ -71,21 +71,24 @@ impl MeshFormat {
         }
     }
 
-    /// Write a mesh into the file of this path, whose companions are written already.
+    /// Write a lit mesh into the file of this path, whose companions are written already.
     ///
     /// # Errors
     /// Those of `out`, and one sentence where the mesh does not fit into the format.
-    pub fn write(self, out: &mut dyn Write, path: &Path, lit: LitMesh<'_>) -> io::Result<()> {
-        let LitMesh {
-            snapshot,
-            scene,
-            options,
-            ..
-        } = lit;
+    pub fn write(
+        self,
+        out: &mut dyn Write,
+        path: &Path,
+        lit: LitMesh<'_>,
+        options: &MeshOptions,
+    ) -> io::Result<()> {
         match self {
-            Self::Ply => write_ply(out, snapshot, &scene.frame, options),
-            Self::Glb => write_glb(out, snapshot, &scene.frame, options),
-            Self::Obj => write_obj(out, lit, &MaterialLibrary::beside(path, scene)?),
+            Self::Ply => write_ply(out, lit, options),
+            Self::Glb => write_glb(out, lit, options),
+            Self::Obj => {
+                let library = MaterialLibrary::beside(path, lit.scene)?;
+                write_obj(out, lit, options, &library)
+            }
         }
     }
 }

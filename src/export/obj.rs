@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use glam::Vec3;
 
 use super::{
-    LitMesh,
+    LitMesh, MeshOptions,
     mesh::Light,
     parts::{ObjectParts, Part, by_object},
 };
@@ -22,15 +22,10 @@ use crate::scene::{MaterialLibrary, ObjectName, coordinates, write_name};
 pub(super) fn write_obj(
     out: &mut dyn Write,
     lit: LitMesh<'_>,
+    options: &MeshOptions,
     library: &MaterialLibrary,
 ) -> io::Result<()> {
-    let LitMesh {
-        snapshot,
-        scene,
-        options,
-        ..
-    } = lit;
-    let mesh = &*snapshot.mesh;
+    let (mesh, scene) = (&*lit.snapshot.mesh, lit.scene);
     let color = &options.color;
     writeln!(out, "# vecrad {}", env!("CARGO_PKG_VERSION"))?;
     writeln!(
@@ -43,7 +38,7 @@ pub(super) fn write_obj(
     writeln!(out, "mtllib {}", library.name())?;
     for (index, &position) in mesh.positions.iter().enumerate() {
         let [x, y, z] = coordinates(&scene.frame, position);
-        let radiance = Light::at(snapshot, index, options).radiance;
+        let radiance = Light::at(lit, index, options).radiance;
         let Vec3 { x: r, y: g, z: b } = color.displayed(radiance);
         writeln!(out, "v {x} {y} {z} {r:.5} {g:.5} {b:.5}")?;
     }
@@ -57,8 +52,8 @@ pub(super) fn write_obj(
     let has_texcoords = !mesh.texcoords.is_empty();
     let mut before: Option<&ObjectName> = None;
     let mut material = None;
-    for ObjectParts { name, parts } in by_object(mesh, scene) {
-        if !options.merge && before != Some(name) {
+    for ObjectParts { name, parts } in by_object(mesh, scene, options.merge) {
+        if let Some(name) = name {
             write_name(out, name, before)?;
             before = Some(name);
         }

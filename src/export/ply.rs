@@ -1,6 +1,7 @@
 //! Binary PLY of the display mesh with light at its vertices.
 //!
-//! Per vertex: position in world units, normal, tone-mapped sRGB, linear radiance and irradiance. MeshLab, Blender and
+//! Per vertex: position in world units, normal, tone-mapped sRGB, linear radiance and irradiance, and light by direction where
+//! that is asked for. MeshLab, Blender and
 //! CloudCompare show the bytes; tools that compute read the floats. Positions are floats, too, where these hold the shape,
 //! else doubles: coordinates of surveyors have seven digits before the point.
 
@@ -11,33 +12,37 @@ use rayon::prelude::*;
 
 use super::{
     MeshOptions,
-    mesh::{Light, write_vector},
+    mesh::{HARMONICS_MEANING, Light, LitMesh, write_vector},
 };
-use crate::{
-    scene::Frame,
-    solver::{DisplayMesh, Snapshot},
-};
+use crate::{scene::Frame, solver::DisplayMesh};
 
-/// Write the display mesh of a snapshot in world units.
+/// Write a lit mesh in world units.
 ///
 /// # Errors
 /// Those of `out`.
 pub(super) fn write_ply(
     out: &mut dyn Write,
-    snapshot: &Snapshot,
-    frame: &Frame,
+    lit: LitMesh<'_>,
     options: &MeshOptions,
 ) -> io::Result<()> {
-    let mesh = &snapshot.mesh;
+    let (mesh, frame) = (&lit.snapshot.mesh, &lit.scene.frame);
     let coordinate = Coordinate::holding(mesh, frame);
-    out.write_all(header(mesh, frame, coordinate, options).as_bytes())?;
+    out.write_all(header(lit, coordinate, options).as_bytes())?;
     for (index, &position) in mesh.positions.iter().enumerate() {
-        let light = Light::at(snapshot, index, options);
+        let light = Light::at(lit, index, options);
         coordinate.write(out, frame.to_world(position))?;
         write_vector(out, mesh.normals[index])?;
         out.write_all(&options.color.encode(light.radiance))?;
         write_vector(out, light.radiance)?;
         write_vector(out, light.irradiance)?;
+        for coefficient in light.harmonics.into_iter().flatten() {
+            write_vector(out, coefficient)?;
+        }
+        for lamp in lit.lamps {
+            let light = Light::of_lamp(lit, lamp, index, options);
+            write_vector(out, light.radiance)?;
+            write_vector(out, light.irradiance)?;
+        }
     }
     for corners in &mesh.indices {
         out.write_all(&[3])?;
@@ -47,6 +52,12 @@ pub(super) fn write_ply(
     }
     Ok(())
 }
+
+/// Properties of light by direction.
+const HARMONICS_NAMES: [&str; 12] = [
+    "sh0_r", "sh0_g", "sh0_b", "sh1_r", "sh1_g", "sh1_b", "sh2_r", "sh2_g", "sh2_b", "sh3_r",
+    "sh3_g", "sh3_b",
+];
 
 /// The type of positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,12 +110,8 @@ impl Coordinate {
     }
 }
 
-fn header(
-    mesh: &DisplayMesh,
-    frame: &Frame,
-    coordinate: Coordinate,
-    options: &MeshOptions,
-) -> String {
+fn header(lit: LitMesh<'_>, coordinate: Coordinate, options: &MeshOptions) -> String {
+    let (mesh, frame) = (&lit.snapshot.mesh, &lit.scene.frame);
     let (vertex_count, face_count) = (mesh.positions.len(), mesh.indices.len());
     let tone_map = options.color.tone_map.name();
     let properties = |kind: &str, names: &[&str]| -> String {
@@ -123,14 +130,32 @@ fn header(
             )
         }
     };
+    let (meaning, harmonics) = match lit.harmonics {
+        None => Default::default(),
+        Some(_) => (
+            format!("comment sh {HARMONICS_MEANING}\n"),
+            properties("float", &HARMONICS_NAMES),
+        ),
+    };
+    let (mut lamps, mut of_lamps) = (String::new(), String::new());
+    for (number, lamp) in lit.lamps.iter().enumerate() {
+        // A name may hold anything but the end of a line.
+        let name = lit.lamp_name(lamp.lamp).replace(char::is_control, " ");
+        lamps += &format!("comment lamp {number} {name}\n");
+        for quantity in ["radiance", "irradiance"] {
+            for channel in ["r", "g", "b"] {
+                of_lamps += &format!("property float lamp{number}_{quantity}_{channel}\n");
+            }
+        }
+    }
     format!(
         "ply\nformat binary_little_endian 1.0\n\
          comment vecrad {version}\n\
          comment exposure {exposure} EV, tone curve {tone_map}, colours sRGB\n\
          comment radiance linear W/(sr m^2), irradiance linear W/m^2, lengths in units of the scene\n\
-         comment up axis {up}\n{origin}\
+         comment up axis {up}\n{meaning}{lamps}{origin}\
          element vertex {vertex_count}\n{position}{normal}\
-         property uchar red\nproperty uchar green\nproperty uchar blue\n{light}\
+         property uchar red\nproperty uchar green\nproperty uchar blue\n{light}{harmonics}{of_lamps}\
          element face {face_count}\nproperty list uchar int vertex_indices\nend_header\n",
         version = env!("CARGO_PKG_VERSION"),
         exposure = options.color.exposure_ev,
@@ -153,9 +178,16 @@ fn header(
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
+    use glam::{DVec3, Vec3};
 
-    use super::{super::mesh::tests::triangle, *};
+    use super::{
+        super::mesh::tests::{UNMOVED, scene_in, triangle},
+        *,
+    };
+    use crate::{
+        geometry::Harmonics,
+        solver::{Lamp, LampLight},
+    };
 
     #[test]
     fn radiance_is_emission_plus_reflected_irradiance_over_pi_in_world_units() {
@@ -164,7 +196,13 @@ mod tests {
             scale: 2.0,
         };
         let mut bytes = Vec::new();
-        write_ply(&mut bytes, &triangle(), &frame, &MeshOptions::default()).unwrap();
+        let lit = LitMesh {
+            snapshot: &triangle(),
+            scene: &scene_in(frame),
+            harmonics: None,
+            lamps: &[],
+        };
+        write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
         let end = b"end_header\n";
         let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
         let body = &bytes[start..];
@@ -180,11 +218,68 @@ mod tests {
         );
     }
 
+    #[test]
+    fn light_by_direction_follows_where_it_is_asked_for() {
+        let harmonics = [Harmonics([0.0, 1.0, -2.0, 3.0].map(Vec3::splat)); 3];
+        let mut bytes = Vec::new();
+        let lit = LitMesh {
+            snapshot: &triangle(),
+            scene: &scene_in(UNMOVED),
+            harmonics: Some(&harmonics),
+            lamps: &[],
+        };
+        write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.contains("property float sh3_b\nelement face"));
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        let body = &bytes[start..];
+        assert_eq!(body.len(), 3 * (12 * 4 + 3 + 48) + 13);
+        let float = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
+        let found = [0, 1, 2, 3].map(|order| float(51 + 12 * order));
+        assert_eq!(found, [0.0, 1.0, -2.0, 3.0]);
+    }
+
+    #[test]
+    fn the_light_of_each_lamp_follows_with_its_name() {
+        let lamp = |lamp: Lamp, irradiance: f32| LampLight {
+            lamp,
+            irradiance: vec![Vec3::splat(irradiance); 3],
+            emission: vec![Vec3::ZERO; 3],
+        };
+        let lamps = [lamp(Lamp::Material(0), 1.0), lamp(Lamp::Sky, 2.0)];
+        let mut bytes = Vec::new();
+        let lit = LitMesh {
+            snapshot: &triangle(),
+            scene: &scene_in(UNMOVED),
+            harmonics: None,
+            lamps: &lamps,
+        };
+        write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.contains("comment lamp 0 material 0\ncomment lamp 1 sky\n"));
+        assert!(text.contains("property float lamp1_irradiance_b\nelement face"));
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        let body = &bytes[start..];
+        assert_eq!(body.len(), 3 * (12 * 4 + 3 + 48) + 13);
+        let float = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
+        assert_eq!([63, 87].map(float), [1.0, 2.0], "irradiance of each");
+        let reflected = 0.5 / std::f32::consts::PI;
+        assert!((float(51) - reflected).abs() < 1e-6, "{}", float(51));
+    }
+
     /// Header and positions of the triangle in a frame about a place, where a frame unit is half a unit of the world.
     fn written_at(centre: DVec3) -> (String, Vec<DVec3>) {
         let frame = Frame { centre, scale: 2.0 };
         let mut bytes = Vec::new();
-        write_ply(&mut bytes, &triangle(), &frame, &MeshOptions::default()).unwrap();
+        let lit = LitMesh {
+            snapshot: &triangle(),
+            scene: &scene_in(frame),
+            harmonics: None,
+            lamps: &[],
+        };
+        write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
         let end = b"end_header\n";
         let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
         let header = String::from_utf8(bytes[..start].to_vec()).unwrap();

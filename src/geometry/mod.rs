@@ -1,6 +1,7 @@
 //! Shapes and rays: area vectors, the exact irradiance of a polygon, sampling, occlusion.
 //! Everything here is in frame units and knows nothing of light.
 
+mod harmonics;
 mod lanes;
 mod mirrors;
 mod panes;
@@ -10,14 +11,15 @@ mod reflections;
 mod sampling;
 mod wide;
 
+pub use harmonics::Harmonics;
 pub use lanes::Vectors4;
 pub use mirrors::{Image, Mirrors};
 pub use polygon::{irradiance_vector, outline_irradiance, point_irradiance, point_irradiances};
 pub use rays::{Hit, Passage, RAY_OFFSET, RayTree};
 pub use reflections::Followed;
 pub use sampling::{
-    Random, Shuffle, SphericalTriangle, cosine_direction, low_discrepancy_1d, low_discrepancy_2d,
-    shuffled, sobol_2d, triangle_point,
+    Random, Shuffle, SphericalTriangle, cosine_direction, hemisphere_direction, low_discrepancy_1d,
+    low_discrepancy_2d, shuffled, sobol_2d, triangle_point,
 };
 
 use glam::Vec3;

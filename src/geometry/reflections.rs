@@ -29,6 +29,8 @@ pub struct Followed {
     pub length: f32,
     /// By what its light is to be multiplied, by channel.
     pub tint: Vec3,
+    /// How many mirrors reflected it.
+    pub reflections: u32,
 }
 
 impl RayTree {
@@ -41,6 +43,7 @@ impl RayTree {
             direction,
             length: 0.0,
             tint: self.tint(origin, direction, from, hit),
+            reflections: 0,
         }
     }
 
@@ -79,6 +82,7 @@ impl RayTree {
                 direction,
                 length,
                 tint,
+                reflections,
             };
         }
     }
@@ -130,6 +134,7 @@ impl RayTree {
         Some(Followed {
             length: leg.length,
             tint: leg.tint * last.tint,
+            reflections: image.legs.len() as u32,
             ..last
         })
     }

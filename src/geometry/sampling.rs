@@ -216,6 +216,15 @@ pub fn cosine_direction(normal: Vec3, square: Vec2) -> Vec3 {
     (tangent * (radius * cos) + bitangent * (radius * sin) + normal * height).normalize_or(normal)
 }
 
+/// Direction about a unit normal from a point of the unit square; all of the hemisphere are equally likely.
+pub fn hemisphere_direction(normal: Vec3, square: Vec2) -> Vec3 {
+    let height = square.x;
+    let radius = (1.0 - height * height).max(0.0).sqrt();
+    let (sin, cos) = (square.y * std::f32::consts::TAU).sin_cos();
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    (tangent * (radius * cos) + bitangent * (radius * sin) + normal * height).normalize_or(normal)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,6 +6,9 @@
 //! Needs no graphics adapter; on all processors, and the same bits on any number of them.
 
 mod film;
+mod gloss;
+mod incoming;
+mod lamps;
 mod lens;
 mod record;
 mod sampler;
@@ -15,6 +18,8 @@ mod surface;
 mod turn;
 
 pub use film::Developed;
+pub use gloss::{GLOSS_LAMPS, GlossLamp, GlossLight, GlossVertex, gloss_at_vertices};
+pub use incoming::harmonics_at_vertices;
 pub use lens::Lens;
 
 use std::{f32::consts::PI, ops::Range};
@@ -24,8 +29,6 @@ use rayon::prelude::*;
 
 use crate::{
     geometry::RayTree,
-    metrics::MeshLookup,
-    sampling::Emitters,
     scene::Scene,
     solver::{Cancel, Snapshot},
 };
@@ -103,16 +106,7 @@ pub fn trace(
     exposure: &Exposure,
     cancel: &Cancel,
 ) -> Option<Vec<Developed>> {
-    let snapshot = subject.snapshot;
-    let lit = LitScene {
-        scene: subject.scene,
-        rays: subject.rays,
-        mesh: &snapshot.mesh,
-        light: &snapshot.light,
-        lights: snapshot.lights.as_deref(),
-        lookup: MeshLookup::new(subject.scene, &snapshot.mesh),
-        emitters: Emitters::new(subject.scene),
-    };
+    let lit = LitScene::new(subject.scene, subject.rays, subject.snapshot);
     cancel.proceed()?;
     let pass = Pass {
         subject,

@@ -1,6 +1,6 @@
 //! Rays from the eye, through what they pass and over mirrors, gloss and glass, to what they show.
 
-use std::{f32::consts::FRAC_1_PI, iter};
+use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
@@ -12,7 +12,7 @@ use super::{
     turn::Lobe,
 };
 use crate::{
-    geometry::{Hit, Image},
+    geometry::Hit,
     scene::{Sky, Specular, TriangleId, luminance},
 };
 
@@ -191,7 +191,13 @@ impl Sight {
             Specular::Glass { .. } => !is_blurred,
         });
         let emitting = match leg.chosen {
-            Some(chosen) => seen.share_of_ray(&surface, leg.direction, hit.triangle, chosen),
+            Some(chosen) => {
+                let Chosen {
+                    density, length, ..
+                } = chosen;
+                let lit = seen.lit;
+                lit.share_of_ray(&surface, leg.direction, density, length)
+            }
             // The few lamps that gloss sees over curved mirrors would be specks.
             None if is_blurred => 0.0,
             None => 1.0,
@@ -349,84 +355,16 @@ impl Seen<'_> {
         }
     }
 
-    /// The share of the emission of a surface that counts where a ray of gloss meets it; the rest counts where gloss samples
-    /// emitters (the balance heuristic of Veach and Guibas, 1995).
-    fn share_of_ray(
-        &self,
-        surface: &Surface,
-        direction: Vec3,
-        triangle: TriangleId,
-        chosen: Chosen,
-    ) -> f32 {
-        let by_ray = chosen.density * -surface.flat_normal.dot(direction);
-        let by_point = self.lit.emitters.density(triangle) * chosen.length * chosen.length;
-        if by_ray > 0.0 {
-            by_ray / (by_ray + by_point)
-        } else {
-            0.0
-        }
-    }
-
     /// What gloss reflects from the sun, from a point of an emitter, and from one of its image in each mirror, as radiance; its
     /// colour apart.
     fn highlights(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
-        let images = self.lit.rays.images().iter();
-        let images = images.filter(|image| image.is_single());
-        let all = iter::once(None).chain(images.map(|image| Some(&**image)));
-        let emitters = all.map(|image| self.emitter_highlight(surface, lobe, image, chances));
-        emitters.sum::<Vec3>() + self.sun_highlight(surface, lobe, chances)
-    }
-
-    fn emitter_highlight(
-        &self,
-        surface: &Surface,
-        lobe: &Lobe,
-        image: Option<&Image>,
-        chances: &mut Chances,
-    ) -> Vec3 {
-        let (choice, square) = chances.choice();
-        let lit = self.lit;
-        let Some(point) = lit.emitters.sample(lit.scene, choice, square) else {
-            return Vec3::ZERO;
-        };
-        let seen = image.map_or(point.position, |image| image.place(point.position));
-        let separation = seen - surface.start;
-        let direction = separation.normalize_or_zero();
-        let toward = lobe.toward(direction);
-        let arriving = image.map_or(direction, |image| image.source_direction(direction));
-        let (normal, is_back) = lit.side(point.triangle, arriving);
-        let source_cosine = -normal.dot(arriving);
-        let is_lit = lit.is_lit(point.triangle, is_back);
-        let is_own = image.is_none() && point.triangle == surface.triangle;
-        if toward.value <= 0.0 || source_cosine <= 0.0 || !is_lit || is_own {
-            return Vec3::ZERO;
-        }
-        let density = lit.emitters.density(point.triangle) * separation.length_squared();
-        let ends = [Some(surface.triangle), Some(point.triangle)];
-        let (from, to) = (surface.start, point.position);
-        let mut passing = match image {
-            None => lit.rays.transmittance(from, to, ends),
-            Some(image) => {
-                lit.rays.passage_over(image, from, to, ends).transmittance * image.reflectance()
-            }
-        };
-        passing *= lit.scene.opacity_at(point.triangle, point.barycentric);
-        let weight = toward.value * source_cosine / (density + source_cosine * toward.density);
-        lit.emitted(&point) * weight * passing
-    }
-
-    fn sun_highlight(&self, surface: &Surface, lobe: &Lobe, chances: &mut Chances) -> Vec3 {
-        let Some(sun) = self.lit.scene.environment.sun else {
-            return Vec3::ZERO;
-        };
-        let (direction, weight) = sun.sample(chances.choice().1);
-        let value = lobe.toward(direction).value;
-        if value <= 0.0 {
-            return Vec3::ZERO;
-        }
-        let rays = self.lit.rays;
-        let own = Some(surface.triangle);
-        let passing = rays.transmittance_outward(surface.start, direction, own);
-        sun.irradiance * (value * weight) * passing
+        let mut sum = Vec3::ZERO;
+        self.lit.arriving_from_lamps(
+            surface.as_start(),
+            |direction| lobe.toward(direction),
+            || chances.choice(),
+            |arriving| sum += arriving.light,
+        );
+        sum
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     metrics::{MeshLookup, MeshPlace, SidePoint},
     sampling::{EmitterPoint, Emitters},
     scene::{Appearance, Scene, Specular, TriangleId},
-    solver::{DirectLights, DisplayMesh, LitPoint, VertexLight},
+    solver::{DirectLights, DisplayMesh, LitPoint, Snapshot, VertexLight},
 };
 
 /// A scene with light at the vertices of its mesh.
@@ -44,6 +44,21 @@ pub(super) struct Surface {
     pub(super) is_back: bool,
     /// Its place among the vertices; `None` where the mesh has none.
     pub(super) place: Option<MeshPlace>,
+}
+
+impl<'a> LitScene<'a> {
+    /// A scene under the light of a snapshot.
+    pub(super) fn new(scene: &'a Scene, rays: &'a RayTree, snapshot: &'a Snapshot) -> Self {
+        Self {
+            scene,
+            rays,
+            mesh: &snapshot.mesh,
+            light: &snapshot.light,
+            lights: snapshot.lights.as_deref(),
+            lookup: MeshLookup::new(scene, &snapshot.mesh),
+            emitters: Emitters::new(scene),
+        }
+    }
 }
 
 impl LitScene<'_> {
@@ -165,6 +180,11 @@ impl LitScene<'_> {
         let emits = self.lights.is_none_or(|lights| !lights.has_emitters());
         let emission = if emits { surface.emission } else { Vec3::ZERO };
         emission + self.reflectance(surface) * irradiance * FRAC_1_PI
+    }
+
+    /// Radiance that a surface reflects of the light stored there, in whatever directions, as [`Self::reflectance`] says.
+    pub(super) fn reflected(&self, surface: &Surface) -> Vec3 {
+        self.reflectance(surface) * self.stored(surface)[0] * FRAC_1_PI
     }
 }
 

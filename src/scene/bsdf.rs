@@ -68,6 +68,25 @@ impl Specular {
         }
     }
 
+    /// The integrals of what is reflected of light from a direction at this cosine, its colour apart.
+    pub fn moments(&self, cosine: f32) -> LobeMoments {
+        match *self {
+            Self::Mirror { .. } => LobeMoments::of_mirror(1.0, cosine),
+            Self::Gloss { roughness, .. } => Gloss::new(roughness).moments(cosine),
+            Self::Glass { index, is_thin } => {
+                LobeMoments::of_mirror(fresnel_at(cosine, index, is_thin), cosine)
+            }
+        }
+    }
+
+    /// The roughness of its lobe, α of GGX; that of mirrors and glass is the smallest that there is.
+    pub fn roughness(&self) -> f32 {
+        match *self {
+            Self::Gloss { roughness, .. } => roughness.max(LEAST_ROUGHNESS),
+            Self::Mirror { .. } | Self::Glass { .. } => LEAST_ROUGHNESS,
+        }
+    }
+
     /// The same with another colour; that of glass does not change.
     pub(super) fn with_color(self, color: Vec3) -> Self {
         match self {
@@ -118,17 +137,16 @@ fn fresnel(before: f32, behind: f32, index: f32) -> f32 {
 
 /// The part that glass reflects of light from all directions.
 fn mean_fresnel(index: f32, is_thin: bool) -> f32 {
-    cosine_mean(|cosine| match is_thin {
-        true => reflected_by_pane(cosine, index),
-        false => {
-            refracted(
-                Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, -cosine),
-                Vec3::Z,
-                index,
-            )
-            .1
-        }
-    })
+    cosine_mean(|cosine| fresnel_at(cosine, index, is_thin))
+}
+
+/// The part that glass reflects of light from a direction at this cosine.
+fn fresnel_at(cosine: f32, index: f32, is_thin: bool) -> f32 {
+    if is_thin {
+        return reflected_by_pane(cosine, index);
+    }
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    refracted(Vec3::new(sine, 0.0, -cosine), Vec3::Z, index).1
 }
 
 /// Mean over the directions of a hemisphere, weighted by their cosines.
@@ -216,6 +234,11 @@ impl Gloss {
 
     /// The part that is reflected of light from a direction at this cosine, 0…1.
     fn albedo(&self, cosine: f32) -> f32 {
+        self.moments(cosine).albedo
+    }
+
+    /// The integrals of the lobe about a direction at this cosine.
+    fn moments(&self, cosine: f32) -> LobeMoments {
         /// Midpoints along each side of the unit square.
         const STEPS: u32 = 24;
         let from = Vec3::new((1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine);
@@ -223,8 +246,38 @@ impl Gloss {
             let at = [index % STEPS, index / STEPS];
             Vec2::from(at.map(|step| (step as f32 + 0.5) / STEPS as f32))
         });
-        let weights = squares.filter_map(|square| Some(self.sample(Vec3::Z, from, square)?.1));
-        weights.sum::<f32>() / (STEPS * STEPS) as f32
+        let samples = squares.filter_map(|square| self.sample(Vec3::Z, from, square));
+        let sum: Vec3 = samples
+            .map(|(to, weight)| weight * Vec3::new(1.0, to.z, -to.x))
+            .sum();
+        let [albedo, along_normal, across] = (sum / (STEPS * STEPS) as f32).to_array();
+        LobeMoments {
+            albedo,
+            along_normal,
+            across,
+        }
+    }
+}
+
+/// Integrals of a lobe over all directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LobeMoments {
+    /// Of the value, 0…1: the part that is reflected of light from one direction.
+    pub albedo: f32,
+    /// Of the value times the direction: along the normal, and along the surface, away from where the light comes from.
+    pub along_normal: f32,
+    /// See above.
+    pub across: f32,
+}
+
+impl LobeMoments {
+    /// Those of a mirror that reflects a part, for light from a direction at this cosine.
+    fn of_mirror(part: f32, cosine: f32) -> Self {
+        Self {
+            albedo: part,
+            along_normal: part * cosine,
+            across: part * (1.0 - cosine * cosine).max(0.0).sqrt(),
+        }
     }
 }
 
@@ -306,6 +359,32 @@ mod tests {
                 assert!(density <= 1.0 + 0.01 && density >= value - 1e-3);
             }
         }
+    }
+
+    #[test]
+    fn moments_are_the_integrals_of_the_value() {
+        for (roughness, cosine) in [(0.3, 0.9), (0.6, 0.3), (1.0, 0.6)] {
+            let (gloss, from) = (Gloss::new(roughness), direction(cosine, 0.0));
+            let moments = gloss.moments(cosine);
+            let (steps, mut sum) = (400, Vec3::ZERO);
+            for row in 0..steps {
+                for column in 0..2 * steps {
+                    let height = (row as f32 + 0.5) / steps as f32;
+                    let to = direction(height, (column as f32 + 0.5) / steps as f32 * PI);
+                    let value = gloss.value(Vec3::Z, from, to).value;
+                    sum += value * Vec3::new(1.0, to.z, -to.x);
+                }
+            }
+            let sum = sum * (PI / (steps * steps) as f32);
+            let found = Vec3::new(moments.albedo, moments.along_normal, moments.across);
+            assert!(found.abs_diff_eq(sum, 0.015), "{found} {sum}");
+        }
+        let mirror = Specular::Mirror {
+            reflectance: Vec3::ONE,
+        };
+        let (of_mirror, smooth) = (mirror.moments(0.6), Gloss::new(0.0).moments(0.6));
+        assert!((of_mirror.along_normal - 0.6).abs() < 1e-6);
+        assert!((of_mirror.across - smooth.across).abs() < 0.01);
     }
 
     #[test]

@@ -170,7 +170,7 @@ impl<R: BufRead> ObjCleaner<R> {
             b"vn" => self.normal_statement(rest, line),
             b"f" | b"fo" => self.face_statement(rest, line),
             b"o" => {
-                self.name = ObjectName::from(&*label(&decode(rest)));
+                self.name = ObjectName::from(label(&decode(rest)));
                 self.segment_is_new = true;
             }
             b"g" => {

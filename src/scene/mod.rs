@@ -64,7 +64,7 @@ mod whole;
 mod write;
 
 pub use appearance::Appearance;
-pub use bsdf::{Gloss, LobeValue, Specular, reflected, reflected_by_pane, refracted};
+pub use bsdf::{Gloss, LobeMoments, LobeValue, Specular, reflected, reflected_by_pane, refracted};
 pub use builder::{BuildError, Face, ObjectName, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
 pub use cutout::{Cutout, SeeThrough};

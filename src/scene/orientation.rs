@@ -354,9 +354,7 @@ mod tests {
 
         /// A level square sheet.
         fn sheet(mut self, at: [f64; 3], side: f64, material: MaterialId) -> Self {
-            self.0
-                .objects
-                .push(("sheet".into(), self.0.faces.len()));
+            self.0.objects.push(("sheet".into(), self.0.faces.len()));
             let [a, b, c, d] =
                 [(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)].map(|(x, y)| {
                     let offset = DVec3::new(x, y, 0.0);

@@ -74,6 +74,8 @@ pub enum Action {
     ToggleBacks,
     /// The view at rest sharpened to a traced picture, or not.
     ToggleTraced,
+    /// Show gloss where light at vertices is drawn, or not.
+    ToggleGloss,
     /// Walls before the inside of a room drawn, or not.
     ToggleSeeThrough,
     /// The view that the scene opened with.

@@ -22,6 +22,7 @@ use super::{
     bindings::{self, Binding},
     faults::Faults,
     focus,
+    glossing::Glossing,
     options::Options,
     panels,
     preferences::Preferences,
@@ -63,6 +64,7 @@ pub struct App {
     guide: panels::guide::Guide,
     /// Since when the file dialog is open.
     dialog_since: Option<Instant>,
+    glossing: Glossing,
     notices: (Sender<Notice>, Receiver<Notice>),
     unfinished: Unfinished,
     /// Set from the command line for the first scene only.
@@ -135,6 +137,7 @@ impl App {
             watch: None,
             guide: panels::guide::Guide::default(),
             dialog_since: None,
+            glossing: Glossing::default(),
             notices: mpsc::channel(),
             unfinished: Unfinished::default(),
             first: None,

@@ -221,6 +221,7 @@ pub fn bindings() -> Vec<Binding> {
             "Traced picture of the view at rest",
             Action::ToggleTraced,
         ),
+        plain(Key::G, View, "Gloss in the drawn view", Action::ToggleGloss),
         plain(
             Key::X,
             View,

@@ -18,7 +18,12 @@ use super::{
     theme,
     view::{ViewMode, ViewSettings},
 };
-use crate::{scene::Scene, solver::Snapshot};
+use crate::{
+    geometry::RayTree,
+    picture::{GlossLight, gloss_at_vertices},
+    scene::Scene,
+    solver::{Cancel, Snapshot},
+};
 
 /// Why there is no headless picture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -77,6 +82,16 @@ impl Subject<'_> {
     /// Whether there is no light to show.
     pub(super) fn is_unlit(&self, view: &ViewSettings) -> bool {
         !self.snapshot.is_lit() || (self.is_dark && view.auto_exposure)
+    }
+
+    /// What gloss reflects, where that is shown.
+    fn gloss(&self, view: &ViewSettings) -> Option<Arc<GlossLight>> {
+        let (scene, snapshot) = (self.scene, self.snapshot);
+        if !view.shows_gloss() || !scene.has_specular() || self.is_unlit(view) {
+            return None;
+        }
+        let rays = RayTree::new(scene);
+        gloss_at_vertices(scene, &rays, snapshot, &Cancel::default()).map(Arc::new)
     }
 }
 
@@ -142,7 +157,8 @@ pub fn picture(
     let target = Target::new(renderer.gpu(), size)?;
     let view = exposed(&mut renderer, subject, camera, view, size)?;
     let exposure_factor = view.exposure_factor() / subject.scene.radiance_unit;
-    with_picture(subject, camera, &view, |picture| {
+    let gloss = subject.gloss(&view);
+    with_picture(subject, gloss.as_ref(), camera, &view, |picture| {
         renderer.render(&target, picture)
     })?;
     Ok(HeadlessPicture {
@@ -165,7 +181,8 @@ pub fn cutout(
     let target = CutoutTarget::new(renderer.gpu(), size)?;
     let view = exposed(&mut renderer, subject, camera, view, size)?;
     let exposure_factor = view.exposure_factor() / subject.scene.radiance_unit;
-    with_picture(subject, camera, &view, |picture| {
+    let gloss = subject.gloss(&view);
+    with_picture(subject, gloss.as_ref(), camera, &view, |picture| {
         renderer.render_cutout(&target, picture)
     })?;
     Ok(target.read(renderer.gpu(), exposure_factor)?)
@@ -181,7 +198,7 @@ fn exposed(
 ) -> Result<ViewSettings, HeadlessError> {
     let mut view = view.clone();
     if view.auto_exposure && view.mode.is_light() && !subject.is_unlit(&view) {
-        let metering = with_picture(subject, camera, &view, |picture| {
+        let metering = with_picture(subject, None, camera, &view, |picture| {
             renderer.measure(size, picture)
         })?;
         let metered = metering.wait(renderer.gpu())?;
@@ -193,6 +210,7 @@ fn exposed(
 /// Describe the picture, and draw it.
 fn with_picture<T>(
     subject: Subject<'_>,
+    gloss: Option<&Arc<GlossLight>>,
     camera: &Camera,
     view: &ViewSettings,
     draw: impl FnOnce(&Picture<'_>) -> Result<T, RenderError>,
@@ -219,6 +237,7 @@ fn with_picture<T>(
         mesh: &snapshot.mesh,
         light: &snapshot.light,
         errors,
+        gloss,
         camera,
         is_unlit: subject.is_unlit(view),
         range: light_range::false_color_range(

@@ -19,6 +19,7 @@ pub mod first_look;
 pub mod focus;
 pub mod fonts;
 pub mod frame_time;
+mod glossing;
 pub mod headless;
 pub mod inspection;
 pub mod light_range;

@@ -42,6 +42,8 @@ pub struct PanelState {
     pub mesh_text: String,
     /// Whether all objects of the lit mesh become one.
     pub mesh_merged: bool,
+    /// Whether the lit mesh has light by direction.
+    pub mesh_has_harmonics: bool,
     /// Size of a picture in pixels.
     pub picture_size: [u32; 2],
     /// Whether a picture has no background.
@@ -164,6 +166,7 @@ impl Default for PanelState {
             picture_text: String::new(),
             mesh_text: String::new(),
             mesh_merged: false,
+            mesh_has_harmonics: false,
             picture_size: [1920, 1080],
             picture_is_transparent: false,
             table: false,

@@ -33,6 +33,8 @@ pub struct Preferences {
     pub look: bool,
     /// Whether pictures have no background.
     pub picture_is_transparent: bool,
+    /// Whether exported meshes have light by direction.
+    pub mesh_has_harmonics: bool,
 }
 
 impl Default for Preferences {
@@ -59,6 +61,7 @@ impl Preferences {
             light: panels.light,
             look: panels.look,
             picture_is_transparent: panels.picture_is_transparent,
+            mesh_has_harmonics: panels.mesh_has_harmonics,
         }
     }
 
@@ -94,6 +97,7 @@ impl Preferences {
             light: self.light,
             look: self.look,
             picture_is_transparent: self.picture_is_transparent,
+            mesh_has_harmonics: self.mesh_has_harmonics,
             ..PanelState::default()
         }
     }
@@ -140,6 +144,7 @@ mod tests {
             light: false,
             look: true,
             picture_is_transparent: true,
+            mesh_has_harmonics: true,
         };
         set.store(&mut kept);
         assert_eq!(Preferences::load(Some(&kept)), set);

@@ -16,10 +16,12 @@ use super::{
 };
 use crate::{
     export::{self, MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
+    geometry::RayTree,
     metrics::SceneComparison,
+    picture::harmonics_at_vertices,
     scene::{MaterialLibrary, Scene, folder_of, write_whole},
-    solver::Snapshot,
-    worker::Wake,
+    solver::{Cancel, Snapshot},
+    worker::{self, Wake},
 };
 
 /// A sentence from another thread.
@@ -110,8 +112,12 @@ pub enum Content {
 pub struct LitMesh {
     /// Mesh and light.
     pub snapshot: Arc<Snapshot>,
-    /// The scene that it shows.
+    /// Their scene, and all of its triangles.
     pub scene: Arc<Scene>,
+    /// See above.
+    pub rays: Arc<RayTree>,
+    /// Whether light by direction is added, and the seed of its random numbers.
+    pub harmonics: Option<u64>,
     /// Options of the file.
     pub options: MeshOptions,
 }
@@ -119,12 +125,6 @@ pub struct LitMesh {
 impl LitMesh {
     fn save(&self, path: &Path) -> Result<(), SaveError> {
         let format = MeshFormat::of(path)?;
-        let lit = export::LitMesh {
-            snapshot: &self.snapshot,
-            scene: &self.scene,
-            options: &self.options,
-            lamps: &[],
-        };
         let library = format
             .companions(path, &self.scene)
             .map_err(SaveError::Write)?;
@@ -134,10 +134,26 @@ impl LitMesh {
                 return Err(SaveError::Input(path));
             }
         }
+        let wanted = self.harmonics.filter(|_| format.holds_attributes());
+        let harmonics = wanted.and_then(|seed| {
+            let (scene, rays, snapshot) = (&self.scene, &self.rays, &self.snapshot);
+            let work = || harmonics_at_vertices(scene, rays, snapshot, seed, &Cancel::default());
+            match worker::pool_that_gives_way("harmonics", 0) {
+                Some(pool) => pool.install(work),
+                None => work(),
+            }
+        });
+        let lit = export::LitMesh {
+            snapshot: &self.snapshot,
+            scene: &self.scene,
+            harmonics: harmonics.as_deref(),
+            lamps: &[],
+        };
         if let Some(library) = library {
             library.write(&self.scene).map_err(SaveError::Write)?;
         }
-        write_whole(path, |out| format.write(out, path, lit)).map_err(SaveError::Write)
+        let written = write_whole(path, |out| format.write(out, path, lit, &self.options));
+        written.map_err(SaveError::Write)
     }
 }
 

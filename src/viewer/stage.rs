@@ -22,6 +22,7 @@ use super::{
 };
 use crate::{
     metrics::ErrorMap,
+    picture::GlossLight,
     scene::{Scene, TriangleId},
     solver::{ClusterBox, Snapshot},
     worker::Wake,
@@ -36,6 +37,8 @@ pub struct Wanted {
     pub snapshot: Arc<Snapshot>,
     /// Measured errors at its vertices in per cent, where they are shown.
     pub errors: Option<Arc<Vec<f32>>>,
+    /// What gloss reflects at its vertices, where that is known and shown.
+    pub gloss: Option<Arc<GlossLight>>,
     /// The view mode.
     pub mode: ViewMode,
     /// Ends of the false colours of that mode.
@@ -53,6 +56,7 @@ impl PartialEq for Wanted {
         Arc::ptr_eq(&self.scene, &other.scene)
             && Arc::ptr_eq(&self.snapshot, &other.snapshot)
             && self.errors.as_ref().map(Arc::as_ptr) == other.errors.as_ref().map(Arc::as_ptr)
+            && self.gloss.as_ref().map(Arc::as_ptr) == other.gloss.as_ref().map(Arc::as_ptr)
             && self.mode == other.mode
             && self.range == other.range
             && self.edges == other.edges
@@ -259,6 +263,7 @@ impl StageHand {
             mesh: &wanted.snapshot.mesh,
             light: &wanted.snapshot.light,
             errors,
+            gloss: wanted.gloss.as_ref(),
             mode: wanted.mode,
             edges: wanted.edges,
             boxes: &self.boxes.instances,

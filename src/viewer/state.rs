@@ -214,6 +214,12 @@ impl State {
         self.loaded.as_ref().is_some_and(|loaded| loaded.has_backs)
     }
 
+    /// Whether something sends light in preferred directions.
+    pub fn has_gloss(&self) -> bool {
+        let loaded = self.loaded.as_ref();
+        loaded.is_some_and(|loaded| loaded.scene.has_specular())
+    }
+
     /// Whether the scene is a room, whose walls can be looked through.
     pub fn has_interior(&self) -> bool {
         let loaded = self.loaded.as_ref();

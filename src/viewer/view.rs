@@ -198,6 +198,8 @@ pub struct ViewSettings {
     pub see_through: bool,
     /// Whether textures show in detail, and not only as the mean of each element.
     pub texture_detail: bool,
+    /// Whether what mirrors, gloss and glass send to the eye is added to the light at vertices.
+    pub gloss: bool,
     /// Whether a view at rest sharpens to a traced picture.
     pub traced: bool,
     /// The cluster boxes.
@@ -259,6 +261,11 @@ impl ViewSettings {
         }
     }
 
+    /// Whether gloss is seen: only radiance has any.
+    pub fn shows_gloss(&self) -> bool {
+        self.gloss && self.mode == ViewMode::Radiance
+    }
+
     /// Factor of the exposure on radiance.
     pub fn exposure_factor(&self) -> f32 {
         self.exposure
@@ -284,6 +291,8 @@ pub struct ViewRequest {
     pub fixed_range: Option<[f32; 2]>,
     /// Whether edges were asked for.
     pub edges: bool,
+    /// Whether no gloss was asked for.
+    pub lacks_gloss: bool,
     /// Which cluster boxes.
     pub clusters: Option<ClusterRequest>,
 }
@@ -300,6 +309,7 @@ impl ViewRequest {
             logarithmic: view.logarithmic || self.logarithmic,
             fixed_range: self.fixed_range.or(view.fixed_range),
             edges: view.edges || self.edges,
+            gloss: view.gloss && !self.lacks_gloss,
             clusters: self
                 .clusters
                 .map_or(view.clusters, |asked| asked.apply(view.clusters)),
@@ -322,6 +332,7 @@ impl Default for ViewSettings {
             backs: false,
             see_through: true,
             texture_detail: true,
+            gloss: true,
             traced: true,
             clusters: ClusterOverlay::default(),
             links: LinkOverlay::default(),

@@ -312,6 +312,7 @@ impl Viewport {
             mesh: &wanted.snapshot.mesh,
             light: &wanted.snapshot.light,
             errors: key.staged.errors.as_ref(),
+            gloss: wanted.gloss.as_ref(),
             camera: &key.camera,
             view: &key.view,
             is_unlit: key.is_unlit,

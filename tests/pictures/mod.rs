@@ -1,5 +1,7 @@
 //! Checks of pictures that are drawn without a window.
 
+#![allow(dead_code, reason = "each test uses some of it")]
+
 use vecrad::viewer::headless::HeadlessError;
 
 /// Steps of 255 by which a rounded half float may be off after the sRGB curve.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{direct_lights::DirectLights, estimated_error::ErrorPoint, omitted::Omitted};
-use crate::scene::{Appearance, Finish};
+use crate::scene::Appearance;
 
 /// The crack-free mesh of the current elements. Two-sided triangles appear once per side.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,10 +35,6 @@ pub struct DisplayMesh {
     pub element_of: Vec<u32>,
     /// The last vertices are copies of these, with the texture coordinates of the other side of a seam.
     pub repeated: Vec<u32>,
-    /// How surfaces look beside their diffuse reflection, by material of the scene; empty where all are matt.
-    pub finishes: Vec<Finish>,
-    /// The material of each display triangle; empty where all are matt.
-    pub material_of: Vec<u32>,
 }
 
 /// Light at the vertices of a [`DisplayMesh`], linear RGB; all finite and not negative.
@@ -123,7 +119,6 @@ impl Snapshot {
             + size_of_val(mesh.is_back.as_slice())
             + size_of_val(mesh.element_of.as_slice())
             + size_of_val(mesh.repeated.as_slice())
-            + size_of_val(mesh.material_of.as_slice())
             + size_of_val(light.irradiance.as_slice())
             + size_of_val(light.direct.as_slice())
             + size_of_val(self.clusters.as_slice())

@@ -8,7 +8,7 @@ use super::seams::{Seams, repeat};
 use crate::{
     geometry::area_vector,
     hierarchy::{Channels as _, Cluster, Hierarchy, NodeId},
-    scene::{Appearance, Material, Scene, TriangleId},
+    scene::{Appearance, Scene, TriangleId},
     solver::{
         Cancel, ClusterBox, DisplayMesh, Omitted, Snapshot, VertexLight,
         direct::Surfaces,
@@ -145,12 +145,6 @@ impl View<'_> {
             *uv = Vec2::ZERO;
         }
         color(hierarchy, self.appearances, &mut display);
-        if self.scene.has_specular() {
-            let of = |triangle: &u32| self.scene.triangles[*triangle as usize].material.0;
-            display.material_of = display.triangle_of.iter().map(of).collect();
-            let materials = self.scene.materials.iter();
-            display.finishes = materials.map(Material::finish).collect();
-        }
         Some(display)
     }
 

@@ -196,6 +196,7 @@ impl App {
             Action::ToggleEdges => state.view.edges = !state.view.edges,
             Action::ToggleBacks if state.has_backs() => state.view.backs = !state.view.backs,
             Action::ToggleTraced => state.view.traced = !state.view.traced,
+            Action::ToggleGloss => state.view.gloss = !state.view.gloss,
             Action::ToggleBacks => {
                 let text = "there are no backs to show: all faces are lit on both sides";
                 state.messages.push(Severity::Note, text);

@@ -48,6 +48,7 @@ impl App {
         }
         self.drain_worker();
         self.take_staged();
+        self.glossing.renew(&self.state, &self.wake);
         self.want();
     }
 
@@ -150,6 +151,9 @@ impl App {
             snapshot: snapshot.clone(),
             errors: (mode == ViewMode::Error)
                 .then(|| state.truth.vertex_errors(snapshot).cloned())
+                .flatten(),
+            gloss: (state.view.shows_gloss())
+                .then(|| self.glossing.of(snapshot))
                 .flatten(),
             mode,
             range: state.false_color_range,

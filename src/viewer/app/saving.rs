@@ -83,9 +83,13 @@ impl App {
             self.state.messages.push(Severity::Error, text);
             return;
         };
+        let has_harmonics = self.state.panels.mesh_has_harmonics;
+        let lit_scene = has_harmonics.then(|| self.state.lit_scene()).flatten();
         let mesh = saver::LitMesh {
             snapshot: snapshot.clone(),
-            scene: loaded.scene.clone(),
+            scene: lit_scene.unwrap_or_else(|| loaded.scene.clone()),
+            rays: loaded.rays.clone(),
+            harmonics: has_harmonics.then_some(self.state.settings.seed),
             options: MeshOptions {
                 merge: self.state.panels.mesh_merged,
                 ..mesh_options(

@@ -148,6 +148,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     let view = &state.view;
     let has_backs = state.has_backs() && view.mode != ViewMode::FaceOrientation;
     let has_interior = state.has_interior();
+    let has_gloss = state.has_gloss();
     let toggles = [
         (
             "Element mesh over the light",
@@ -161,6 +162,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
             Action::ToggleLinks,
         ),
         ("Backs of faces", view.backs, Action::ToggleBacks),
+        ("Gloss in the drawn view", view.gloss, Action::ToggleGloss),
         ("Traced picture at rest", view.traced, Action::ToggleTraced),
         (
             "See through walls from outside",
@@ -181,6 +183,7 @@ fn view_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mut 
     for (label, is_on, action) in toggles {
         let is_offered = match action {
             Action::ToggleBacks => has_backs,
+            Action::ToggleGloss => has_gloss,
             Action::ToggleSeeThrough => has_interior,
             _ => true,
         };

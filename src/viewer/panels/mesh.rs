@@ -14,8 +14,9 @@ use crate::{
 pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Action>) {
     let panels = &mut state.panels;
     let (text, is_merged) = (&mut panels.mesh_text, &mut panels.mesh_merged);
+    let has_harmonics = &mut panels.mesh_has_harmonics;
     dialog(ctx, "Export lit mesh", &mut panels.mesh, |ui| {
-        mesh_ui(ui, text, is_merged, actions)
+        mesh_ui(ui, text, [is_merged, has_harmonics], actions)
     });
 }
 
@@ -23,7 +24,7 @@ pub fn mesh_window(ctx: &egui::Context, state: &mut State, actions: &mut Vec<Act
 fn mesh_ui(
     ui: &mut egui::Ui,
     text: &mut String,
-    is_merged: &mut bool,
+    [is_merged, has_harmonics]: [&mut bool; 2],
     actions: &mut Vec<Action>,
 ) -> bool {
     let present = MeshFormat::of(Path::new(text.trim()));
@@ -40,10 +41,15 @@ fn mesh_ui(
         }
     });
     file_field(ui, "File", text);
-    // A PLY is one mesh always.
+    // A PLY is one mesh always, and an OBJ has room for one colour.
     if present != Ok(MeshFormat::Ply) {
         ui.checkbox(is_merged, "One object")
             .on_hover_text("All objects of the scene as one; else each keeps its name");
+    }
+    if present != Ok(MeshFormat::Obj) {
+        ui.checkbox(has_harmonics, "Light by direction").on_hover_text(
+            "Adds to each vertex the light that arrives, as first-order spherical harmonics: four colours, found by rays",
+        );
     }
     ui.weak("Exposure and up axis are those of the view, in a PLY and an OBJ the tone map, too.");
     let hint = "The name must end in .ply, .glb or .obj.";

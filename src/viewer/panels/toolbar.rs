@@ -29,6 +29,7 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
         ui.separator();
         // Where orientation is shown, backs are shown anyway.
         let has_backs = state.has_backs() && state.view.mode != ViewMode::FaceOrientation;
+        let has_gloss = state.has_gloss();
         let view = &mut state.view;
         ui.toggle_value(&mut view.edges, "Mesh")
             .on_hover_text("Edges of the elements over the light (M)");
@@ -43,6 +44,11 @@ pub fn toolbar_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
         if loaded.is_some_and(|loaded| !loaded.scene.textures.is_empty()) {
             ui.toggle_value(&mut view.texture_detail, "Textures")
                 .on_hover_text("Textures in detail, lit by the computed light");
+        }
+        if view.mode == ViewMode::Radiance && has_gloss {
+            ui.toggle_value(&mut view.gloss, "Gloss").on_hover_text(
+                "Add what mirrors, gloss and glass send to the eye to the light at vertices; the traced picture always has it (G)",
+            );
         }
         if view.mode == ViewMode::Radiance {
             ui.toggle_value(&mut view.traced, "Traced").on_hover_text(

@@ -1,12 +1,15 @@
-//! Textures on the adapter: one group for each material with a texture or through which light passes, and group 0 for all
-//! others.
+//! Textures on the adapter: one group for each material with a texture, with gloss, or through which light passes, and group 0
+//! for all others.
 
 use std::{ops::Range, sync::Arc};
 
 use glam::Vec3;
 use wgpu::util::DeviceExt as _;
 
-use super::Gpu;
+use super::{
+    Gpu,
+    gloss::{GLOSS_VECTORS, gloss_vectors},
+};
 use crate::{
     scene::{Appearance, Cutout, CutoutId, Material, Scene, Texture, TextureId, srgb_byte},
     solver::DisplayMesh,
@@ -83,8 +86,19 @@ pub(super) struct DetailSet {
     /// Number of the group of each material.
     group_of: Vec<usize>,
     /// Groups from 1 on.
-    textured: Vec<(wgpu::BindGroup, Look)>,
+    own: Vec<OwnGroup>,
 }
+
+/// The group of a material.
+#[derive(Clone)]
+struct OwnGroup {
+    bindings: wgpu::BindGroup,
+    look: Look,
+    is_glossy: bool,
+}
+
+/// Numbers of a group: `Detail` of mesh_pass.wgsl.
+type Factors = [[f32; 4]; 3 + GLOSS_VECTORS];
 
 /// A texture on the adapter.
 #[derive(Clone)]
@@ -135,7 +149,7 @@ impl DetailSet {
         };
         let white = upload(gpu, &white).view;
         let upright = sampler(1);
-        let plain = bind_group(gpu, &layout, &upright, [&white; 3], [[0.0; 4]; 3]);
+        let plain = bind_group(gpu, &layout, &upright, [&white; 3], &Factors::default());
         Self {
             layout,
             // Floors are seen at a slant.
@@ -149,7 +163,7 @@ impl DetailSet {
             cutouts: Vec::new(),
             appearances: Vec::new(),
             group_of: Vec::new(),
-            textured: Vec::new(),
+            own: Vec::new(),
         }
     }
 
@@ -160,21 +174,21 @@ impl DetailSet {
 
     /// A group by its number.
     pub(super) fn bind_group(&self, number: usize) -> &wgpu::BindGroup {
-        match number.checked_sub(1) {
-            Some(index) => self
-                .textured
-                .get(index)
-                .map_or(&self.plain, |(group, _)| group),
-            None => &self.plain,
-        }
+        self.own(number).map_or(&self.plain, |own| &own.bindings)
     }
 
     /// How a group is drawn, by its number.
     pub(super) fn look(&self, number: usize) -> Look {
-        let textured = number
-            .checked_sub(1)
-            .and_then(|index| self.textured.get(index));
-        textured.map_or(Look::Opaque, |(_, look)| *look)
+        self.own(number).map_or(Look::Opaque, |own| own.look)
+    }
+
+    /// Whether a group reflects light in preferred directions, by its number.
+    pub(super) fn is_glossy(&self, number: usize) -> bool {
+        self.own(number).is_some_and(|own| own.is_glossy)
+    }
+
+    fn own(&self, number: usize) -> Option<&OwnGroup> {
+        self.own.get(number.checked_sub(1)?)
     }
 
     /// Upload the textures of another scene, and take other appearances of materials over.
@@ -189,7 +203,7 @@ impl DetailSet {
             return;
         }
         self.appearances = appearances.to_vec();
-        self.textured.clear();
+        self.own.clear();
         self.group_of = vec![0; scene.materials.len()];
         let sampler = match self.is_tame {
             true => &self.slanted,
@@ -197,7 +211,8 @@ impl DetailSet {
         };
         for (index, material) in scene.materials.iter().enumerate() {
             let textures = [material.reflectance_texture, material.emission_texture];
-            if !material.has_pictures() && !material.is_see_through() {
+            let gloss = gloss_vectors(material);
+            if !material.has_pictures() && !material.is_see_through() && gloss.is_none() {
                 continue;
             }
             let appearance = appearances.get(index).copied();
@@ -206,7 +221,9 @@ impl DetailSet {
             let colors = [appearance.reflectance * met, appearance.emission * met];
             let passing = material.transmission();
             let mut views = [(); 3].map(|()| self.white.clone());
-            let mut factors = [[0.0; 4], [0.0; 4], passing.extend(0.0).to_array()];
+            let mut factors = Factors::default();
+            factors[2] = passing.extend(0.0).to_array();
+            factors[3..].copy_from_slice(&gloss.unwrap_or_default());
             if let Some(cutout) = material.cutout.map(CutoutId::index) {
                 let uploaded = self.cutouts[cutout]
                     .get_or_insert_with(|| upload_cutout(gpu, &scene.cutouts[cutout]));
@@ -221,9 +238,12 @@ impl DetailSet {
                 let factor = (colors[kind] * uploaded.scale).extend(1.0);
                 (views[kind], factors[kind]) = (uploaded.view.clone(), factor.to_array());
             }
-            let group = bind_group(gpu, &self.layout, sampler, views.each_ref(), factors);
-            self.textured.push((group, Look::of(material)));
-            self.group_of[index] = self.textured.len();
+            self.own.push(OwnGroup {
+                bindings: bind_group(gpu, &self.layout, sampler, views.each_ref(), &factors),
+                look: Look::of(material),
+                is_glossy: gloss.is_some(),
+            });
+            self.group_of[index] = self.own.len();
         }
     }
 
@@ -308,11 +328,11 @@ fn bind_group(
     layout: &wgpu::BindGroupLayout,
     sampler: &wgpu::Sampler,
     [reflectance, emission, cutout]: [&wgpu::TextureView; 3],
-    factors: [[f32; 4]; 3],
+    factors: &Factors,
 ) -> wgpu::BindGroup {
     let uniform = gpu.buffer(
         "detail",
-        bytemuck::cast_slice(&factors),
+        bytemuck::cast_slice(factors),
         wgpu::BufferUsages::UNIFORM,
     );
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

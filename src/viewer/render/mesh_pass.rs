@@ -2,7 +2,8 @@
 //!
 //! Of the two sides of a triangle, one is drawn in a pixel: a two-sided triangle has a copy for each, and a back is drawn
 //! of one-sided ones only.
-//! Panes come last: what is behind them is multiplied by what they let pass, and what they reflect is added.
+//! Panes come last: what is behind them is multiplied by what they let pass, and what they reflect is added. Gloss is added to
+//! each surface where it is drawn.
 
 use super::{
     DEPTH_FORMAT, Gpu,
@@ -10,9 +11,12 @@ use super::{
     meter::METER_FORMAT,
     uploads::Uploads,
 };
-use crate::viewer::{
-    first_look::Interior,
-    view::{ViewMode, ViewSettings},
+use crate::{
+    picture::GlossVertex,
+    viewer::{
+        first_look::Interior,
+        view::{ViewMode, ViewSettings},
+    },
 };
 
 /// Pipelines of the surfaces.
@@ -34,6 +38,8 @@ struct Pipelines {
     cut_out_light: wgpu::RenderPipeline,
     filter: wgpu::RenderPipeline,
     pane: wgpu::RenderPipeline,
+    gloss: wgpu::RenderPipeline,
+    gloss_of_pane: wgpu::RenderPipeline,
     meter: wgpu::RenderPipeline,
     meter_cut_out: wgpu::RenderPipeline,
     meter_back: wgpu::RenderPipeline,
@@ -68,6 +74,8 @@ impl MeshPass {
                 cut_out_light: build(Kind::CutOutLight),
                 filter: build(Kind::Filter),
                 pane: build(Kind::Pane),
+                gloss: build(Kind::Gloss),
+                gloss_of_pane: build(Kind::GlossOfPane),
                 meter: build(Kind::Meter),
                 meter_cut_out: build(Kind::MeterCutOut),
                 meter_back: build(Kind::MeterBack),
@@ -83,13 +91,14 @@ impl MeshPass {
         if cuts { &self.cut } else { &self.whole }
     }
 
-    /// Draw what was uploaded, whole or without what stands before the room; group 0 is set.
+    /// Draw what was uploaded, whole or without what stands before the room, with gloss or without; group 0 is set.
     pub(super) fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         uploads: &Uploads,
         view: &ViewSettings,
         cuts: bool,
+        shows_gloss: bool,
     ) {
         let pipelines = self.pipelines(cuts);
         let shows_orientation = view.mode == ViewMode::FaceOrientation;
@@ -101,7 +110,8 @@ impl MeshPass {
             (_, _, Look::Pane | Look::CutOut) => vec![&pipelines.cut_out, &pipelines.cut_out_light],
         };
         let back = (view.backs || shows_orientation).then_some(&pipelines.back);
-        draw_sides(pass, uploads, pipelines_of, back);
+        let gloss = shows_gloss.then_some(pipelines);
+        draw_sides(pass, uploads, pipelines_of, back, gloss);
         if view.mode.shows_edges(view.edges)
             && let Some((edges, count)) = uploads.mesh().and_then(|mesh| mesh.edges.as_ref())
         {
@@ -128,17 +138,18 @@ impl MeshPass {
             // What is seen through them is metered.
             Look::Pane => Vec::new(),
         };
-        draw_sides(pass, uploads, pipelines_of, back);
+        draw_sides(pass, uploads, pipelines_of, back, None);
     }
 }
 
 /// Draw each triangle's side that faces the viewer: copies by the pipelines for them, backs of one-sided triangles by
-/// `back` or not at all.
+/// `back` or not at all, and gloss by the pipelines for it, where they are given.
 fn draw_sides<'p>(
     pass: &mut wgpu::RenderPass<'_>,
     uploads: &Uploads,
     pipelines_of: impl Fn(FaceCopy, Look) -> Vec<&'p wgpu::RenderPipeline>,
     back: Option<&wgpu::RenderPipeline>,
+    gloss: Option<&Pipelines>,
 ) {
     let (Some(mesh), Some(light)) = (uploads.mesh(), uploads.light()) else {
         return;
@@ -153,9 +164,7 @@ fn draw_sides<'p>(
         &mesh.emission,
         light,
     ];
-    for (slot, buffer) in buffers.into_iter().enumerate() {
-        pass.set_vertex_buffer(slot as u32, buffer.slice(..));
-    }
+    set_vertex_buffers(pass, buffers);
     pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
     let draw = |pass: &mut wgpu::RenderPass<'_>, range: &DrawRange| {
         for pipeline in pipelines_of(range.copy, details.look(range.group)) {
@@ -179,8 +188,47 @@ fn draw_sides<'p>(
             pass.draw_indexed(range.indices.clone(), 0, 0..1);
         }
     }
+    if let Some(pipelines) = gloss {
+        draw_gloss(pass, uploads, &pipelines.gloss, |look| look != Look::Pane);
+        set_vertex_buffers(pass, buffers);
+    }
     for range in mesh.ranges.iter().filter(is_pane) {
         draw(pass, range);
+    }
+    if let Some(pipelines) = gloss {
+        draw_gloss(pass, uploads, &pipelines.gloss_of_pane, |look| {
+            look == Look::Pane
+        });
+    }
+}
+
+fn set_vertex_buffers<const N: usize>(
+    pass: &mut wgpu::RenderPass<'_>,
+    buffers: [&wgpu::Buffer; N],
+) {
+    for (slot, buffer) in buffers.into_iter().enumerate() {
+        pass.set_vertex_buffer(slot as u32, buffer.slice(..));
+    }
+}
+
+/// Draw what glossy surfaces of some looks reflect in preferred directions; the index buffer is set.
+fn draw_gloss(
+    pass: &mut wgpu::RenderPass<'_>,
+    uploads: &Uploads,
+    pipeline: &wgpu::RenderPipeline,
+    is_meant: impl Fn(Look) -> bool,
+) {
+    let (Some(mesh), Some(gloss)) = (uploads.mesh(), uploads.gloss()) else {
+        return;
+    };
+    let details = uploads.details();
+    set_vertex_buffers(pass, [&mesh.positions, &mesh.normals, gloss]);
+    pass.set_pipeline(pipeline);
+    for range in &mesh.ranges {
+        if details.is_glossy(range.group) && is_meant(details.look(range.group)) {
+            pass.set_bind_group(1, details.bind_group(range.group), &[]);
+            pass.draw_indexed(range.indices.clone(), 0, 0..1);
+        }
     }
 }
 
@@ -203,6 +251,10 @@ enum Kind {
     Filter,
     /// What panes reflect and emit.
     Pane,
+    /// What surfaces that were drawn reflect in preferred directions.
+    Gloss,
+    /// The same of panes, which hide nothing.
+    GlossOfPane,
     /// Luminance of fronts.
     Meter,
     /// The same of what is left of a cut-out.
@@ -237,6 +289,8 @@ fn pipeline(
         Kind::CutOutLight => ("mesh light of cut-outs", "vs_main", "fs_main"),
         Kind::Filter => ("mesh filters", "vs_main", "fs_filter"),
         Kind::Pane => ("mesh panes", "vs_main", "fs_pane"),
+        Kind::Gloss => ("mesh gloss", "vs_gloss", "fs_gloss"),
+        Kind::GlossOfPane => ("mesh gloss of panes", "vs_gloss", "fs_gloss"),
         Kind::MeterCutOut => ("mesh meter cut-outs", "vs_main", "fs_meter_cut_out"),
         Kind::Meter => ("mesh meter", "vs_main", "fs_meter"),
         Kind::MeterBack => ("mesh meter backs", "vs_main", "fs_meter_back"),
@@ -252,6 +306,9 @@ fn pipeline(
         wgpu::vertex_attr_array![4 => Float32x3],
         wgpu::vertex_attr_array![5 => Float32x3],
     ];
+    let gloss = wgpu::vertex_attr_array![
+        2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4
+    ];
     let layouts = attributes.each_ref().map(|attribute| {
         Some(wgpu::VertexBufferLayout {
             array_stride: attribute[0].format.size(),
@@ -259,6 +316,17 @@ fn pipeline(
             attributes: attribute,
         })
     });
+    let [positions, normals, ..] = layouts.clone();
+    let gloss_layouts = [
+        positions,
+        normals,
+        Some(wgpu::VertexBufferLayout {
+            array_stride: size_of::<GlossVertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &gloss,
+        }),
+    ];
+    let is_gloss = matches!(kind, Kind::Gloss | Kind::GlossOfPane);
     let add = |src_factor, dst_factor| BlendComponent {
         src_factor,
         dst_factor,
@@ -273,6 +341,7 @@ fn pipeline(
             keep,
         )),
         Kind::Filter => Some((add(BlendFactor::Zero, BlendFactor::Src), keep)),
+        Kind::Gloss | Kind::GlossOfPane => Some((add(BlendFactor::One, BlendFactor::One), keep)),
         Kind::Pane => Some((
             add(BlendFactor::One, BlendFactor::One),
             add(BlendFactor::One, BlendFactor::OneMinusSrcAlpha),
@@ -282,7 +351,12 @@ fn pipeline(
     let blend = blend.map(|(color, alpha)| wgpu::BlendState { color, alpha });
     let hides = !matches!(
         kind,
-        Kind::Edge | Kind::CutOutLight | Kind::Filter | Kind::Pane
+        Kind::Edge
+            | Kind::CutOutLight
+            | Kind::Filter
+            | Kind::Pane
+            | Kind::Gloss
+            | Kind::GlossOfPane
     );
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -292,10 +366,10 @@ fn pipeline(
                 module,
                 entry_point: Some(vertex),
                 compilation_options: Default::default(),
-                buffers: if kind == Kind::Edge {
-                    &layouts[..2]
-                } else {
-                    &layouts
+                buffers: match kind {
+                    Kind::Edge => &layouts[..2],
+                    _ if is_gloss => &gloss_layouts,
+                    _ => &layouts,
                 },
             },
             primitive: wgpu::PrimitiveState {
@@ -315,7 +389,7 @@ fn pipeline(
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(hides),
                 depth_compare: Some(match kind {
-                    Kind::CutOutLight => wgpu::CompareFunction::Equal,
+                    Kind::CutOutLight | Kind::Gloss => wgpu::CompareFunction::Equal,
                     _ => wgpu::CompareFunction::Greater,
                 }),
                 stencil: Default::default(),

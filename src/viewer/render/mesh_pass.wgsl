@@ -7,7 +7,15 @@ struct Detail {
     emission: vec4<f32>,
     // rgb: the part of the light that passes; w: 1 where something is cut out.
     passing: vec4<f32>,
+    // rgb: colour of what is reflected in preferred directions; w: square of the roughness.
+    gloss: vec4<f32>,
+    // For cosines of the angle to the eye from 0 to 1, moments of the lobe: the part that it reflects, its mean direction along
+    // the normal and across it; w: what a single direction counts.
+    moments: array<vec4<f32>, 16>,
 };
+
+// Length of `Detail::moments`.
+const COSINES: u32 = 16u;
 
 @group(1) @binding(0) var<uniform> detail: Detail;
 @group(1) @binding(1) var reflectance_texture: texture_2d<f32>;
@@ -16,7 +24,7 @@ struct Detail {
 @group(1) @binding(4) var cutout_texture: texture_2d<f32>;
 
 struct Surface {
-    @builtin(position) clip: vec4<f32>,
+    @invariant @builtin(position) clip: vec4<f32>,
     @location(0) position: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) texcoord: vec2<f32>,
@@ -291,4 +299,91 @@ fn fs_edge(edge: Edge) -> @location(0) vec4<f32> {
         discard;
     }
     return vec4<f32>(0.008, 0.012, 0.02, view.viewport.w);
+}
+
+struct GlossySurface {
+    @invariant @builtin(position) clip: vec4<f32>,
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    // By channel, light as a linear function of its direction; solid angles of the lamps.
+    @location(2) @interpolate(perspective, centroid) red: vec4<f32>,
+    @location(3) @interpolate(perspective, centroid) green: vec4<f32>,
+    @location(4) @interpolate(perspective, centroid) blue: vec4<f32>,
+    @location(5) @interpolate(perspective, centroid) lamps: vec4<f32>,
+};
+
+@vertex
+fn vs_gloss(
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) red: vec4<f32>,
+    @location(3) green: vec4<f32>,
+    @location(4) blue: vec4<f32>,
+    @location(5) lamps: vec4<f32>,
+) -> GlossySurface {
+    var out: GlossySurface;
+    out.clip = view.clip_from_frame * vec4<f32>(position, 1.0);
+    out.position = position;
+    out.normal = normal;
+    out.red = red;
+    out.green = green;
+    out.blue = blue;
+    out.lamps = lamps;
+    return out;
+}
+
+// The part of the facets that no others hide: see `Gloss::unmasked`.
+fn unmasked(cosine: f32, roughness_squared: f32) -> f32 {
+    let root = sqrt(roughness_squared + (1.0 - roughness_squared) * cosine * cosine);
+    return 2.0 * cosine / max(cosine + root, 1e-12);
+}
+
+// Value of the BSDF of gloss times the cosine towards the light: see `Gloss::value`.
+fn lobe(normal: vec3<f32>, to_eye: vec3<f32>, to_light: vec3<f32>, roughness_squared: f32) -> f32 {
+    let cosine_eye = max(dot(normal, to_eye), 1e-3);
+    let cosine_light = dot(normal, to_light);
+    if (cosine_light <= 0.0) {
+        return 0.0;
+    }
+    let half = normalize(to_eye + to_light + 1e-6 * normal);
+    let cosine = max(dot(normal, half), 0.0);
+    let across = cross(normal, half);
+    let spread = roughness_squared * cosine * cosine + dot(across, across);
+    let facets = roughness_squared / max(PI * spread * spread, 1e-20);
+    return facets * unmasked(cosine_eye, roughness_squared) * unmasked(cosine_light, roughness_squared)
+        / (4.0 * cosine_eye);
+}
+
+// Largest gloss: with the brightest surface it is still a half float.
+const BRIGHTEST_GLOSS: f32 = 5000.0;
+
+// What gloss adds to what is drawn.
+@fragment
+fn fs_gloss(surface: GlossySurface) -> @location(0) vec4<f32> {
+    cut(surface.position, surface.normal);
+    let normal = normalize(surface.normal);
+    let to_eye = towards_viewer(surface.position);
+    let cosine = clamp(dot(normal, to_eye), 0.0, 1.0);
+    let place = cosine * f32(COSINES - 1u);
+    let below = u32(min(floor(place), f32(COSINES - 2u)));
+    let moments = mix(detail.moments[below], detail.moments[below + 1u], place - f32(below));
+    // Of light that is linear in the direction, a lobe reflects what comes along its mean direction.
+    let across = normal * dot(normal, to_eye) - to_eye;
+    let mean = normal * moments.y + across * (moments.z / max(length(across), 1e-6));
+    let along = vec4<f32>(mean, moments.x);
+    var radiance = vec3<f32>(dot(surface.red, along), dot(surface.green, along), dot(surface.blue, along));
+    radiance = max(radiance, vec3<f32>(0.0));
+    // A lamp widens the lobe: in a mirror it is then as bright as it is.
+    var solid_angles = surface.lamps;
+    for (var lamp = 0u; lamp < LAMPS; lamp++) {
+        let solid_angle = solid_angles[lamp];
+        if (solid_angle > 0.0) {
+            let middle = view.lamp_places[lamp];
+            let to_light = normalize(middle.xyz - surface.position * middle.w);
+            let roughness_squared = min(detail.gloss.w + solid_angle / (4.0 * PI), 1.0);
+            let value = lobe(normal, to_eye, to_light, roughness_squared);
+            radiance += view.lamp_radiance[lamp].rgb * (moments.w * solid_angle * value);
+        }
+    }
+    return min(exposed(detail.gloss.rgb * radiance), vec4<f32>(vec3<f32>(BRIGHTEST_GLOSS), 1.0));
 }

@@ -6,6 +6,7 @@
 
 mod cutout;
 mod detail;
+mod gloss;
 mod line_pass;
 mod mesh_pass;
 mod meter;
@@ -32,6 +33,7 @@ use super::{
     view::{ViewMode, ViewSettings},
 };
 use crate::{
+    picture::GlossLight,
     scene::{Scene, Sky, SkyPicture},
     solver::{DisplayMesh, VertexLight},
 };
@@ -204,6 +206,8 @@ pub struct Picture<'a> {
     pub light: &'a Arc<VertexLight>,
     /// Errors at its vertices in per cent, for the modes that show them, where they are known.
     pub errors: Option<&'a Arc<Vec<f32>>>,
+    /// What gloss reflects at its vertices, where that is known.
+    pub gloss: Option<&'a Arc<GlossLight>>,
     /// From where.
     pub camera: &'a Camera,
     /// How.
@@ -232,6 +236,11 @@ impl<'a> Picture<'a> {
     /// Factor on light, exposure included.
     fn light_factor(&self) -> f32 {
         self.view.exposure_factor() * self.view.light_factor().max(f32::MIN_POSITIVE)
+    }
+
+    /// Whether gloss is added to surfaces.
+    fn shows_gloss(&self) -> bool {
+        self.view.shows_gloss() && !self.is_unlit
     }
 
     /// The sky where it is seen: one that was asked for, as radiance.
@@ -267,6 +276,7 @@ impl<'a> Picture<'a> {
             mesh: self.mesh,
             light: self.light,
             errors: self.errors,
+            gloss: self.gloss,
             mode: self.view.mode,
             edges: self.view.edges,
             boxes: &self.overlay.boxes,
@@ -438,7 +448,9 @@ impl Renderer {
             self.sky_pass.draw(&mut pass);
         }
         let cuts = picture.room_looked_into().is_some();
-        self.mesh_pass.draw(&mut pass, uploads, picture.view, cuts);
+        let shows_gloss = picture.shows_gloss();
+        self.mesh_pass
+            .draw(&mut pass, uploads, picture.view, cuts, shows_gloss);
         self.line_pass.draw(&mut pass, uploads.boxes());
     }
 }

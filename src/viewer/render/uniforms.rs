@@ -2,13 +2,13 @@
 
 use std::num::NonZeroU64;
 
-use glam::{Mat3, Vec3};
+use glam::{Mat3, Vec3, Vec4};
 
 use super::{super::theme, Picture};
-use crate::{export::ToneMap, scene::SkyPicture, viewer::view::ViewMode};
+use crate::{export::ToneMap, picture::GLOSS_LAMPS, scene::SkyPicture, viewer::view::ViewMode};
 
-/// Floats of `View`: a matrix, eleven vectors, nine ramp colours.
-const FLOAT_COUNT: usize = 16 + 11 * 4 + 9 * 4;
+/// Floats of `View`: a matrix, eleven vectors, nine ramp colours, and lamps by place and radiance.
+const FLOAT_COUNT: usize = 16 + 11 * 4 + 9 * 4 + 2 * GLOSS_LAMPS * 4;
 const BYTE_COUNT: u64 = (FLOAT_COUNT * size_of::<f32>()) as u64;
 /// Width of segments in points.
 const LINE_POINTS: f32 = 2.5;
@@ -128,6 +128,16 @@ impl ViewUniforms {
         }
         for color in theme::ramp_stops(view.mode.is_signed()) {
             floats.extend([color.x, color.y, color.z, 1.0]);
+        }
+        let lamps = picture.gloss.map_or(&[][..], |gloss| &gloss.lamps);
+        let lamp = |index: usize| lamps.get(index);
+        for index in 0..GLOSS_LAMPS {
+            let place = lamp(index).map_or(Vec4::ZERO, |lamp| lamp.place);
+            floats.extend(place.to_array());
+        }
+        for index in 0..GLOSS_LAMPS {
+            let radiance = lamp(index).map_or(Vec3::ZERO, |lamp| lamp.radiance);
+            floats.extend(radiance.extend(0.0).to_array());
         }
         debug_assert_eq!(floats.len(), FLOAT_COUNT);
         queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&floats));

@@ -10,6 +10,7 @@ use super::{
     line_pass::Instances,
 };
 use crate::{
+    picture::GlossLight,
     scene::Scene,
     solver::{DisplayMesh, VertexLight},
     viewer::view::ViewMode,
@@ -25,6 +26,8 @@ pub struct Source<'a> {
     pub light: &'a Arc<VertexLight>,
     /// Errors at its vertices in per cent, for the modes that show them, where they are known.
     pub errors: Option<&'a Arc<Vec<f32>>>,
+    /// What gloss reflects at its vertices, where that is known.
+    pub gloss: Option<&'a Arc<GlossLight>>,
     /// Which light is shown.
     pub mode: ViewMode,
     /// Whether edges are drawn.
@@ -39,6 +42,7 @@ pub struct Uploads {
     details: DetailSet,
     mesh: Option<MeshBuffers>,
     light: Option<(LightSource, wgpu::Buffer)>,
+    gloss: Option<(Arc<GlossLight>, wgpu::Buffer)>,
     boxes: Instances<BoxInstance>,
 }
 
@@ -49,6 +53,7 @@ impl Uploads {
             details,
             mesh: None,
             light: None,
+            gloss: None,
             boxes: Instances::default(),
         }
     }
@@ -64,7 +69,7 @@ impl Uploads {
         let is_current = |current: &MeshBuffers| Arc::ptr_eq(&current.source, source.mesh);
         if !self.mesh.as_ref().is_some_and(is_current) {
             // Nobody holds on to the old mesh here: two large ones may not fit.
-            (self.mesh, self.light) = (None, None);
+            (self.mesh, self.light, self.gloss) = (None, None, None);
             if source.mesh.indices.is_empty() {
                 return Ok(());
             }
@@ -76,6 +81,16 @@ impl Uploads {
         if !self.light.as_ref().is_some_and(is_current) {
             let buffer = wanted.upload(gpu, source.mesh.positions.len());
             self.light = Some((wanted, buffer));
+        }
+        let is_current = |(current, _): &(Arc<GlossLight>, wgpu::Buffer)| {
+            source
+                .gloss
+                .is_some_and(|wanted| Arc::ptr_eq(current, wanted))
+        };
+        if !self.gloss.as_ref().is_some_and(is_current) {
+            self.gloss = source
+                .gloss
+                .and_then(|gloss| upload_gloss(gpu, source, gloss));
         }
         if let Some(mesh) = &mut self.mesh
             && source.mode.shows_edges(source.edges)
@@ -93,6 +108,11 @@ impl Uploads {
     /// The light at its vertices.
     pub(super) fn light(&self) -> Option<&wgpu::Buffer> {
         self.light.as_ref().map(|(_, buffer)| buffer)
+    }
+
+    /// What gloss reflects at its vertices.
+    pub(super) fn gloss(&self) -> Option<&wgpu::Buffer> {
+        self.gloss.as_ref().map(|(_, buffer)| buffer)
     }
 
     /// The textures.
@@ -167,6 +187,21 @@ impl LightSource {
         gpu.queue.write_buffer(&buffer, 0, &bytes[..fitting]);
         buffer
     }
+}
+
+/// A buffer of gloss; `None` where it is not of this mesh, or larger than the adapter takes.
+fn upload_gloss(
+    gpu: &Gpu,
+    source: &Source<'_>,
+    gloss: &Arc<GlossLight>,
+) -> Option<(Arc<GlossLight>, wgpu::Buffer)> {
+    let bytes: &[u8] = bytemuck::cast_slice(&gloss.vertices);
+    let fits = gloss.vertices.len() == source.mesh.positions.len()
+        && bytes.len() as u64 <= gpu.max_buffer_size;
+    fits.then(|| {
+        let buffer = gpu.buffer("gloss", bytes, wgpu::BufferUsages::VERTEX);
+        (gloss.clone(), buffer)
+    })
 }
 
 /// The mesh on the adapter.

@@ -23,7 +23,13 @@ struct View {
     sky_scale: vec4<f32>,
     // Display-linear colours of the false-colour ramp, evenly spaced.
     ramp: array<vec4<f32>, 9>,
+    // Lamps that gloss shows: middle and 1, or direction and 0; rgb: radiance.
+    lamp_places: array<vec4<f32>, 4>,
+    lamp_radiance: array<vec4<f32>, 4>,
 };
+
+// Length of `View::lamp_places`.
+const LAMPS: u32 = 4u;
 
 @group(0) @binding(0) var<uniform> view: View;
 

@@ -1,0 +1,259 @@
+//! Binary glTF 2.0 (GLB) of the display mesh with light at its vertices.
+//!
+//! Per vertex: position, normal, `COLOR_0`, `_RADIANCE` and `_IRRADIANCE`, all floats, `_SH0` to `_SH3` where light by
+//! direction is asked for, and `_RADIANCE_0`, `_IRRADIANCE_0` and on where that of each lamp is. `COLOR_0` is exposed linear
+//! radiance cut off at 1, as the format demands, without a tone curve, which is the viewer's to apply; the others keep the
+//! full range. Each object of the scene is a mesh, each of its materials a primitive. Materials are unlit
+//! (`KHR_materials_unlit`): the light is in the colours already; they carry roughness and metalness for those who light the
+//! mesh themselves.
+//!
+//! Positions are world units from the node's place, so that single precision suffices far from the origin. glTF is Y-up: a
+//! scene with +Z up stands under a turned root node, its numbers stay. Each side of a two-sided face has triangles of its
+//! own, so that the material is one-sided always. Textures are omitted: vertices have their mean.
+
+mod document;
+
+use std::io::{self, Write};
+
+use glam::Vec3;
+
+use super::{
+    MeshOptions,
+    mesh::{Light, LitMesh, write_vector},
+    parts::by_object,
+};
+use crate::scene::{Frame, ObjectName};
+use document::document;
+
+/// Attributes of every vertex, three floats each, in the order of the file; those that are asked for follow.
+const ATTRIBUTES: [&str; 5] = ["POSITION", "NORMAL", "COLOR_0", "_RADIANCE", "_IRRADIANCE"];
+
+/// Those of light by direction.
+const HARMONICS: [&str; 4] = ["_SH0", "_SH1", "_SH2", "_SH3"];
+
+const ATTRIBUTE_BYTES: u64 = 12;
+
+/// Three indices of 32 bits.
+const TRIANGLE_BYTES: u64 = 12;
+
+/// Header of the file; length and kind of a chunk.
+const HEADER_BYTES: u64 = 12;
+const CHUNK_HEADER_BYTES: u64 = 8;
+
+/// Why a mesh does not become a GLB.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+enum GlbError {
+    /// The format knows no empty meshes.
+    #[error("there is no surface to write")]
+    Empty,
+    /// Lengths and indices have 32 bits.
+    #[error(
+        "a GLB holds less than 4 GiB and 4,294,967,295 vertices, too few for {vertices} vertices and {triangles} triangles; write a PLY instead"
+    )]
+    TooLarge {
+        /// Of the mesh.
+        vertices: u64,
+        /// Of the mesh.
+        triangles: u64,
+    },
+}
+
+/// Write a lit mesh.
+///
+/// # Errors
+/// Those of `out`, and one sentence where the mesh is empty or does not fit.
+pub(super) fn write_glb(
+    out: &mut dyn Write,
+    lit: LitMesh<'_>,
+    options: &MeshOptions,
+) -> io::Result<()> {
+    let content = Content::of(lit, options.merge);
+    let sizes = content.sizes();
+    let refused = |error| io::Error::new(io::ErrorKind::InvalidInput, error);
+    sizes.check().map_err(refused)?;
+    let mut text = document(&content, lit, options).to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let length = sizes.file_length(text.len() as u64).map_err(refused)?;
+    out.write_all(b"glTF")?;
+    write_numbers(out, &[2, length])?;
+    write_numbers(out, &[text.len() as u32])?;
+    out.write_all(b"JSON")?;
+    out.write_all(&text)?;
+    write_numbers(out, &[sizes.buffer_length() as u32])?;
+    out.write_all(b"BIN\0")?;
+    for mesh in &content.meshes {
+        for &vertex in &mesh.vertices {
+            write_vertex(out, lit, vertex as usize, options)?;
+        }
+    }
+    let primitives = content.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let mut triangles = primitives.flat_map(|primitive| &primitive.triangles);
+    triangles.try_for_each(|triangle| write_numbers(out, triangle))
+}
+
+/// The attributes of a vertex, in the order of [`Content::attributes`].
+fn write_vertex(
+    out: &mut dyn Write,
+    lit: LitMesh<'_>,
+    vertex: usize,
+    options: &MeshOptions,
+) -> io::Result<()> {
+    let mesh = &lit.snapshot.mesh;
+    let light = Light::at(lit, vertex, options);
+    write_vector(out, from_node(mesh.positions[vertex], &lit.scene.frame))?;
+    write_vector(out, mesh.normals[vertex].normalize_or(Vec3::Y))?;
+    write_vector(out, options.color.exposed(light.radiance).min(Vec3::ONE))?;
+    write_vector(out, light.radiance)?;
+    write_vector(out, light.irradiance)?;
+    for coefficient in light.harmonics.into_iter().flatten() {
+        write_vector(out, coefficient)?;
+    }
+    for lamp in lit.lamps {
+        let light = Light::of_lamp(lit, lamp, vertex, options);
+        write_vector(out, light.radiance)?;
+        write_vector(out, light.irradiance)?;
+    }
+    Ok(())
+}
+
+/// What the file holds, without the values of vertices.
+struct Content<'a> {
+    meshes: Vec<Mesh<'a>>,
+    /// Names of the attributes of a vertex.
+    attributes: Vec<String>,
+}
+
+/// One object.
+struct Mesh<'a> {
+    /// What it is called; `None` where all objects are one.
+    name: Option<&'a ObjectName>,
+    /// Indices into the vertices of the display mesh.
+    vertices: Vec<u32>,
+    primitives: Vec<Primitive>,
+}
+
+/// The triangles of one material.
+struct Primitive {
+    /// Index into the scene's materials.
+    material: usize,
+    /// Indices into the vertices of the object.
+    triangles: Vec<[u32; 3]>,
+}
+
+impl<'a> Content<'a> {
+    fn of(lit: LitMesh<'a>, merge: bool) -> Self {
+        let mesh = &lit.snapshot.mesh;
+        let mut place: Vec<Option<u32>> = vec![None; mesh.positions.len()];
+        let meshes = by_object(mesh, lit.scene, merge).into_iter().map(|object| {
+            let mut vertices = Vec::new();
+            let mut numbered = |vertex: u32| {
+                *place[vertex as usize].get_or_insert_with(|| {
+                    vertices.push(vertex);
+                    vertices.len() as u32 - 1
+                })
+            };
+            let parts = object.parts.into_iter();
+            let primitives = parts
+                .map(|part| Primitive {
+                    material: part.material,
+                    triangles: part
+                        .triangles
+                        .iter()
+                        .map(|&triangle| mesh.indices[triangle as usize].map(&mut numbered))
+                        .collect(),
+                })
+                .collect();
+            // Other objects number the vertices that they share anew.
+            for &vertex in &vertices {
+                place[vertex as usize] = None;
+            }
+            Mesh {
+                name: object.name,
+                vertices,
+                primitives,
+            }
+        });
+        let meshes = meshes.collect();
+        let harmonics = lit.harmonics.map_or([].as_slice(), |_| &HARMONICS);
+        let plain = ATTRIBUTES.iter().chain(harmonics);
+        let of_lamps = (0..lit.lamps.len())
+            .flat_map(|lamp| [format!("_RADIANCE_{lamp}"), format!("_IRRADIANCE_{lamp}")]);
+        Self {
+            meshes,
+            attributes: plain
+                .map(|name| (*name).to_owned())
+                .chain(of_lamps)
+                .collect(),
+        }
+    }
+
+    fn sizes(&self) -> Sizes {
+        let primitives = self.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        Sizes {
+            vertices: self.meshes.iter().map(|it| it.vertices.len() as u64).sum(),
+            triangles: primitives.map(|it| it.triangles.len() as u64).sum(),
+            attributes: self.attributes.len() as u64,
+        }
+    }
+}
+
+/// How much there is to write.
+#[derive(Clone, Copy, Debug)]
+struct Sizes {
+    vertices: u64,
+    triangles: u64,
+    /// Of a vertex.
+    attributes: u64,
+}
+
+impl Sizes {
+    fn vertex_bytes(self) -> u64 {
+        self.attributes * ATTRIBUTE_BYTES
+    }
+
+    fn vertices_length(self) -> u64 {
+        self.vertices * self.vertex_bytes()
+    }
+
+    fn indices_length(self) -> u64 {
+        self.triangles * TRIANGLE_BYTES
+    }
+
+    /// Vertices, then indices: a multiple of 4, as chunks must be.
+    fn buffer_length(self) -> u64 {
+        self.vertices_length() + self.indices_length()
+    }
+
+    /// Whether there is something to write, and it may fit.
+    fn check(self) -> Result<(), GlbError> {
+        self.file_length(0).map(|_| ())
+    }
+
+    /// Bytes of the file with a description of this length. Where that has 32 bits, no index can be the one that is
+    /// reserved: vertices take more than a byte each.
+    fn file_length(self, text_length: u64) -> Result<u32, GlbError> {
+        if self.vertices == 0 || self.triangles == 0 {
+            return Err(GlbError::Empty);
+        }
+        let length = HEADER_BYTES + 2 * CHUNK_HEADER_BYTES + text_length + self.buffer_length();
+        u32::try_from(length).map_err(|_| GlbError::TooLarge {
+            vertices: self.vertices,
+            triangles: self.triangles,
+        })
+    }
+}
+
+/// A position of the mesh in world units from the place of its node.
+fn from_node(position: Vec3, frame: &Frame) -> Vec3 {
+    let distance = (position.as_dvec3() / frame.scale).as_vec3();
+    distance.clamp(Vec3::MIN, Vec3::MAX)
+}
+
+fn write_numbers(out: &mut dyn Write, numbers: &[u32]) -> io::Result<()> {
+    numbers
+        .iter()
+        .try_for_each(|number| out.write_all(&number.to_le_bytes()))
+}
+
+#[cfg(test)]
+mod tests;
