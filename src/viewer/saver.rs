@@ -17,7 +17,7 @@ use super::{
 use crate::{
     export::{MeshFormat, MeshOptions, UnknownMeshFormat, write_csv},
     metrics::SceneComparison,
-    scene::{Frame, folder_of, write_whole},
+    scene::{Frame, folder_of, is_scene_ending, write_whole},
     solver::Snapshot,
     worker::Wake,
 };
@@ -234,9 +234,8 @@ fn free_path_beside(source: &SceneSource, what: &str, extension: &str) -> PathBu
 
 /// The name of a scene as files may have it.
 fn plain_stem(scene: &str) -> String {
-    let is_obj = |ending: &str| ending.eq_ignore_ascii_case("obj");
     let stem = match scene.rsplit_once('.') {
-        Some((stem, ending)) if is_obj(ending) => stem,
+        Some((stem, ending)) if is_scene_ending(ending) => stem,
         _ => scene,
     };
     let stem: String = stem
