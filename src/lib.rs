@@ -1,4 +1,4 @@
-//! vecrad lights an OBJ scene by extended vector-based radiosity and shows the light while it is being computed.
+//! vecrad lights an OBJ or glTF scene by extended vector-based radiosity and shows the light while it is being computed.
 //!
 //! The method is that of Sun, Gong and Pan, "Extended Vector-Based Radiosity": a volume cluster is treated as its
 //! bounding box with six power vectors and six area vectors, links carry a vector irradiance, and each face takes its

@@ -11,7 +11,7 @@ use boxes::{cuboid, rectangle};
 use common::solve;
 use glam::{DMat3, DVec3, Vec3};
 use vecrad::{
-    scene::{Material, SceneBuilder, SceneOptions, read_obj},
+    scene::{Material, SceneBuilder, SceneOptions, read_scene},
     solver::SolveSettings,
 };
 
@@ -49,7 +49,7 @@ fn lit(turned: DMat3, origin: DVec3) -> Vec<(Vec3, Vec3)> {
         "newmtl grey\nKd 0.5\nnewmtl lamp\nKd 0\nKe 10\n",
     )
     .unwrap();
-    let scene = Arc::new(read_obj(&path, &SceneOptions::default()).unwrap());
+    let scene = Arc::new(read_scene(&path, &SceneOptions::default()).unwrap());
     let settings = SolveSettings {
         epsilon: 0.2,
         max_steps: 1,

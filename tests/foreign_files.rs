@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 use glam::Vec3;
 use tempfile::TempDir;
 use vecrad::scene::{
-    Material, ReadError, Scene, SceneOptions, Specular, TriangleId, WarningKind, read_obj,
+    Material, ReadError, Scene, SceneOptions, Specular, TriangleId, WarningKind, read_scene,
 };
 
 /// A square with texture coordinates.
@@ -38,7 +38,7 @@ fn folder(files: &[(&str, &str)], pictures: &[&str]) -> TempDir {
 }
 
 fn try_read(folder: &Path) -> Result<Scene, ReadError> {
-    read_obj(&folder.join("scene.obj"), &SceneOptions::default())
+    read_scene(&folder.join("scene.obj"), &SceneOptions::default())
 }
 
 fn read(folder: &TempDir) -> Scene {
@@ -314,7 +314,7 @@ fn specular_materials_reflect_at_most_all_light_and_survive_their_file() {
     // Written and read again.
     let path = folder.path().join("again.obj");
     vecrad::scene::write_obj(&scene, &path).unwrap();
-    let again = read_obj(&path, &SceneOptions::default()).unwrap();
+    let again = read_scene(&path, &SceneOptions::default()).unwrap();
     for before in scene
         .materials
         .iter()
@@ -331,7 +331,7 @@ fn specular_materials_reflect_at_most_all_light_and_survive_their_file() {
         is_matt: true,
         ..SceneOptions::default()
     };
-    let matt = read_obj(&folder.path().join("scene.obj"), &options).unwrap();
+    let matt = read_scene(&folder.path().join("scene.obj"), &options).unwrap();
     assert!(!matt.has_specular());
     assert_near(
         named(&matt, "bright").reflectance,
@@ -354,7 +354,7 @@ fn opacities(mtl: &str, options: &SceneOptions) -> (Vec<f32>, Vec<String>) {
         obj += &format!("usemtl {name}\nf -3/1 -2/2 -1/3\n");
     }
     let folder = folder(&[("scene.obj", &obj), ("a.mtl", mtl)], &["floor.png"]);
-    let scene = read_obj(&folder.path().join("scene.obj"), options).unwrap();
+    let scene = read_scene(&folder.path().join("scene.obj"), options).unwrap();
     let opacities = scene.surfaces.iter().map(|surface| surface.opacity);
     (opacities.collect(), said(&scene))
 }

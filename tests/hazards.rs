@@ -14,7 +14,7 @@ use vecrad::scene::{
         Encoding, FaceSkipped, LineSkipped, MaterialMissing, NoEmitter, SeeThrough, TextureMissing,
         Unsupported, ValueClamped,
     },
-    read_obj,
+    read_scene,
 };
 
 const POINTS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -34,7 +34,7 @@ fn try_read(obj: impl AsRef<[u8]>, others: &[(&str, &[u8])]) -> Result<Scene, Re
     let mut files = vec![("scene.obj", obj.as_ref())];
     files.extend_from_slice(others);
     let (_folder, path) = write(&files);
-    let scene = read_obj(&path, &SceneOptions::default())?;
+    let scene = read_scene(&path, &SceneOptions::default())?;
     let bytes = files.iter().map(|(_, content)| content.len()).sum();
     assert_promises(&scene, bytes);
     Ok(scene)
@@ -242,7 +242,7 @@ fn what_is_no_scene_is_one_sentence() {
         (b" \n\n", "the file is empty; export the scene again: "),
         (
             png,
-            "this is not an OBJ text file; export the scene as Wavefront OBJ: ",
+            "this is neither glTF nor OBJ text; export the scene as one of these: ",
         ),
         (
             b"v 0 0 0\n",
@@ -262,12 +262,12 @@ fn what_is_no_scene_is_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let options = SceneOptions::default();
     assert!(matches!(
-        read_obj(folder.path(), &options),
+        read_scene(folder.path(), &options),
         Err(ReadError::Folder { .. })
     ));
     let none = Path::new("/nowhere/none.obj");
     assert!(matches!(
-        read_obj(none, &options),
+        read_scene(none, &options),
         Err(ReadError::NotFound { .. })
     ));
 }

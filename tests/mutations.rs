@@ -10,7 +10,7 @@ mod spoiled;
 use std::{fmt::Write as _, fs, path::Path};
 
 use spoiled::{Chance, assert_promises, case_count, folder, spoil};
-use vecrad::scene::{ReadError, Scene, SceneOptions, Warning, WarningKind, read_obj};
+use vecrad::scene::{ReadError, Scene, SceneOptions, Warning, WarningKind, read_scene};
 
 /// An OBJ file that is valid but for what a reader must bear anyway: names without a file, lines of other kinds.
 fn obj(chance: &mut Chance) -> String {
@@ -159,7 +159,7 @@ fn check(folder: &Path, obj: &[u8], mtl: &[u8]) -> bool {
     fs::write(&path, obj).unwrap();
     fs::write(folder.join("a.mtl"), mtl).unwrap();
     let options = SceneOptions::default();
-    match (read_obj(&path, &options), read_obj(&path, &options)) {
+    match (read_scene(&path, &options), read_scene(&path, &options)) {
         (Ok(one), Ok(other)) => {
             assert_promises(&one, obj.len());
             assert_same(&one, &other);
@@ -263,7 +263,7 @@ fn a_planted_fault_is_named_with_its_line() {
         lines.insert(at, fault.to_owned());
         let text = lines.join(chance.pick(&["\n", "\r\n", "\r"]));
         fs::write(folder.join("scene.obj"), &text).unwrap();
-        let scene = read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
+        let scene = read_scene(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
         let said = scene.warnings.iter();
         // Faces are drawn at random, so some are the same.
         let is_planted = |warning: &&Warning| {
@@ -298,7 +298,7 @@ fn a_planted_fault_of_a_material_is_named_with_its_line() {
         let at = 1 + chance.below(lines.len());
         lines.insert(at, fault);
         fs::write(folder.join("a.mtl"), lines.join("\n")).unwrap();
-        let scene = read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
+        let scene = read_scene(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
         let mut said = scene.warnings.iter();
         let warning = said.find(|warning| warning.kind == WarningKind::LineSkipped);
         let warning = warning.unwrap_or_else(|| panic!("case {case}: {fault}"));

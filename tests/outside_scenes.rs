@@ -8,7 +8,7 @@ use glam::Vec3;
 use vecrad::{
     geometry::RayTree,
     reference::{PathSettings, PathTracer},
-    scene::{Environment, Lighting, Scene, SceneOptions, Sky, builtin::builtin, read_obj},
+    scene::{Environment, Lighting, Scene, SceneOptions, Sky, builtin::builtin, read_scene},
 };
 
 /// Mean irradiance (green) over the reflecting surfaces, W/m².
@@ -29,7 +29,7 @@ fn mean_irradiance(scene: Scene) -> f32 {
 
 fn colonnade() -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/colonnade.obj");
-    read_obj(&path, &SceneOptions::default()).unwrap()
+    read_scene(&path, &SceneOptions::default()).unwrap()
 }
 
 #[test]

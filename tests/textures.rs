@@ -9,7 +9,7 @@ use std::{fs, path::Path, sync::Arc};
 use common::solve;
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
-    scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_obj, write_builtin},
+    scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_scene, write_builtin},
     solver::{Cancel, Omitted, Snapshot, SolveSettings},
 };
 
@@ -19,7 +19,7 @@ fn read(folder: &Path, picture: &str) -> Scene {
     fs::write(folder.join("scene.obj"), obj).unwrap();
     let mtl = format!("newmtl m\nKd 0.5 0.25 0.125\nmap_Kd {picture}\n");
     fs::write(folder.join("a.mtl"), mtl).unwrap();
-    read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap()
+    read_scene(&folder.join("scene.obj"), &SceneOptions::default()).unwrap()
 }
 
 /// The picture is not used, the plain colour is, and a warning at the material says why.
@@ -197,7 +197,7 @@ fn nothing_outside_the_folder_and_no_device_is_read() {
     symlink("../secret.mtl", folder.join("link.mtl")).unwrap();
     let obj = "mtllib link.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
     fs::write(folder.join("scene.obj"), obj).unwrap();
-    let scene = read_obj(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
+    let scene = read_scene(&folder.join("scene.obj"), &SceneOptions::default()).unwrap();
     let said = scene.warnings[0].to_string();
     assert!(said.contains(outside), "{said}");
     assert_eq!(scene.surfaces[0].reflectance, Vec3::splat(0.5));
@@ -222,7 +222,7 @@ fn read_square(folder: &Path, texcoords: &[[f64; 2]], faces: [[usize; 3]; 2]) ->
         obj += &format!("f {a} {b} {c}\n");
     }
     fs::write(folder.join("square.obj"), obj).unwrap();
-    read_obj(&folder.join("square.obj"), &SceneOptions::default()).unwrap()
+    read_scene(&folder.join("square.obj"), &SceneOptions::default()).unwrap()
 }
 
 fn lit(scene: &Arc<Scene>) -> Snapshot {
@@ -273,7 +273,7 @@ fn a_tiled_floor_comes_back_from_a_file_as_it_was_and_is_shown_whole() {
     let folder = tempfile::tempdir().unwrap();
     let options = SceneOptions::default();
     let path = write_builtin("tiled-room", folder.path()).unwrap();
-    let read = Arc::new(read_obj(&path, &options).unwrap());
+    let read = Arc::new(read_scene(&path, &options).unwrap());
     let original = builtin::builtin("tiled-room", &options).unwrap().unwrap();
     assert_eq!(read.texcoords, original.texcoords);
     let shown = lit(&read);
@@ -380,7 +380,7 @@ fn pictures_that_no_face_shows_are_not_read() {
         let path = folder.join("scene.obj");
         let obj = format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{rest}\n");
         fs::write(&path, obj).unwrap();
-        read_obj(&path, &SceneOptions::default()).unwrap()
+        read_scene(&path, &SceneOptions::default()).unwrap()
     };
     // A material without faces, and one whose faces have no texture coordinates.
     let scene = read("usemtl unused\nusemtl flat\nf 1 2 3");

@@ -679,9 +679,9 @@ fn a_dropped_scene_is_opened() {
     drop_files(&mut harness, &[&picture]);
     let (severity, text) = last_message(&harness);
     assert_eq!(severity, Severity::Error);
-    assert!(text.contains("not an OBJ text file"), "{text}");
+    assert!(text.contains("neither glTF nor OBJ text"), "{text}");
     assert_eq!(shown_file(&harness), None);
-    let shown = harness.query_all_by_label_contains("not an OBJ text file");
+    let shown = harness.query_all_by_label_contains("neither glTF nor OBJ text");
     assert!(shown.count() > 0, "the empty window says so itself");
 
     drop_files(&mut harness, &[&scene]);
@@ -708,7 +708,7 @@ fn among_several_dropped_files_the_scene_is_found() {
 fn a_dropped_folder_is_opened_where_it_holds_one_scene() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let mut harness = window(Options::default());
-    for (count, sentence) in [(0, "no OBJ file"), (1, ""), (2, "several OBJ files")] {
+    for (count, sentence) in [(0, "no OBJ or glTF file"), (1, ""), (2, "several scenes")] {
         if count > 0 {
             let path = folder.path().join(format!("{count}.obj"));
             fs::write(path, ONE_TRIANGLE).expect("it can be written");

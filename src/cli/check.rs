@@ -30,7 +30,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct CheckArguments {
-    /// OBJ file to test
+    /// OBJ or glTF file to test
     #[arg(required_unless_present = "scene", conflicts_with = "scene")]
     pub path: Option<PathBuf>,
     /// Built-in scene to test

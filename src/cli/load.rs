@@ -48,7 +48,7 @@ pub fn load(
     } else {
         let path = path.ok_or(LoadError::Nothing)?;
         check_is_file(path)?;
-        scene::read_obj(path, options)?
+        scene::read_scene(path, options)?
     };
     light(scene, lighting)
 }
@@ -70,7 +70,7 @@ pub(super) fn load_with_faces(
     } else {
         let path = path.ok_or(LoadError::Nothing)?;
         check_is_file(path)?;
-        scene::read_obj_and_faces(path, options)?
+        scene::read_scene_and_faces(path, options)?
     };
     Ok((light(scene, lighting)?, faces))
 }

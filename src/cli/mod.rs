@@ -31,14 +31,14 @@ pub use flags::{LimitFlags, Preset, Reference, RunFlags, SceneFlags, SettingFlag
 pub use light_flags::{LampFlag, LightFlags, SkyFlag, SunFlag};
 pub use load::{LoadError, load};
 
-/// Light an OBJ scene by extended vector-based radiosity.
+/// Light an OBJ or glTF scene by extended vector-based radiosity.
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true)]
 pub struct Arguments {
     /// What to do instead of opening the window
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// OBJ file to open in the window
+    /// OBJ or glTF file to open in the window
     pub path: Option<PathBuf>,
     /// Flags of the window
     #[cfg(feature = "viewer")]

@@ -42,7 +42,7 @@ const POLL: Duration = Duration::from_millis(20);
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct SolveArguments {
-    /// OBJ file to light
+    /// OBJ or glTF file to light
     #[arg(required_unless_present = "scene", conflicts_with = "scene")]
     pub path: Option<PathBuf>,
     /// Built-in scene to light

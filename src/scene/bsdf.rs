@@ -40,6 +40,24 @@ pub enum Specular {
 pub(super) const LEAST_ROUGHNESS: f32 = 0.01;
 
 impl Specular {
+    /// A mirror where it is smooth, else gloss; nothing where nothing is reflected. A roughness that is not finite is 1.
+    pub(super) fn of_roughness(reflectance: Vec3, roughness: f32) -> Option<Self> {
+        let roughness = if roughness.is_finite() {
+            roughness.min(1.0)
+        } else {
+            1.0
+        };
+        let specular = match roughness < LEAST_ROUGHNESS {
+            true => Self::Mirror { reflectance },
+            false => Self::Gloss {
+                reflectance,
+                roughness,
+            },
+        };
+        let shines = reflectance.max_element() > 0.0;
+        shines.then_some(specular)
+    }
+
     /// The part that is reflected of light from all directions, by channel, 0…1.
     pub fn mean_reflectance(&self) -> Vec3 {
         match *self {

@@ -56,7 +56,7 @@ impl SceneBuilder {
         );
         let averages = TextureAverages::new(self.pictures(), &self.materials);
         let surfaces = self.surfaces(&frame, &averages, options);
-        let told = self.source.up;
+        let (told, is_in_metres) = (self.source.up, self.source.is_in_metres);
         let mut scene = Scene {
             name: self.source.name,
             files: self.source.files,
@@ -78,6 +78,8 @@ impl SceneBuilder {
             averages: Arc::new(averages),
             up: options.up.unwrap_or_default(),
             up_evidence: None,
+            is_in_metres,
+            start_view: None,
             environment: Arc::default(),
             radiance_unit,
         };

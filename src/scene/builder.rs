@@ -1,6 +1,8 @@
 //! Raw faces in world coordinates, on their way to a [`super::Scene`].
 
-use std::{path::PathBuf, sync::Arc};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
 
@@ -75,6 +77,26 @@ pub struct Source {
     pub files: Vec<PathBuf>,
     /// The axis that points up in what its program writes, where that is known.
     pub up: Option<UpAxis>,
+    /// See [`super::Scene::is_in_metres`].
+    pub is_in_metres: bool,
+}
+
+impl Source {
+    /// A file that says nothing of its up axis.
+    pub(super) fn of(path: &Path) -> Self {
+        let text = |name: Option<&OsStr>| {
+            name.unwrap_or(path.as_os_str())
+                .to_string_lossy()
+                .into_owned()
+        };
+        Self {
+            name: text(path.file_stem()),
+            file: text(path.file_name()),
+            files: vec![path.to_owned()],
+            up: None,
+            is_in_metres: false,
+        }
+    }
 }
 
 /// Collects faces in world coordinates and turns them into a [`super::Scene`].

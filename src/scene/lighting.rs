@@ -12,8 +12,8 @@ use super::{
 /// Light that is asked for. What is not asked for is as the scene has it. Sky and sun stand by the scene's up axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lighting {
-    /// The sky. Where none is asked for, and neither a surface nor the scene's own sky gives light, it is the default
-    /// one.
+    /// The sky. Where none is asked for, and neither a surface nor the scene's own sky or sun gives light, it is the
+    /// default one.
     pub sky: Option<SkySource>,
     /// The sun.
     pub sun: Option<SunSource>,
@@ -133,6 +133,7 @@ impl Lighting {
     /// The environment of a scene in W·sr⁻¹·m⁻²: its own with what is asked for in its place.
     pub fn environment(&self, scene: &Scene) -> Environment {
         let own = (*scene.environment).clone().scaled(scene.radiance_unit);
+        let has_own_sun = !own.is_default && own.sun.is_some();
         let own_sky = if own.is_default { Sky::Dark } else { own.sky };
         let sun = self.sun.map_or(own.sun, |sun| sun.sun(scene.up));
         let environment = Environment {
@@ -145,7 +146,7 @@ impl Lighting {
             is_default: false,
         };
         let is_asked_for = self.sky.is_some() || self.is_sky_off;
-        if !is_asked_for && environment.sky.is_dark() && !scene.has_emitter() {
+        if !is_asked_for && !has_own_sun && environment.sky.is_dark() && !scene.has_emitter() {
             environment.with_default_sky()
         } else {
             environment

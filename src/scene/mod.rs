@@ -7,6 +7,7 @@
 
 mod ahead;
 mod appearance;
+mod archive;
 mod bsdf;
 mod build;
 mod builder;
@@ -24,12 +25,14 @@ mod environment;
 mod finish;
 mod fit;
 mod frame;
+mod gltf;
 mod hosek;
 mod known_light;
 mod library;
 mod lighting;
 mod limited;
 mod lines;
+mod listed;
 mod locate;
 mod means;
 mod mtl;
@@ -43,6 +46,7 @@ mod overlay;
 mod placement;
 mod progress;
 mod ranges;
+mod read;
 mod read_error;
 mod relight;
 mod shells;
@@ -53,6 +57,7 @@ mod source;
 mod suggestion;
 #[cfg(test)]
 pub(crate) mod test_shapes;
+mod texcoords;
 mod texture;
 mod texture_statement;
 mod triangulate;
@@ -75,10 +80,12 @@ pub use frame::Frame;
 pub use hosek::HosekSky;
 pub use lighting::{Lamp, Lighting, SkySource, SunSource};
 pub use means::TextureMeans;
-pub use obj::{read_obj, read_obj_and_faces, read_obj_with_progress};
 pub use options::{SceneOptions, Sides};
 pub use placement::Placement;
 pub use progress::ReadProgress;
+pub use read::{
+    SCENE_ENDINGS, is_scene_ending, read_scene, read_scene_and_faces, read_scene_with_progress,
+};
 pub use read_error::ReadError;
 pub use relight::ActiveMaterials;
 pub use size_classes::SizeClasses;
@@ -94,7 +101,7 @@ pub(crate) use write::{coordinates, write_name};
 
 use std::{path::PathBuf, sync::Arc};
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use means::TextureAverages;
 
@@ -164,6 +171,8 @@ pub struct Material {
     /// What it sends in preferred directions. Glass is the part that is not opaque; mirrors and gloss are beside the diffuse
     /// part, with which they reflect at most all light.
     pub specular: Option<Specular>,
+    /// Which sides of its faces reflect and emit, where the options leave that to the scene.
+    pub sides: Sides,
 }
 
 impl Material {
@@ -179,6 +188,7 @@ impl Material {
             filter: Vec3::ONE,
             cutout: None,
             specular: None,
+            sides: Sides::Auto,
         }
     }
 }
@@ -211,7 +221,18 @@ pub struct Surface {
     pub opacity: f32,
 }
 
-/// A named run of triangles (`o` or `g` in OBJ).
+/// A camera of a file, in its coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartView {
+    /// The eye.
+    pub position: DVec3,
+    /// Unit vector in which it looks.
+    pub direction: DVec3,
+    /// Vertical angle of view.
+    pub fov_y_radians: f32,
+}
+
+/// A named run of triangles (`o` or `g` in OBJ; a node in glTF).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     /// Its name in the file.
@@ -227,8 +248,8 @@ pub struct Object {
 pub struct Scene {
     /// Its name in titles and reports: the file's stem or the built-in name.
     pub name: String,
-    /// The files that it comes from: the OBJ file, then MTL files and pictures that were found, those that no face shows
-    /// included. Empty for generated scenes.
+    /// The files that it comes from: the OBJ or glTF file, then MTL files, buffers and pictures that were found, those that
+    /// no face shows included. Empty for generated scenes.
     pub files: Vec<PathBuf>,
     /// Triangles before faces were cut where others cross or cover them.
     pub face_count: usize,
@@ -257,6 +278,10 @@ pub struct Scene {
     pub up: UpAxis,
     /// What shows that this axis points up; nothing where it was asked for or is the usual one.
     pub up_evidence: Option<UpEvidence>,
+    /// Whether its file says that its unit of length is the metre, as glTF does and OBJ does not.
+    pub is_in_metres: bool,
+    /// The view that its file brings along.
+    pub start_view: Option<StartView>,
     /// Light from outside; dark as a scene is read.
     pub environment: Arc<Environment>,
     /// Warnings: what was skipped, corrected or clamped.

@@ -2,20 +2,20 @@
 
 use glam::Vec3;
 
-use super::bsdf::{LEAST_ROUGHNESS, Specular, roughness_of_exponent};
+use super::bsdf::{Specular, roughness_of_exponent};
 use super::mtl::MtlMaterial;
 
 /// Exponents from which a highlight is a mirror.
 pub(super) const MIRROR_EXPONENT: f32 = 1000.0;
 
 /// Reflectance of what is no metal and states a roughness but no colour: that of common plastics, paints and woods.
-const DIELECTRIC: f32 = 0.04;
+pub(super) const DIELECTRIC: f32 = 0.04;
 
 /// Index of refraction of glass that states none.
 const GLASS_INDEX: f32 = 1.5;
 
 /// Largest index of refraction: no clear matter has more.
-const MOST_INDEX: f32 = 4.5;
+pub(super) const MOST_INDEX: f32 = 4.5;
 
 /// Reflection in preferred directions, beside a diffuse part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,21 +66,8 @@ impl MtlMaterial {
             (None, Some(exponent)) if exponent >= MIRROR_EXPONENT => 0.0,
             (None, exponent) => roughness_of_exponent(exponent.unwrap_or(0.0)),
         };
-        let roughness = if roughness.is_finite() {
-            roughness.min(1.0)
-        } else {
-            1.0
-        };
-        let specular = match roughness < LEAST_ROUGHNESS {
-            true => Specular::Mirror { reflectance },
-            false => Specular::Gloss {
-                reflectance,
-                roughness,
-            },
-        };
-        let shines = reflectance.max_element() > 0.0;
-        shines.then_some(Shine {
-            specular,
+        Some(Shine {
+            specular: Specular::of_roughness(reflectance, roughness)?,
             diffuse: 1.0 - metal,
         })
     }

@@ -16,80 +16,42 @@ use super::clean::{FaceNote, ForeignNumber, MAX_LIBRARIES, Mention, Notes, ObjCl
 use super::color::linear_from_srgb;
 use super::library::{Defined, Library};
 use super::lines::{Notation, spellings};
+use super::listed::{MOST_LISTED, listed, shortened};
 use super::locate::{Missing, SceneFolder};
 use super::mtl::{MtlMaterial, read_mtl};
 use super::options::SceneOptions;
-use super::progress::ReadProgress;
 use super::read_error::ReadError;
-use super::source;
+use super::source::{CHANGED, Watch};
+use super::texcoords::near_origin;
 use super::texture::Role;
 use super::texture_statement::{TextureReference, TextureStatement};
 use super::triangulate::{Doubt, MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
 use super::whole::folder_of;
-use super::{CutoutId, Material, MaterialId, Scene, Texture, TextureId};
+use super::{CutoutId, Material, MaterialId, Scene, Sides, Texture, TextureId};
 
-/// Read an OBJ file.
+/// Read the faces of an OBJ file that was opened, and what they show.
 ///
 /// # Errors
 /// [`ReadError`] when no scene is left; everything else is a warning in [`Scene::warnings`].
-pub fn read_obj(path: &Path, options: &SceneOptions) -> Result<Scene, ReadError> {
-    read_obj_with_progress(path, options, &ReadProgress::default())
-}
-
-/// Read an OBJ file and report to another thread how much of it has been read.
-///
-/// # Errors
-/// As [`read_obj`].
-pub fn read_obj_with_progress(
+pub(super) fn import<'a>(
     path: &Path,
-    options: &SceneOptions,
-    progress: &ReadProgress,
-) -> Result<Scene, ReadError> {
-    import(path, options, progress)?.finish(path)
-}
-
-/// Read an OBJ file, and keep its faces as they are before they are cleaned and scaled.
-///
-/// # Errors
-/// As [`read_obj`].
-pub fn read_obj_and_faces(
-    path: &Path,
-    options: &SceneOptions,
-) -> Result<(Scene, SceneBuilder), ReadError> {
-    let import = import(path, options, &ReadProgress::default())?;
-    let faces = import.builder.clone();
-    Ok((import.finish(path)?, faces))
-}
-
-/// Read the faces of an OBJ file, and what they show.
-fn import<'a>(
-    path: &Path,
+    reader: impl BufRead + Send,
+    watch: &Watch,
     options: &'a SceneOptions,
-    progress: &ReadProgress,
 ) -> Result<Import<'a>, ReadError> {
-    let (reader, watch) = source::open(path)?;
-    let reader = progress.count(reader, watch.length());
-    let file = path
-        .file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-        .into_owned();
-    let (models, mut notes) = parse(path, ObjCleaner::new(reader, &file))?;
+    let source = Source::of(path);
+    let (models, mut notes) = parse(path, ObjCleaner::new(reader, &source.file))?;
     if watch.has_changed() {
-        let message = "the file changed while it was read; open it again once it is whole";
-        notes.log.note(WarningKind::FileChanged, message, "", 0);
+        notes.log.note(WarningKind::FileChanged, CHANGED, "", 0);
     }
-    let stem = path.file_stem().unwrap_or(path.as_os_str());
     let mut import = Import {
         options,
         folder: SceneFolder::new(folder_of(path).to_owned()),
         builder: SceneBuilder {
             source: Source {
-                name: stem.to_string_lossy().into_owned(),
-                file,
-                files: vec![path.to_owned()],
                 up: notes.up,
+                ..source
             },
             ..SceneBuilder::default()
         },
@@ -132,7 +94,7 @@ fn parse(
     }
     match models {
         Ok(_) if !notes.any_text => Err(ReadError::Empty { path }),
-        Ok(_) if notes.statements == 0 => Err(ReadError::NotObj { path }),
+        Ok(_) if notes.statements == 0 => Err(ReadError::NotScene { path }),
         Ok((models, _)) => Ok((models, notes)),
         Err(error) => Err(ReadError::Parser {
             reason: error.to_string(),
@@ -156,10 +118,10 @@ struct Slot {
 }
 
 /// The scene on its way in.
-struct Import<'a> {
+pub(super) struct Import<'a> {
     options: &'a SceneOptions,
     folder: SceneFolder,
-    builder: SceneBuilder,
+    pub(super) builder: SceneBuilder,
     notes: Notes,
     /// Pictures by path and by what they are for; nothing where reading failed.
     textures: HashMap<(PathBuf, Role), Option<Loaded>>,
@@ -541,6 +503,7 @@ impl Import<'_> {
             filter: defined.material.filter.unwrap_or(Vec3::ONE),
             cutout,
             specular: glass.or(shine.map(|shine| shine.specular)),
+            sides: Sides::Auto,
         };
         let cutting = cutting.filter(|_| cutout.is_some());
         let mapping = self.mapping([reflecting, emitting, cutting], defined);
@@ -834,11 +797,14 @@ impl Import<'_> {
     }
 
     /// Build the scene, with what was noted while reading before what the builder adds.
-    fn finish(mut self, path: &Path) -> Result<Scene, ReadError> {
+    ///
+    /// # Errors
+    /// When no face is left.
+    pub(super) fn finish(mut self, path: &Path) -> Result<Scene, ReadError> {
         let skipped = self.notes.skipped_faces;
         let foreign_number = self.notes.foreign_number;
         let (file, log) = (self.builder.source.file.clone(), self.notes.log);
-        self.builder.warnings = log.into_warnings();
+        self.builder.warnings.splice(..0, log.into_warnings());
         let first = self
             .builder
             .warnings
@@ -878,11 +844,6 @@ impl Import<'_> {
 /// Reflectance where the file gives none.
 const DEFAULT_REFLECTANCE: Vec3 = Vec3::splat(0.5);
 
-/// Textures repeat, and far from the origin single precision has no digits left for the picture: faces are moved by so
-/// many periods. Fewer, and the coordinates of neighbours are torn apart where nothing asks for it; many more, and the
-/// digits are gone.
-const NEAR_PERIODS: f64 = 256.0;
-
 /// Why a file is not taken, behind its name.
 fn missing_because(missing: Missing) -> &'static str {
     match missing {
@@ -890,32 +851,6 @@ fn missing_because(missing: Missing) -> &'static str {
         Missing::Outside => "lies outside the folder of the OBJ file and was not read",
         Missing::Ambiguous => "fits several files that differ in letter case, so none was read",
     }
-}
-
-/// Names in one message. Fewer would hide which are meant, more would hide the message.
-const MOST_LISTED: usize = 8;
-
-/// Names in quotes, at most so many of them, and how many more there are.
-fn listed<'a>(names: impl ExactSizeIterator<Item = &'a str>, most: usize) -> String {
-    let more = names.len().saturating_sub(most);
-    let quoted = names
-        .take(most)
-        .map(|name| format!("'{}'", shortened(name)));
-    let listed = quoted.collect::<Vec<_>>().join(", ");
-    match (more, listed.is_empty()) {
-        (0, _) => listed,
-        (_, true) => format!("{more} more"),
-        (_, false) => format!("{listed} and {more} more"),
-    }
-}
-
-/// A name short enough for a message.
-fn shortened(name: &str) -> String {
-    const LONGEST: usize = 120;
-    if name.chars().count() <= LONGEST {
-        return name.to_owned();
-    }
-    name.chars().take(LONGEST).chain(['…']).collect()
 }
 
 /// A number with few digits for a message.
@@ -945,9 +880,7 @@ impl Corners<'_> {
             let value = DVec2::from_slice(self.mesh.texcoords.get(index..index + 2)?);
             *uv = value * scale + offset;
         }
-        let shift = (uv[0] / NEAR_PERIODS).round() * NEAR_PERIODS;
-        let uv = uv.map(|uv| (uv - shift).as_vec2());
-        uv.iter().all(|uv| uv.is_finite()).then_some(uv)
+        near_origin(uv)
     }
 
     fn normals(&self, which: [usize; 3]) -> Option<[Vec3; 3]> {

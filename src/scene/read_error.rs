@@ -1,8 +1,8 @@
-//! Why an OBJ file gives no scene, one sentence each.
+//! Why a file gives no scene, one sentence each.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Why an OBJ file gives no scene.
+/// Why a file gives no scene.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// No file of that name.
@@ -12,7 +12,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// A folder instead of a file.
-    #[error("this is a folder; name the OBJ file in it: {}", path.display())]
+    #[error("this is a folder; name the scene file in it: {}", path.display())]
     Folder {
         /// The path.
         path: PathBuf,
@@ -38,8 +38,16 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// Another format.
-    #[error("this is not an OBJ text file; export the scene as Wavefront OBJ: {}", path.display())]
-    NotObj {
+    #[error("this is neither glTF nor OBJ text; export the scene as one of these: {}", path.display())]
+    NotScene {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A glTF file or an archive that cannot be used.
+    #[error("{reason}: {}", path.display())]
+    Refused {
+        /// The problem and the remedy.
+        reason: String,
         /// The path.
         path: PathBuf,
     },
@@ -64,7 +72,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// More than the program can index.
-    #[error("there are too many triangles or vertices ({count}, at most {limit}); split the scene: {}", path.display())]
+    #[error("there are too many triangles, vertices or parts ({count}, at most {limit}); split the scene: {}", path.display())]
     TooLarge {
         /// How many there are.
         count: usize,
@@ -81,4 +89,24 @@ pub enum ReadError {
         /// The path.
         path: PathBuf,
     },
+}
+
+impl ReadError {
+    /// The same of another path: that of the archive in which the file is.
+    pub(super) fn at(mut self, other: &Path) -> Self {
+        match &mut self {
+            Self::NotFound { path }
+            | Self::Folder { path }
+            | Self::NotFile { path }
+            | Self::Unreadable { path, .. }
+            | Self::Empty { path }
+            | Self::NotScene { path }
+            | Self::Refused { path, .. }
+            | Self::NoFaces { path, .. }
+            | Self::ForeignNumbers { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::Parser { path, .. } => other.clone_into(path),
+        }
+        self
+    }
 }

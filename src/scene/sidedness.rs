@@ -1,6 +1,6 @@
 //! Which faces are two-sided, and which are turned: sheets are lit on both sides, faces of a consistently wound closed
 //! shell on one. What light passes through is lit on both sides, and so is a shell that looks outward if light gets in
-//! through a part of it.
+//! through a part of it. Materials may say otherwise for their faces.
 
 use glam::Vec3;
 
@@ -29,8 +29,13 @@ impl SceneBuilder {
         let facings = self.orient(&mut list, &shells, positions, options.sides);
         let flags = two_sided(&shells, &facings, options.sides);
         for (triangle, two_sided) in list.iter_mut().zip(flags) {
-            let is_pane = self.is_see_through(triangle) && options.sides == Sides::Auto;
-            triangle.two_sided = two_sided || is_pane;
+            let material = &self.materials[triangle.material.index()];
+            triangle.two_sided = match (options.sides, material.sides) {
+                (Sides::Auto, Sides::One) => material.transmission() != Vec3::ZERO,
+                (Sides::Auto, Sides::Two) => true,
+                (Sides::Auto, Sides::Auto) => two_sided || material.is_see_through(),
+                (Sides::One | Sides::Two, _) => two_sided,
+            };
             triangle.bounds_solid &= !triangle.two_sided;
         }
         ShelledTriangles { list, shells }
@@ -62,7 +67,13 @@ impl SceneBuilder {
                     normals: &|triangle| self.faces[triangle].normals,
                 },
             );
-            let meant = regions.facings();
+            let mut meant = regions.facings();
+            // Where the file says which side is meant, nobody else does.
+            for (triangle, &shell) in list.iter().zip(&shells.of_triangle) {
+                if self.materials[triangle.material.index()].sides == Sides::One {
+                    meant[shell as usize] = Facing::AsWound;
+                }
+            }
             (regions, meant)
         };
         self.warn_of_orientation(shells, &regions, &meant, sides);
@@ -75,7 +86,8 @@ impl SceneBuilder {
             let shell = shell as usize;
             if self.is_see_through(triangle) {
                 solids[shell] = false;
-                if sides == Sides::Auto && shells.volume[shell] > 0.0 {
+                let is_open = self.materials[triangle.material.index()].sides != Sides::One;
+                if sides == Sides::Auto && shells.volume[shell] > 0.0 && is_open {
                     facings[shell] = Facing::Both;
                 }
             }

@@ -1,4 +1,4 @@
-//! Opening an OBJ file: only a file, only as long as it is now, and watched for change while it is read.
+//! Opening the file of a scene: only a file, only as long as it is now, and watched for change while it is read.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read, Take};
@@ -45,7 +45,11 @@ impl Watch {
     }
 }
 
-/// Open the file and refuse early what is no OBJ text. A file that grows is read up to its present end.
+/// What is said of a file that has changed meanwhile.
+pub(super) const CHANGED: &str =
+    "the file changed while it was read; open it again once it is whole";
+
+/// Open the file. One that grows is read up to its present end.
 pub(super) fn open(path: &Path) -> Result<(BufReader<Take<File>>, Watch), ReadError> {
     let path_buf = || path.to_owned();
     let unreadable = |error: std::io::Error| match error.kind() {
@@ -75,13 +79,17 @@ pub(super) fn open(path: &Path) -> Result<(BufReader<Take<File>>, Watch), ReadEr
     if head.is_empty() {
         return Err(ReadError::Empty { path: path_buf() });
     }
-    let mut text = Vec::with_capacity(head.len());
-    let decoded = DecodedText::new(head).read_to_end(&mut text);
-    decoded.map_err(unreadable)?;
-    if looks_binary(&text) {
-        return Err(ReadError::NotObj { path: path_buf() });
-    }
     Ok((reader, watch))
+}
+
+/// Whether a file that begins like this is no OBJ text.
+///
+/// # Errors
+/// Those of the decoder.
+pub(super) fn is_binary(head: &[u8]) -> std::io::Result<bool> {
+    let mut text = Vec::with_capacity(head.len());
+    DecodedText::new(head).read_to_end(&mut text)?;
+    Ok(looks_binary(&text))
 }
 
 /// Whether the beginning of a file holds no OBJ statement but bytes that text does not have.

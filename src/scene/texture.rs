@@ -1,5 +1,6 @@
 //! Textures: linear RGB pixels, repeated, looked up bilinearly; and their reading from picture files.
 
+use std::io::{BufRead, Cursor, Seek};
 use std::ops::{AddAssign, Mul};
 use std::path::Path;
 
@@ -110,7 +111,7 @@ impl Texture {
 
     /// Linear pixels of a picture, averaged down on the way where it is large: a picture of a few hundred kilobytes
     /// may hold pixels for gigabytes. Nothing where no pixel shows what it reflects.
-    fn from_picture(picture: DynamicImage, name: &str, role: Role) -> Option<Picture> {
+    pub(super) fn from_picture(picture: DynamicImage, name: &str, role: Role) -> Option<Picture> {
         let table: Vec<f32> = (0..=255_u8)
             .map(|x| linear_from_srgb(f32::from(x) / 255.0))
             .collect();
@@ -147,6 +148,12 @@ impl Texture {
             is_transparent: false,
             cutout: None,
         })
+    }
+
+    /// Mean of all pixels.
+    pub(super) fn mean(&self) -> Vec3 {
+        let sum: DVec3 = self.pixels.iter().map(|pixel| pixel.as_dvec3()).sum();
+        (sum / self.pixels.len().max(1) as f64).as_vec3()
     }
 
     /// The picture with sides halved until it has at most so many pixels, but at least one.
@@ -378,8 +385,26 @@ where
     }
 }
 
+/// Decode a picture in memory.
+///
+/// # Errors
+/// A clause with the reason why there is no picture.
+pub(super) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
+    let decoded = std::panic::catch_unwind(|| decode_from(ImageReader::new(Cursor::new(bytes))));
+    match decoded {
+        Ok(Ok(picture)) if picture.width() > 0 && picture.height() > 0 => Ok(picture),
+        Ok(Ok(_)) => Err("it has no pixels".to_owned()),
+        Ok(Err(error)) => Err(error.to_string()),
+        Err(_) => Err("its decoder failed".to_owned()),
+    }
+}
+
 fn decode(path: &Path) -> image::ImageResult<DynamicImage> {
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    decode_from(ImageReader::open(path)?)
+}
+
+fn decode_from(reader: ImageReader<impl BufRead + Seek>) -> image::ImageResult<DynamicImage> {
+    let mut reader = reader.with_guessed_format()?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);

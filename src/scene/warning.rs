@@ -101,6 +101,14 @@ impl WarningLog {
         }
     }
 
+    /// Add those of another log.
+    pub(super) fn append(&mut self, other: Self) {
+        for warning in other.warnings {
+            let (file, line) = warning.place.unwrap_or_default();
+            self.note_times(warning.kind, &warning.message, warning.count, &file, line);
+        }
+    }
+
     /// The warnings in the order in which each was first met.
     pub(super) fn into_warnings(self) -> Vec<Warning> {
         self.warnings

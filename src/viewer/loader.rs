@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    scene::{self, Environment, Lighting, ReadProgress, Scene, SceneOptions, builtin},
+    scene::{self, Environment, Frame, Lighting, ReadProgress, Scene, SceneOptions, builtin},
     worker::Wake,
 };
 
@@ -28,7 +28,7 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SceneSource {
-    /// An OBJ file.
+    /// An OBJ or glTF file.
     File(PathBuf),
     /// A built-in scene.
     Builtin(String),
@@ -250,7 +250,7 @@ fn load(
     tracker.enter(Phase::Reading);
     let (scene, viewpoint) = match &source {
         SceneSource::File(path) => {
-            let scene = scene::read_obj_with_progress(path, options, &tracker.file);
+            let scene = scene::read_scene_with_progress(path, options, &tracker.file);
             (scene.map_err(|error| error.to_string())?, None)
         }
         SceneSource::Builtin(name) => {
@@ -268,6 +268,8 @@ fn load(
     let rays = RayTree::new(&scene);
     tracker.enter(Phase::ChoosingView);
     let look = first_look(&scene, &rays);
+    let own = || file_camera(&scene, &rays);
+    let viewpoint = viewpoint.or_else(own).unwrap_or(look.camera);
     let [min, max] = look.bounds;
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
@@ -283,7 +285,7 @@ fn load(
         max,
         is_lit: look.is_lit,
         interior: look.interior,
-        viewpoint: viewpoint.unwrap_or(look.camera),
+        viewpoint,
     })
 }
 
@@ -301,6 +303,20 @@ pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
     let eye = scene.frame.from_world(builtin.viewpoint.position);
     let target = scene.frame.from_world(builtin.viewpoint.target);
     Camera::looking(eye, target, scene.up.vector())
+}
+
+/// The view that a file brings along, around the first thing that it sees.
+pub fn file_camera(scene: &Scene, rays: &RayTree) -> Option<Camera> {
+    let view = scene.start_view?;
+    let eye = scene.frame.from_world(view.position);
+    let direction = view.direction.as_vec3();
+    let seen = rays.closest(eye, direction, None);
+    let distance = seen.map_or(Frame::EXTENT as f32, |hit| hit.distance);
+    let camera = Camera {
+        fov_y_radians: view.fov_y_radians,
+        ..Camera::looking(eye, eye + direction * distance, scene.up.vector())
+    };
+    camera.is_valid().then_some(camera)
 }
 
 #[cfg(test)]

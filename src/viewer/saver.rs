@@ -19,7 +19,7 @@ use crate::{
     geometry::RayTree,
     metrics::SceneComparison,
     picture::harmonics_at_vertices,
-    scene::{MaterialLibrary, Scene, folder_of, write_whole},
+    scene::{MaterialLibrary, Scene, folder_of, is_scene_ending, write_whole},
     solver::{Cancel, Snapshot},
     worker::{self, Wake},
 };
@@ -277,9 +277,8 @@ fn free_path_beside(source: &SceneSource, what: &str, extension: &str) -> PathBu
 
 /// The name of a scene as files may have it.
 fn plain_stem(scene: &str) -> String {
-    let is_obj = |ending: &str| ending.eq_ignore_ascii_case("obj");
     let stem = match scene.rsplit_once('.') {
-        Some((stem, ending)) if is_obj(ending) => stem,
+        Some((stem, ending)) if is_scene_ending(ending) => stem,
         _ => scene,
     };
     let stem: String = stem

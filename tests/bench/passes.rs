@@ -11,7 +11,7 @@ use criterion::{BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
 use vecrad::{
     geometry::RayTree,
     hierarchy::{Hierarchy, PatchTree},
-    scene::{Scene, SceneOptions, builtin::builtin, read_obj, write_obj},
+    scene::{Scene, SceneOptions, builtin::builtin, read_scene, write_obj},
     solver::{Cancel, SolveSettings, Solver},
 };
 
@@ -47,7 +47,7 @@ fn reading(criterion: &mut Criterion, scene: &Scene) {
     let mut group = criterion.benchmark_group("reading");
     group.throughput(Throughput::Bytes(path.metadata().unwrap().len()));
     group.bench_function("OBJ", |bencher| {
-        bencher.iter(|| black_box(read_obj(&path, &SceneOptions::default()).unwrap()));
+        bencher.iter(|| black_box(read_scene(&path, &SceneOptions::default()).unwrap()));
     });
     group.finish();
 }

@@ -30,7 +30,7 @@ use session::{Session, Source};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct ReportArguments {
-    /// OBJ file to measure on
+    /// OBJ or glTF file to measure on
     #[arg(required_unless_present_any = ["scene", "suite"], conflicts_with_all = ["scene", "suite"])]
     pub path: Option<PathBuf>,
     /// Built-in scene to measure on

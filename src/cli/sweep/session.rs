@@ -31,7 +31,7 @@ const USUAL_TIME_LIMIT: Duration = Duration::from_secs(60);
 
 /// Where a scene comes from.
 pub(super) enum Source {
-    /// An OBJ file.
+    /// An OBJ or glTF file.
     File(PathBuf),
     /// A built-in scene.
     Builtin(String),

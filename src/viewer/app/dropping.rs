@@ -8,6 +8,7 @@ use super::{
     super::{loader::SceneSource, messages::Severity},
     App,
 };
+use crate::scene::is_scene_ending;
 
 impl App {
     /// Open the scene among files that were dropped since the last frame.
@@ -36,7 +37,7 @@ impl App {
 
 /// The scene among dropped files and folders, or one sentence; `None` where nothing was dropped.
 fn scene_among(paths: &[PathBuf]) -> Option<Result<PathBuf, String>> {
-    let scene = paths.iter().find(|path| is_obj(path) && path.is_file());
+    let scene = paths.iter().find(|path| is_scene(path) && path.is_file());
     let chosen = scene.or(paths.first())?;
     Some(if chosen.is_dir() {
         scene_in(chosen)
@@ -46,26 +47,28 @@ fn scene_among(paths: &[PathBuf]) -> Option<Result<PathBuf, String>> {
     })
 }
 
-/// The only OBJ file in a folder.
+/// The only scene in a folder.
 fn scene_in(folder: &Path) -> Result<PathBuf, String> {
     let refused = |reason: &str| format!("{reason}: {}", folder.display());
     let entries = std::fs::read_dir(folder)
         .map_err(|error| refused(&format!("the dropped folder cannot be read ({error})")))?;
     let mut scenes = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| is_obj(path) && path.is_file());
+        .filter(|path| is_scene(path) && path.is_file());
     match (scenes.next(), scenes.next()) {
         (Some(only), None) => Ok(only),
-        (None, _) => Err(refused("there is no OBJ file in the dropped folder")),
+        (None, _) => Err(refused(
+            "there is no OBJ or glTF file in the dropped folder",
+        )),
         _ => Err(refused(
-            "there are several OBJ files in the dropped folder; drop one of them",
+            "there are several scenes in the dropped folder; drop one of them",
         )),
     }
 }
 
-fn is_obj(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("obj"))
+fn is_scene(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.is_some_and(is_scene_ending)
 }
 
 /// Say what dropping will do while files are held over the window.
@@ -81,7 +84,7 @@ pub(super) fn hover_ui(ctx: &egui::Context) {
         [] => return,
         [Some(name)] => format!("Drop to open {name}"),
         [None] => "Drop to open".to_owned(),
-        _ => "Drop to open the OBJ file among these".to_owned(),
+        _ => "Drop to open the scene among these".to_owned(),
     };
     let screen = ctx.content_rect();
     egui::Area::new(egui::Id::unique("drop hint"))

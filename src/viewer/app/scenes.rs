@@ -19,7 +19,7 @@ use super::{
     },
     App,
 };
-use crate::scene::Lighting;
+use crate::scene::{Lighting, SCENE_ENDINGS};
 
 impl App {
     /// Begin to read a scene; the present one stays until it is there.
@@ -237,7 +237,7 @@ impl App {
             .spawn(move || {
                 let file = rfd::FileDialog::new()
                     .set_title("Open a scene")
-                    .add_filter("Wavefront OBJ", &["obj", "OBJ"])
+                    .add_filter("OBJ, glTF, ZIP", &SCENE_ENDINGS)
                     .pick_file();
                 // Nobody listens once the window is closed.
                 let _ = sender.send(file);

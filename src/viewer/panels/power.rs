@@ -1,7 +1,9 @@
 //! Powers in the panels: in watts where the scene's unit of length is known to be the metre, else relative to
 //! the power that leaves all surfaces of the scene.
 
-use crate::viewer::{figures::figure, state::State};
+use std::sync::Arc;
+
+use crate::viewer::{figures::figure, loader::LoadedScene, state::State};
 
 /// From powers in frame units to text.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +16,9 @@ impl PowerScale {
     /// That of the scene that is shown.
     pub fn of(state: &State) -> Self {
         let loaded = state.loaded.as_ref();
-        match loaded.filter(|_| state.view.is_in_metres) {
+        let is_in_metres =
+            |loaded: &&Arc<LoadedScene>| state.view.is_in_metres || loaded.scene.is_in_metres;
+        match loaded.filter(is_in_metres) {
             Some(loaded) => Self {
                 is_in_watts: true,
                 factor: loaded.scene.frame.area_to_world(1.0)

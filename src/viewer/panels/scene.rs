@@ -25,7 +25,7 @@ pub fn empty_ui(ui: &mut egui::Ui, rect: egui::Rect, state: &mut State, actions:
                 ui.colored_label(theme::bad(ui.visuals()), &error.text);
                 ui.add_space(6.0);
             }
-            ui.label("Drop an OBJ file here, choose one, or type its path.");
+            ui.label("Drop an OBJ or glTF file here, choose one, or type its path.");
             ui.add_space(8.0);
             if ui
                 .add(egui::Button::new("Open…").min_size(egui::vec2(120.0, 28.0)))

@@ -240,14 +240,17 @@ fn limits_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action>) {
         if sides != state.scene_options.sides {
             actions.push(Action::Sides(sides));
         }
-        row::setting(
-            ui,
-            "Unit is the metre",
-            "OBJ files do not say what a unit of length is. Powers are in watts where it is the metre, else relative.",
-            &mut state.view.is_in_metres,
-            &false,
-            |ui, value| ui.checkbox(value, ""),
-        );
+        let loaded = state.loaded.as_ref();
+        if loaded.is_none_or(|loaded| !loaded.scene.is_in_metres) {
+            row::setting(
+                ui,
+                "Unit is the metre",
+                "OBJ files do not say what a unit of length is. Powers are in watts where it is the metre, else relative.",
+                &mut state.view.is_in_metres,
+                &false,
+                |ui, value| ui.checkbox(value, ""),
+            );
+        }
     });
 }
 
