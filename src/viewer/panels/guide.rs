@@ -54,28 +54,39 @@ impl Page {
         first.trim_start_matches(['#', ' '])
     }
 
-    /// Text, and pictures by their names, in the order of the page.
+    /// Text, code, and pictures by their names, in the order of the page.
     fn parts(&self) -> Vec<Part> {
         let mut parts = Vec::new();
-        let mut rest = self.0;
-        while let Some((before, picture)) = rest.split_once("\n![") {
-            let Some((line, after)) = picture.split_once('\n') else {
-                break;
-            };
-            let name = line
-                .split_once("](")
-                .and_then(|(_, name)| name.strip_suffix(')'));
-            parts.push(Part::Text(before));
-            parts.extend(name.map(Part::Picture));
-            rest = after;
+        for (index, block) in self.0.split("```").enumerate() {
+            if index % 2 == 1 {
+                // The first line names the language.
+                parts.extend(
+                    block
+                        .split_once('\n')
+                        .map(|(_, code)| Part::Code(code.trim())),
+                );
+                continue;
+            }
+            let mut rest = block;
+            while let Some((before, picture)) = rest.split_once("\n![") {
+                let Some((line, after)) = picture.split_once('\n') else {
+                    break;
+                };
+                let name = line.split_once("](");
+                let name = name.and_then(|(_, name)| name.strip_suffix(')'));
+                parts.push(Part::Text(before));
+                parts.extend(name.map(Part::Picture));
+                rest = after;
+            }
+            parts.push(Part::Text(rest));
         }
-        parts.push(Part::Text(rest));
         parts
     }
 }
 
 enum Part {
     Text(&'static str),
+    Code(&'static str),
     Picture(&'static str),
 }
 
@@ -154,6 +165,12 @@ impl Guide {
         match part {
             Part::Text(text) => {
                 CommonMarkViewer::new().show(ui, &mut self.texts, text);
+            }
+            Part::Code(code) => {
+                egui::Frame::group(ui.style()).show(ui, |ui| {
+                    ui.set_min_width(ui.available_width());
+                    ui.label(egui::RichText::new(*code).monospace());
+                });
             }
             Part::Picture(name) => {
                 if let Some(texture) = self.picture(ui.ctx(), name) {
