@@ -251,6 +251,11 @@ impl<'a> Elements<'a> {
         }
     }
 
+    /// Whether no data says what they are.
+    pub(super) fn are_zero(&self) -> bool {
+        self.row.is_none() && self.exceptions.is_none()
+    }
+
     /// Whether the elements may be indices.
     pub(super) fn are_indices(&self) -> bool {
         matches!(

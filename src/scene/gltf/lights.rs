@@ -35,8 +35,11 @@ const CORNERS: usize = 16;
 /// Cones that are wider from their axis end nowhere, radians: a tube would be flatter than its disc.
 const WIDEST_CONE: f64 = 1.4;
 
-/// The part of a tube's radius that the disc has at least: a smaller one is too bright for its size.
+/// The part of a tube's radius that the disc has at least: a smaller one is too bright for its size …
 const SMALLEST_DISC: f64 = 0.05;
+
+/// … and at most: a larger one makes an edge so soft that most of a beam is half shadow, which takes many times the rays.
+const LARGEST_DISC: f64 = 0.4;
 
 /// A light where it stands.
 struct Lamp<'a> {
@@ -196,7 +199,7 @@ fn add_spot(lamp: &Lamp, radius: f64, builder: &mut SceneBuilder) {
 }
 
 /// A black tube about the axis of a spot, with a disc at its bottom. From within the inner cone all of the disc is seen
-/// through its end, from outside the outer one nothing.
+/// through its end, from outside the outer one nothing, unless the edge of the cone is too soft or too sharp for that.
 struct Tube {
     radius: f64,
     length: f64,
@@ -211,14 +214,18 @@ impl Tube {
             return None;
         }
         let outer = outer.tan();
-        let inner = cone.inner_cone_angle.clamp(0.0, WIDEST_CONE).tan();
-        let largest = outer * (1.0 - SMALLEST_DISC) / (1.0 + SMALLEST_DISC);
-        let inner = inner.min(largest);
+        let inner = cone
+            .inner_cone_angle
+            .clamp(0.0, WIDEST_CONE)
+            .tan()
+            .min(outer);
         let length = 2.0 * radius / (outer + inner).max(1.0);
+        let radius = 0.5 * length * (outer + inner);
+        let softness = (outer - inner) / (outer + inner);
         Some(Self {
-            radius: 0.5 * length * (outer + inner),
+            radius,
             length,
-            disc_radius: 0.5 * length * (outer - inner),
+            disc_radius: radius * softness.clamp(SMALLEST_DISC, LARGEST_DISC),
         })
     }
 }

@@ -97,7 +97,7 @@ impl<'a> Materials<'a> {
     }
 
     /// The name of a material in messages.
-    pub(super) fn name(&self, index: Option<usize>) -> String {
+    fn name(&self, index: Option<usize>) -> String {
         let stated = index.and_then(|index| self.document.materials.get(index));
         match (index, stated.map(|stated| stated.name.as_str())) {
             (Some(index), Some("")) => format!("material {index}"),
@@ -130,10 +130,18 @@ impl<'a> Materials<'a> {
                 };
                 reading.define(stated)
             }
-            None => Slot {
-                id: builder.push_material(Material::plain("", DEFAULT_REFLECTANCE, Vec3::ZERO)),
-                placement: None,
-            },
+            None => {
+                // What is painted states its reflectance.
+                let reflectance = match look {
+                    Look::Painted => Vec3::ONE,
+                    Look::Plain | Look::Textured => DEFAULT_REFLECTANCE,
+                };
+                let material = Material::plain("", reflectance, Vec3::ZERO);
+                Slot {
+                    id: builder.push_material(material),
+                    placement: None,
+                }
+            }
         };
         self.slots.insert((index, look), slot);
         slot

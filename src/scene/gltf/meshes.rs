@@ -41,10 +41,12 @@ pub(super) struct Meshes<'a> {
     pub(super) log: WarningLog,
     /// Why the first part that was left out was so.
     pub(super) first_fault: Option<String>,
-    parts: usize,
     /// Parts without surface.
     bare_parts: usize,
+    /// Faces with corners that do not exist.
     unknown_indices: usize,
+    /// Faces two corners of which are one.
+    flat_faces: usize,
 }
 
 impl<'a> Meshes<'a> {
@@ -62,26 +64,55 @@ impl<'a> Meshes<'a> {
             palettes: Palettes::default(),
             log: WarningLog::default(),
             first_fault: None,
-            parts: 0,
             bare_parts: 0,
             unknown_indices: 0,
+            flat_faces: 0,
         }
     }
 
-    /// Add the mesh of a node, if it has one.
+    /// Add the meshes of nodes.
     ///
     /// # Errors
-    /// When there are too many triangles.
-    pub(super) fn add(&mut self, placed: &Placed) -> Result<(), TooMany> {
+    /// When there would be too many triangles.
+    pub(super) fn add(&mut self, placed: &[Placed]) -> Result<(), TooMany> {
+        let triangle_count = self.count(placed)?;
+        self.builder.faces.reserve(triangle_count);
+        placed.iter().for_each(|placed| self.add_mesh(placed));
+        Ok(())
+    }
+
+    /// Triangles of all nodes.
+    fn count(&self, placed: &[Placed]) -> Result<usize, TooMany> {
+        let (mut parts, mut triangles) = (0_usize, 0_usize);
+        for placed in placed {
+            let mesh = placed.node.mesh;
+            let mesh = mesh.and_then(|index| self.document.meshes.get(index));
+            for primitive in mesh.iter().flat_map(|mesh| &mesh.primitives) {
+                let part = Part::of(self.document, self.buffers, primitive, placed.world);
+                let count = part.map_or(0, |part| part.map_or(0, |part| part.triangle_count()));
+                triangles = triangles.saturating_add(count);
+                parts += 1;
+                for (count, limit) in [(triangles, MAX_TRIANGLES), (parts, MAX_PARTS)] {
+                    if count > limit {
+                        return Err(TooMany { count, limit });
+                    }
+                }
+            }
+        }
+        Ok(triangles)
+    }
+
+    /// Add the mesh of a node, if it has one.
+    fn add_mesh(&mut self, placed: &Placed) {
         let Some(index) = placed.node.mesh else {
-            return Ok(());
+            return;
         };
         let Some(mesh) = self.document.meshes.get(index) else {
             self.fault(
                 "a mesh that does not exist is named",
                 &printable(&placed.node.name),
             );
-            return Ok(());
+            return;
         };
         let named = [&placed.node.name, &mesh.name];
         let name = named.into_iter().find(|name| !name.is_empty());
@@ -95,20 +126,11 @@ impl<'a> Meshes<'a> {
             let what = "meshes that are posed by bones or shapes are in their rest pose";
             self.materials.remark(WarningKind::Unsupported, what, &name);
         }
-        self.parts = self.parts.saturating_add(mesh.primitives.len());
-        if self.parts > MAX_PARTS {
-            return Err(TooMany {
-                count: self.parts,
-                limit: MAX_PARTS,
-            });
-        }
         for primitive in &mesh.primitives {
-            match self.part(primitive, placed.world, &name)? {
-                Ok(()) => {}
-                Err(reason) => self.fault(&reason, &name),
+            if let Err(reason) = self.part(primitive, placed.world, &name) {
+                self.fault(&reason, &name);
             }
         }
-        Ok(())
     }
 
     /// Paint what has colours of its own, and count what was left out.
@@ -125,6 +147,11 @@ impl<'a> Meshes<'a> {
                 self.unknown_indices,
                 "skipped a face: vertex index out of range",
             ),
+            (
+                WarningKind::FaceSkipped,
+                self.flat_faces,
+                "skipped a face: no area",
+            ),
         ] {
             if count > 0 {
                 self.log.note_times(kind, message, count, "", 0);
@@ -139,38 +166,16 @@ impl<'a> Meshes<'a> {
         self.first_fault.get_or_insert_with(|| reason.to_owned());
     }
 
-    /// Add a part of a mesh; the inner error is why it is left out.
-    fn part(
-        &mut self,
-        primitive: &Primitive,
-        world: DAffine3,
-        name: &str,
-    ) -> Result<Result<(), String>, TooMany> {
-        let part = match Part::of(self.document, self.buffers, primitive, world) {
-            Ok(Some(part)) => part,
-            Ok(None) => {
-                self.bare_parts += 1;
-                return Ok(Ok(()));
-            }
-            Err(reason) => return Ok(Err(reason)),
+    /// Add a part of a mesh; the error is why it is left out.
+    fn part(&mut self, primitive: &Primitive, world: DAffine3, name: &str) -> Result<(), String> {
+        let part = Part::of(self.document, self.buffers, primitive, world)?;
+        let Some(part) = part else {
+            self.bare_parts += 1;
+            return Ok(());
         };
-        let count = self
-            .builder
-            .faces
-            .len()
-            .saturating_add(part.triangle_count());
-        if count > MAX_TRIANGLES {
-            return Err(TooMany {
-                count,
-                limit: MAX_TRIANGLES,
-            });
-        }
-        let attributes = match self.attributes(primitive, &part, name) {
-            Ok(attributes) => attributes,
-            Err(reason) => return Ok(Err(reason)),
-        };
+        let attributes = self.attributes(primitive, &part, name)?;
         self.push_faces(&part, &attributes, name);
-        Ok(Ok(()))
+        Ok(())
     }
 
     /// Which material, texture coordinates, colours and normals a part has.
@@ -236,8 +241,9 @@ impl<'a> Meshes<'a> {
                 self.unknown_indices += 1;
                 continue;
             };
-            // Strips are led on by triangles without area.
-            if part.mode != Primitive::TRIANGLES && (a == b || b == c || c == a) {
+            if a == b || b == c || c == a {
+                // Strips are led on by such.
+                self.flat_faces += usize::from(part.mode == Primitive::TRIANGLES);
                 continue;
             }
             let numbers = match part.is_mirrored {
@@ -304,6 +310,9 @@ impl<'a> Part<'a> {
         let position = primitive.attributes.get("POSITION");
         let position = *position.ok_or("it has no positions")?;
         let positions = Elements::of(document, buffers, position, &[3])?;
+        if positions.are_zero() {
+            return Err("all of its positions are 0".to_owned());
+        }
         let indices = match primitive.indices {
             None => None,
             Some(index) => {

@@ -115,12 +115,12 @@ pub(super) fn import(
     };
     let materials = Materials::new(document, options);
     let mut meshes = Meshes::new(document, &buffers, materials, builder);
-    for placed in &walk.placed {
-        meshes.add(placed).map_err(|TooMany { count, limit }| {
+    meshes
+        .add(&walk.placed)
+        .map_err(|TooMany { count, limit }| {
             let path = path.to_owned();
             ReadError::TooLarge { count, limit, path }
         })?;
-    }
     let Meshes {
         mut builder,
         materials,
