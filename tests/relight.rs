@@ -487,7 +487,7 @@ fn sky_and_sun_are_lamps_beside_those_of_the_scene() {
     let [sky, sun] = [Vec3::new(0.2, 0.3, 0.5), Vec3::new(9.0, 8.0, 7.0)];
     let under = |sky: Vec3, sun: Option<Vec3>| {
         let sun = sun.map(|irradiance| Sun {
-            direction: Vec3::new(0.3, 1.0, 0.2).normalize(),
+            direction: Vec3::new(0.3, 1.0, 0.2).normalize_or_zero(),
             irradiance,
             diameter: 0.01,
         });

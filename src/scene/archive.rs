@@ -325,9 +325,6 @@ mod tests {
         ] {
             assert_eq!(path_of(name), expected.map(PathBuf::from), "{name}");
         }
-        assert_eq!(
-            path_of(&"a/".repeat(40).trim_end_matches('/').to_owned()),
-            None
-        );
+        assert_eq!(path_of("a/".repeat(40).trim_end_matches('/')), None);
     }
 }

@@ -66,11 +66,14 @@ enum Place {
     Inline(usize),
 }
 
+/// A picture as one use of it reads it, or why that fails.
+type ReadPicture = (Use, Result<Shown, String>);
+
 /// The pictures.
 #[derive(Debug)]
 pub(super) struct Pictures<'a> {
     document: &'a Document,
-    read: HashMap<Place, Vec<(Use, Result<Shown, String>)>>,
+    read: HashMap<Place, Vec<ReadPicture>>,
     pixel_budget: usize,
     cutout_budget: usize,
 }
