@@ -167,7 +167,7 @@ fn objects_lose_comments_but_keep_numbers() {
     let faces = "f 1 2 3\n";
     let obj = format!("{SQUARE}o chair # oak\n{faces}o Window #3\nf 1 3 4\n");
     let scene = read(&folder(&[("scene.obj", &obj)], &[]));
-    let names = scene.objects.iter().map(|object| &*object.name);
+    let names = scene.objects.iter().map(|object| object.name.label());
     assert_eq!(names.collect::<Vec<_>>(), ["chair", "Window #3"]);
 }
 

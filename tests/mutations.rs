@@ -345,6 +345,7 @@ mod sidecar {
             ..Lighting::default()
         };
         let session = Session {
+            bookmarks: Vec::new(),
             camera: Some(Camera::looking(
                 Vec3::new(90.0, 20.0, 3.0),
                 Vec3::X,
