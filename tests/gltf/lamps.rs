@@ -96,7 +96,12 @@ fn a_point_light_obeys_the_square_of_the_distance() {
         );
         glb.json["scenes"][0]["nodes"] = json!([0, outer]);
         let scene = read(&glb);
-        assert!(scene.objects.iter().any(|object| object.name == "bulb"));
+        assert!(
+            scene
+                .objects
+                .iter()
+                .any(|object| object.name.label() == "bulb")
+        );
         let lit = lit(scene, SolveSettings::default());
         assert_lit(&lit, 3.0, |place| from_point(place, 2.0, 40.0));
         let (_, light, _) = lit[0];
@@ -187,7 +192,7 @@ fn lamps_fit_between_surfaces() {
     let lamp = scene
         .objects
         .iter()
-        .find(|object| object.name == "light 0")
+        .find(|object| object.name.label() == "light 0")
         .unwrap();
     for triangle in lamp.start.0..lamp.end.0 {
         for corner in scene.corners(vecrad::scene::TriangleId(triangle)) {

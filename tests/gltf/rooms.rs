@@ -5,7 +5,7 @@ use std::{fs, sync::Arc};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 use vecrad::{
-    export::{MeshFormat, MeshOptions},
+    export::{LitMesh, MeshFormat, MeshOptions},
     scene::{
         Scene, SceneOptions, Sides, Surface, TriangleId, UpAxis, builtin::find_builtin, read_scene,
         write_builtin,
@@ -280,7 +280,7 @@ fn instances_names_and_the_rest_pose() {
     let objects = scene
         .objects
         .iter()
-        .map(|o| (o.name.as_str(), o.start.0, o.end.0));
+        .map(|o| (o.name.label(), o.start.0, o.end.0));
     assert_eq!(
         objects.collect::<Vec<_>>(),
         [("square", 0, 2), ("middle", 2, 4), ("square", 4, 6)]
@@ -319,8 +319,14 @@ fn what_is_written_opens_again() {
     let path = folder.path().join("lit.glb");
     let mut bytes = Vec::new();
     let options = MeshOptions::default();
+    let lit = LitMesh {
+        snapshot: &snapshot,
+        scene: &scene,
+        harmonics: None,
+        lamps: &[],
+    };
     MeshFormat::Glb
-        .write(&mut bytes, &snapshot, &scene.frame, &options)
+        .write(&mut bytes, &path, lit, &options)
         .unwrap();
     fs::write(&path, bytes).unwrap();
     let again = read_scene(&path, &SceneOptions::default()).unwrap();
