@@ -97,11 +97,11 @@ impl Specular {
         }
     }
 
-    /// The roughness of its lobe, α of GGX; that of mirrors and glass is the smallest that there is.
+    /// The roughness of its lobe, α of GGX; 0 for mirrors and glass.
     pub fn roughness(&self) -> f32 {
         match *self {
-            Self::Gloss { roughness, .. } => roughness.max(LEAST_ROUGHNESS),
-            Self::Mirror { .. } | Self::Glass { .. } => LEAST_ROUGHNESS,
+            Self::Gloss { roughness, .. } => roughness,
+            Self::Mirror { .. } | Self::Glass { .. } => 0.0,
         }
     }
 

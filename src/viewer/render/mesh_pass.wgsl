@@ -338,14 +338,17 @@ fn unmasked(cosine: f32, roughness_squared: f32) -> f32 {
     return 2.0 * cosine / max(cosine + root, 1e-12);
 }
 
-// Value of the BSDF of gloss times the cosine towards the light: see `Gloss::value`.
-fn lobe(normal: vec3<f32>, to_eye: vec3<f32>, to_light: vec3<f32>, roughness_squared: f32) -> f32 {
+// Value of the BSDF of gloss times the cosine towards a lamp: see `Gloss::value`. The lobe is wider by the lamp's solid angle, so
+// that a mirror shows the lamp as bright as it is.
+fn lobe(normal: vec3<f32>, to_eye: vec3<f32>, to_light: vec3<f32>, solid_angle: f32) -> f32 {
     let cosine_eye = max(dot(normal, to_eye), 1e-3);
     let cosine_light = dot(normal, to_light);
     if (cosine_light <= 0.0) {
         return 0.0;
     }
     let half = normalize(to_eye + to_light + 1e-6 * normal);
+    let widening = solid_angle / (4.0 * PI * max(dot(half, to_eye), 0.1));
+    let roughness_squared = min(detail.gloss.w + widening, 1.0);
     let cosine = max(dot(normal, half), 0.0);
     let across = cross(normal, half);
     let spread = roughness_squared * cosine * cosine + dot(across, across);
@@ -373,15 +376,13 @@ fn fs_gloss(surface: GlossySurface) -> @location(0) vec4<f32> {
     let along = vec4<f32>(mean, moments.x);
     var radiance = vec3<f32>(dot(surface.red, along), dot(surface.green, along), dot(surface.blue, along));
     radiance = max(radiance, vec3<f32>(0.0));
-    // A lamp widens the lobe: in a mirror it is then as bright as it is.
     var solid_angles = surface.lamps;
     for (var lamp = 0u; lamp < LAMPS; lamp++) {
         let solid_angle = solid_angles[lamp];
         if (solid_angle > 0.0) {
             let middle = view.lamp_places[lamp];
             let to_light = normalize(middle.xyz - surface.position * middle.w);
-            let roughness_squared = min(detail.gloss.w + solid_angle / (4.0 * PI), 1.0);
-            let value = lobe(normal, to_eye, to_light, roughness_squared);
+            let value = lobe(normal, to_eye, to_light, solid_angle);
             radiance += view.lamp_radiance[lamp].rgb * (moments.w * solid_angle * value);
         }
     }
