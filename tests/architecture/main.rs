@@ -76,6 +76,7 @@ const ORDERED_CHILDREN: [(&str, &[&str]); 4] = [
             "queries",
             "accuracy",
             "relight",
+            "by_lamp",
         ],
     ),
     (

