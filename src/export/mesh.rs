@@ -34,6 +34,16 @@ impl Default for MeshOptions {
     }
 }
 
+impl MeshOptions {
+    /// Light of the scene as files have it: in watts, with the factor on all emission; finite and not negative.
+    pub fn scaled(&self, light: Vec3) -> Vec3 {
+        scaled(
+            light,
+            [self.emission_scale, self.radiance_unit].map(f64::from),
+        )
+    }
+}
+
 /// Light at a vertex of the display mesh, linear, finite and not negative.
 pub(super) struct Light {
     /// Emitted and reflected, W·sr⁻¹·m⁻².
@@ -49,10 +59,9 @@ impl Light {
         let arriving = snapshot.light.irradiance.get(index).copied();
         let irradiance = presentable(arriving.unwrap_or_default());
         let radiance = mesh.emission[index] + mesh.reflectance[index] * irradiance * FRAC_1_PI;
-        let scale = [options.emission_scale, options.radiance_unit].map(f64::from);
         Self {
-            radiance: scaled(radiance, scale),
-            irradiance: scaled(irradiance, scale),
+            radiance: options.scaled(radiance),
+            irradiance: options.scaled(irradiance),
         }
     }
 }

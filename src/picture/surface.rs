@@ -9,7 +9,7 @@ use crate::{
     metrics::{MeshLookup, MeshPlace, SidePoint},
     sampling::{EmitterPoint, Emitters},
     scene::{Appearance, Scene, Specular, TriangleId},
-    solver::{DirectLights, DisplayMesh, LitPoint, VertexLight},
+    solver::{DirectLights, DisplayMesh, LitPoint, Snapshot, VertexLight},
 };
 
 /// A scene with light at the vertices of its mesh.
@@ -46,6 +46,21 @@ pub(super) struct Surface {
     pub(super) place: Option<MeshPlace>,
 }
 
+impl<'a> LitScene<'a> {
+    /// A scene, all of its triangles, and its light.
+    pub(super) fn new(scene: &'a Scene, rays: &'a RayTree, snapshot: &'a Snapshot) -> Self {
+        Self {
+            scene,
+            rays,
+            mesh: &snapshot.mesh,
+            light: &snapshot.light,
+            lights: snapshot.lights.as_deref(),
+            lookup: MeshLookup::new(scene, &snapshot.mesh),
+            emitters: Emitters::new(scene),
+        }
+    }
+}
+
 impl LitScene<'_> {
     /// The unit normal of a triangle, towards the side that a ray comes from, and whether that is the back.
     pub(super) fn side(&self, triangle: TriangleId, direction: Vec3) -> (Vec3, bool) {
@@ -64,14 +79,22 @@ impl LitScene<'_> {
     pub(super) fn surface(&self, origin: Vec3, direction: Vec3, hit: Hit) -> Option<Surface> {
         let triangle = hit.triangle;
         let (flat_normal, is_back) = self.side(triangle, direction);
-        let material = self.scene.material(triangle);
         let is_lit = self.is_lit(triangle, is_back);
-        if !is_lit && !material.is_glass() {
-            return None;
-        }
         let position = origin + direction * hit.distance;
+        (is_lit || self.scene.material(triangle).is_glass())
+            .then(|| self.surface_at(triangle, is_back, flat_normal, position))
+    }
+
+    /// A point of a side of a triangle, which has this unit normal.
+    pub(super) fn surface_at(
+        &self,
+        triangle: TriangleId,
+        is_back: bool,
+        flat_normal: Vec3,
+        position: Vec3,
+    ) -> Surface {
         let at = barycentric(position, self.scene.corners(triangle));
-        let shown = if is_lit {
+        let shown = if self.is_lit(triangle, is_back) {
             self.appearance(triangle)
         } else {
             Appearance {
@@ -89,7 +112,7 @@ impl LitScene<'_> {
             Some(place) => self.smooth(position, flat_normal, &place),
             None => (flat_normal, position),
         };
-        Some(Surface {
+        Surface {
             triangle,
             position,
             start,
@@ -97,10 +120,10 @@ impl LitScene<'_> {
             normal,
             reflectance: self.scene.reflected_at(triangle, shown.reflectance, at),
             emission: self.scene.emitted_at(triangle, shown.emission, at),
-            specular: material.specular,
+            specular: self.scene.material(triangle).specular,
             is_back,
             place,
-        })
+        }
     }
 
     /// The present appearance of the material of a triangle.
