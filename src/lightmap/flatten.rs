@@ -125,7 +125,7 @@ pub(super) fn over_others(triangles: &[[Vec2; 3]]) -> Vec<bool> {
         // In each cell they come in their order.
         let before = |cell: usize| {
             let all = cells[cell].iter().map(|&other| other as usize);
-            all.take_while(|other| *other < index)
+            all.take_while(move |other| *other < index)
         };
         let mut covered = grid.covered(triangle);
         is_over[index] = covered.any(|cell| before(cell).any(&mut overlaps));

@@ -20,9 +20,6 @@ pub(super) const PADDING: u32 = 2;
 const LEAST_SIDE: u32 = 64;
 const MOST_SIDE: u32 = 4096;
 
-/// Most texels of a lightmap.
-pub const MOST_TEXELS: u32 = MOST_SIDE * MOST_SIDE;
-
 /// Width and height where no density is asked for, unless charts are too many. Smaller, and shadows in a room blur; larger
 /// takes time.
 const DEFAULT_SIDE: u32 = 1024;

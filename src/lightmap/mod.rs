@@ -21,4 +21,4 @@ mod sides;
 mod texels;
 
 pub use bake::{Lightmap, LightmapFacts, LightmapRequest, bake_lightmap};
-pub use layout::{LayoutError, MOST_TEXELS};
+pub use layout::LayoutError;
