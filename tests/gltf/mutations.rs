@@ -86,12 +86,12 @@ fn material(chance: &mut Chance, textures: &[usize]) -> Value {
     match chance.below(4) {
         0 => {
             material["extensions"]["KHR_materials_transmission"] =
-                json!({ "transmissionFactor": factor })
+                json!({ "transmissionFactor": factor });
         }
         1 => material["extensions"]["KHR_materials_unlit"] = json!({}),
         2 => {
             material["extensions"]["KHR_materials_emissive_strength"] =
-                json!({ "emissiveStrength": 1e6 * factor })
+                json!({ "emissiveStrength": 1e6 * factor });
         }
         _ => {}
     }
