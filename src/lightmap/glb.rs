@@ -172,7 +172,9 @@ impl File<'_> {
         } else {
             &[]
         };
-        let floats = [position, normal].into_iter().flat_map(|value| value.to_array());
+        let floats = [position, normal]
+            .into_iter()
+            .flat_map(|value| value.to_array());
         let coordinates = [&[place], own].concat();
         let coordinates = coordinates.into_iter().flat_map(|at| at.to_array());
         let bytes: Vec<u8> = floats
