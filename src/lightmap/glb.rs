@@ -255,7 +255,7 @@ impl File<'_> {
         let mut nodes: Vec<Value> = objects
             .map(|(mesh, object)| {
                 let mut node = json!({ "mesh": mesh, "translation": centre });
-                name(&mut node, object.name.label());
+                name(&mut node, &object.name);
                 node
             })
             .collect();
@@ -310,7 +310,7 @@ impl File<'_> {
                 triangles += part.indices.len() as u64;
             }
             let mut mesh = json!({ "primitives": primitives });
-            name(&mut mesh, object.name.label());
+            name(&mut mesh, &object.name);
             meshes.push(mesh);
         }
         (meshes, accessors)

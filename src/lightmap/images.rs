@@ -11,7 +11,7 @@ use crate::scene::srgb_byte;
 pub(super) fn linear(values: impl Iterator<Item = Vec3>, side: u32) -> ImageResult<Vec<u8>> {
     let channels = values.flat_map(|value| value.to_array()).collect();
     let picture = Rgb32FImage::from_raw(side, side, channels).unwrap_or_default();
-    encoded(&picture.into(), ImageFormat::OpenExr)
+    encoded(picture.into(), ImageFormat::OpenExr)
 }
 
 /// A PNG file of sRGB bytes, cut off at 1.
@@ -20,7 +20,7 @@ pub(super) fn display(values: impl Iterator<Item = Vec3>, side: u32) -> ImageRes
         .flat_map(|value| value.to_array().map(srgb_byte))
         .collect();
     let picture = RgbImage::from_raw(side, side, bytes).unwrap_or_default();
-    encoded(&picture.into(), ImageFormat::Png)
+    encoded(picture.into(), ImageFormat::Png)
 }
 
 /// The same with straight alpha.
@@ -35,10 +35,10 @@ pub(super) fn transparent(values: impl Iterator<Item = Vec4>, side: u32) -> Imag
         ]
     });
     let picture = RgbaImage::from_raw(side, side, bytes.collect()).unwrap_or_default();
-    encoded(&picture.into(), ImageFormat::Png)
+    encoded(picture.into(), ImageFormat::Png)
 }
 
-fn encoded(picture: &DynamicImage, format: ImageFormat) -> ImageResult<Vec<u8>> {
+fn encoded(picture: DynamicImage, format: ImageFormat) -> ImageResult<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, format)?;
     Ok(bytes.into_inner())
