@@ -6,7 +6,6 @@
 mod check;
 mod flags;
 mod light_flags;
-mod lightmap;
 mod load;
 mod observed;
 mod output;

@@ -113,15 +113,6 @@ pub(super) fn check_inputs_kept(destinations: &[Destination], inputs: &[PathBuf]
     Ok(())
 }
 
-/// A scene's name as a file's, without its ending.
-pub(super) fn file_stem(scene: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || c == '-';
-    scene
-        .chars()
-        .map(|c| if plain(c) { c } else { '_' })
-        .collect()
-}
-
 /// Symbolic links that are followed one after another before they count as a circle, as on most systems.
 const MOST_LINKS: usize = 40;
 

@@ -217,21 +217,19 @@ impl Records {
         Some(own)
     }
 
-    /// The records of the pixels about one, `step` apart, of its group: their indices, and weights of a bell.
+    /// The records of the pixels about one, `step` apart: their indices, and weights of a bell.
     fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, &Record, f32)> {
         const BELL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
         let (row, column) = ((at / self.width) as isize, (at % self.width) as isize);
         let height = (self.list.len() / self.width) as isize;
         let (width, step) = (self.width as isize, step as isize);
-        let group = self.list[at].as_ref().map(|record| record.group);
         (0..25).filter_map(move |index| {
             let (down, across) = (index / 5, index % 5);
             let (row, column) = (row + (down - 2) * step, column + (across - 2) * step);
             let is_inside = (0..height).contains(&row) && (0..width).contains(&column);
             let at = is_inside.then_some((row * width + column) as usize)?;
             let weight = BELL[down as usize] * BELL[across as usize];
-            let record = self.list[at].as_ref()?;
-            (Some(record.group) == group).then_some((at, record, weight))
+            Some((at, self.list[at].as_ref()?, weight))
         })
     }
 }
@@ -248,12 +246,6 @@ impl SharedLight<'_> {
             let variance: f32 = shared.iter().map(|shared| shared.variance).sum();
             variance.sqrt() / light
         })
-    }
-
-    /// What irradiance is more than the indirect light stored, W/m², at the place of a record.
-    pub(super) fn of(&self, at: usize) -> Option<Vec3> {
-        let (record, shared) = (self.records.list[at].as_ref()?, self.list[at]?);
-        Some(record.excess_of(shared.map(|shared| shared.mean)))
     }
 
     /// What irradiance is more than the indirect light stored at a place, W/m², that is `seen` at a place of the picture in

@@ -47,7 +47,7 @@ pub(super) struct Surface {
 }
 
 impl<'a> LitScene<'a> {
-    /// A scene, all of its triangles, and its light.
+    /// A scene under the light of a snapshot.
     pub(super) fn new(scene: &'a Scene, rays: &'a RayTree, snapshot: &'a Snapshot) -> Self {
         Self {
             scene,
@@ -79,22 +79,14 @@ impl LitScene<'_> {
     pub(super) fn surface(&self, origin: Vec3, direction: Vec3, hit: Hit) -> Option<Surface> {
         let triangle = hit.triangle;
         let (flat_normal, is_back) = self.side(triangle, direction);
+        let material = self.scene.material(triangle);
         let is_lit = self.is_lit(triangle, is_back);
+        if !is_lit && !material.is_glass() {
+            return None;
+        }
         let position = origin + direction * hit.distance;
-        (is_lit || self.scene.material(triangle).is_glass())
-            .then(|| self.surface_at(triangle, is_back, flat_normal, position))
-    }
-
-    /// A point of a side of a triangle, which has this unit normal.
-    pub(super) fn surface_at(
-        &self,
-        triangle: TriangleId,
-        is_back: bool,
-        flat_normal: Vec3,
-        position: Vec3,
-    ) -> Surface {
         let at = barycentric(position, self.scene.corners(triangle));
-        let shown = if self.is_lit(triangle, is_back) {
+        let shown = if is_lit {
             self.appearance(triangle)
         } else {
             Appearance {
@@ -112,7 +104,7 @@ impl LitScene<'_> {
             Some(place) => self.smooth(position, flat_normal, &place),
             None => (flat_normal, position),
         };
-        Surface {
+        Some(Surface {
             triangle,
             position,
             start,
@@ -120,10 +112,10 @@ impl LitScene<'_> {
             normal,
             reflectance: self.scene.reflected_at(triangle, shown.reflectance, at),
             emission: self.scene.emitted_at(triangle, shown.emission, at),
-            specular: self.scene.material(triangle).specular,
+            specular: material.specular,
             is_back,
             place,
-        }
+        })
     }
 
     /// The present appearance of the material of a triangle.
