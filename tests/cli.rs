@@ -113,7 +113,9 @@ fn a_solve_writes_glb_where_the_name_ends_so() {
     let text = &glb[20..20 + number(12)];
     let document: serde_json::Value = serde_json::from_slice(text).unwrap();
     assert_eq!(document["meshes"][0]["extras"]["exposure_ev"], -1.0);
-    assert_eq!(document["nodes"][1]["children"][0], 0, "+Z is turned");
+    let root = document["scenes"][0]["nodes"][0].as_u64().unwrap() as usize;
+    assert_eq!(document["nodes"][root]["children"][0], 0, "+Z is turned");
+    assert!(document["nodes"][root]["rotation"].is_array());
     // Two one-sided plates of two triangles each at least.
     let count = |accessor: usize| document["accessors"][accessor]["count"].as_u64().unwrap();
     let (vertices, corners) = (count(0), count(5));
