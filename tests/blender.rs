@@ -1,7 +1,5 @@
 //! The add-on for Blender, in the `bpy` package, where a Python has it: the one that `VECRAD_BPY_PYTHON` names, or `python3`.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::{
     env,
     path::Path,
