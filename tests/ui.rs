@@ -559,7 +559,7 @@ fn the_lit_mesh_is_exported_in_either_format() {
     ] {
         harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::E);
         harness.run_steps(3);
-        let path = folder.path().join("lit.obj");
+        let path = folder.path().join("lit.fbx");
         harness.state_mut().state.panels.mesh_text = path.display().to_string();
         harness.run_steps(2);
         // The choice is there again with the next file.
