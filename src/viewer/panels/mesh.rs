@@ -42,15 +42,14 @@ fn mesh_ui(
     });
     file_field(ui, "File", text);
     // A PLY is one mesh always, and an OBJ has room for one colour.
-    if present != Ok(MeshFormat::Ply) {
-        ui.checkbox(is_merged, "One object")
-            .on_hover_text("All objects of the scene as one; else each keeps its name");
-    }
-    if present != Ok(MeshFormat::Obj) {
-        ui.checkbox(has_harmonics, "Light by direction").on_hover_text(
-            "Adds to each vertex the light that arrives, as first-order spherical harmonics: four colours, found by rays",
-        );
-    }
+    let has_objects = present != Ok(MeshFormat::Ply);
+    ui.add_enabled(has_objects, egui::Checkbox::new(is_merged, "One object"))
+        .on_hover_text("All objects of the scene as one; else each keeps its name");
+    let has_attributes = present != Ok(MeshFormat::Obj);
+    let directions = egui::Checkbox::new(has_harmonics, "Light by direction");
+    ui.add_enabled(has_attributes, directions).on_hover_text(
+        "Adds to each vertex the light that arrives, as first-order spherical harmonics: four colours, found by rays",
+    );
     ui.weak("Exposure and up axis are those of the view, in a PLY and an OBJ the tone map, too.");
     let hint = "The name must end in .ply, .glb or .obj.";
     let confirmed = confirm(ui, "Export", present.is_ok(), hint);
