@@ -103,13 +103,27 @@ impl Light {
         }
     }
 
-    /// That of a lamp alone.
-    pub(super) fn of_lamp(
-        lit: LitMesh<'_>,
-        lamp: &LampLight,
+    /// What files have of it beside a colour, in their order: radiance, irradiance, then, as far as they are asked for, the
+    /// coefficients by direction, and radiance and irradiance of each lamp.
+    pub(super) fn values<'a>(
+        &self,
+        lit: LitMesh<'a>,
         index: usize,
-        options: &MeshOptions,
-    ) -> Self {
+        options: &'a MeshOptions,
+    ) -> impl Iterator<Item = Vec3> + use<'a> {
+        let of_lamps = lit.lamps.iter().flat_map(move |lamp| {
+            let light = Self::of_lamp(lit, lamp, index, options);
+            [light.radiance, light.irradiance]
+        });
+        let directions = self.harmonics.into_iter().flatten();
+        [self.radiance, self.irradiance]
+            .into_iter()
+            .chain(directions)
+            .chain(of_lamps)
+    }
+
+    /// That of a lamp alone.
+    fn of_lamp(lit: LitMesh<'_>, lamp: &LampLight, index: usize, options: &MeshOptions) -> Self {
         let arriving = lamp.irradiance.get(index).copied();
         let emission = lamp.emission.get(index).copied().unwrap_or_default();
         Self::of(lit.snapshot, index, emission, arriving, options)

@@ -33,16 +33,8 @@ pub(super) fn write_ply(
         coordinate.write(out, frame.to_world(position))?;
         write_vector(out, mesh.normals[index])?;
         out.write_all(&options.color.encode(light.radiance))?;
-        write_vector(out, light.radiance)?;
-        write_vector(out, light.irradiance)?;
-        for coefficient in light.harmonics.into_iter().flatten() {
-            write_vector(out, coefficient)?;
-        }
-        for lamp in lit.lamps {
-            let light = Light::of_lamp(lit, lamp, index, options);
-            write_vector(out, light.radiance)?;
-            write_vector(out, light.irradiance)?;
-        }
+        let mut values = light.values(lit, index, options);
+        values.try_for_each(|value| write_vector(out, value))?;
     }
     for corners in &mesh.indices {
         out.write_all(&[3])?;
@@ -189,6 +181,13 @@ mod tests {
         solver::{Lamp, LampLight},
     };
 
+    /// Header and body.
+    fn parted(bytes: &[u8]) -> (&[u8], &[u8]) {
+        let end = b"end_header\n";
+        let start = bytes.windows(end.len()).position(|w| w == end);
+        bytes.split_at(start.unwrap() + end.len())
+    }
+
     #[test]
     fn radiance_is_emission_plus_reflected_irradiance_over_pi_in_world_units() {
         let frame = Frame {
@@ -203,9 +202,7 @@ mod tests {
             lamps: &[],
         };
         write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
-        let end = b"end_header\n";
-        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-        let body = &bytes[start..];
+        let (_, body) = parted(&bytes);
         assert_eq!(body.len(), 3 * (12 * 4 + 3) + 13);
         let float = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
         let second = 51;
@@ -231,9 +228,7 @@ mod tests {
         write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("property float sh3_b\nelement face"));
-        let end = b"end_header\n";
-        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-        let body = &bytes[start..];
+        let (_, body) = parted(&bytes);
         assert_eq!(body.len(), 3 * (12 * 4 + 3 + 48) + 13);
         let float = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
         let found = [0, 1, 2, 3].map(|order| float(51 + 12 * order));
@@ -259,9 +254,7 @@ mod tests {
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("comment lamp 0 material 0\ncomment lamp 1 sky\n"));
         assert!(text.contains("property float lamp1_irradiance_b\nelement face"));
-        let end = b"end_header\n";
-        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-        let body = &bytes[start..];
+        let (_, body) = parted(&bytes);
         assert_eq!(body.len(), 3 * (12 * 4 + 3 + 48) + 13);
         let float = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
         assert_eq!([63, 87].map(float), [1.0, 2.0], "irradiance of each");
@@ -280,10 +273,9 @@ mod tests {
             lamps: &[],
         };
         write_ply(&mut bytes, lit, &MeshOptions::default()).unwrap();
-        let end = b"end_header\n";
-        let start = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
-        let header = String::from_utf8(bytes[..start].to_vec()).unwrap();
-        let body = &bytes[start..bytes.len() - 13];
+        let (header, body) = parted(&bytes);
+        let header = String::from_utf8(header.to_vec()).unwrap();
+        let body = &body[..body.len() - 13];
         let is_double =
             header.contains("property double x\nproperty double y\nproperty double z\n");
         assert_eq!(

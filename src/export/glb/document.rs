@@ -57,7 +57,7 @@ pub(super) fn document(content: &Content<'_>, lit: LitMesh<'_>, options: &MeshOp
                 "buffer": 0,
                 "byteOffset": 0,
                 "byteLength": sizes.vertices_length(),
-                "byteStride": sizes.vertex_bytes(),
+                "byteStride": ATTRIBUTE_BYTES,
                 "target": ARRAY_BUFFER,
             },
             {
@@ -187,13 +187,14 @@ fn accessors(content: &Content<'_>, lit: LitMesh<'_>) -> Vec<Value> {
     let (mut vertices, mut triangles) = (0, 0);
     for mesh in &content.meshes {
         let start = vertices * sizes.vertex_bytes();
+        let count = mesh.vertices.len() as u64;
         let position = accessors.len();
         accessors.extend((0..sizes.attributes).map(|attribute| {
             json!({
                 "bufferView": 0,
-                "byteOffset": start + ATTRIBUTE_BYTES * attribute,
+                "byteOffset": start + ATTRIBUTE_BYTES * count * attribute,
                 "componentType": FLOAT,
-                "count": mesh.vertices.len(),
+                "count": count,
                 "type": "VEC3",
             })
         }));
@@ -211,7 +212,7 @@ fn accessors(content: &Content<'_>, lit: LitMesh<'_>) -> Vec<Value> {
             }));
             triangles += count;
         }
-        vertices += mesh.vertices.len() as u64;
+        vertices += count;
     }
     accessors
 }

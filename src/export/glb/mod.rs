@@ -25,7 +25,7 @@ use super::{
 use crate::scene::{Frame, ObjectName};
 use document::document;
 
-/// Attributes of every vertex, three floats each, in the order of the file; those that are asked for follow.
+/// Attributes of every vertex of a mesh, three floats each, in the order of the file; those that are asked for follow.
 const ATTRIBUTES: [&str; 5] = ["POSITION", "NORMAL", "COLOR_0", "_RADIANCE", "_IRRADIANCE"];
 
 /// Those of light by direction.
@@ -82,9 +82,15 @@ pub(super) fn write_glb(
     write_numbers(out, &[sizes.buffer_length() as u32])?;
     out.write_all(b"BIN\0")?;
     for mesh in &content.meshes {
+        // One attribute behind the other: vertices with all of theirs together may be longer than the format allows.
+        let mut blocks = vec![Vec::new(); content.attributes.len()];
         for &vertex in &mesh.vertices {
-            write_vertex(out, lit, vertex as usize, options)?;
+            let values = vertex_values(lit, vertex as usize, options);
+            for (block, value) in blocks.iter_mut().zip(values) {
+                write_vector(block, value)?;
+            }
         }
+        blocks.iter().try_for_each(|block| out.write_all(block))?;
     }
     let primitives = content.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let mut triangles = primitives.flat_map(|primitive| &primitive.triangles);
@@ -92,28 +98,19 @@ pub(super) fn write_glb(
 }
 
 /// The attributes of a vertex, in the order of [`Content::attributes`].
-fn write_vertex(
-    out: &mut dyn Write,
-    lit: LitMesh<'_>,
+fn vertex_values<'a>(
+    lit: LitMesh<'a>,
     vertex: usize,
-    options: &MeshOptions,
-) -> io::Result<()> {
+    options: &'a MeshOptions,
+) -> impl Iterator<Item = Vec3> + 'a {
     let mesh = &lit.snapshot.mesh;
     let light = Light::at(lit, vertex, options);
-    write_vector(out, from_node(mesh.positions[vertex], &lit.scene.frame))?;
-    write_vector(out, mesh.normals[vertex].normalize_or(Vec3::Y))?;
-    write_vector(out, options.color.exposed(light.radiance).min(Vec3::ONE))?;
-    write_vector(out, light.radiance)?;
-    write_vector(out, light.irradiance)?;
-    for coefficient in light.harmonics.into_iter().flatten() {
-        write_vector(out, coefficient)?;
-    }
-    for lamp in lit.lamps {
-        let light = Light::of_lamp(lit, lamp, vertex, options);
-        write_vector(out, light.radiance)?;
-        write_vector(out, light.irradiance)?;
-    }
-    Ok(())
+    let shown = [
+        from_node(mesh.positions[vertex], &lit.scene.frame),
+        mesh.normals[vertex].normalize_or(Vec3::Y),
+        options.color.exposed(light.radiance).min(Vec3::ONE),
+    ];
+    shown.into_iter().chain(light.values(lit, vertex, options))
 }
 
 /// What the file holds, without the values of vertices.

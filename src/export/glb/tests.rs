@@ -196,6 +196,17 @@ fn the_light_of_each_lamp_follows_with_its_name() {
     assert!((radiance - 0.25 - 1.0 / PI).abs() < 1e-6, "{radiance}");
     let named = &file.0["meshes"][0]["extras"]["lamps"];
     assert_eq!(*named, json!(["material 0", "sun"]));
+    // The format has no place for more than 252 bytes of a vertex together.
+    let many = vec![lamp(Lamp::Sky, 3.0); 40];
+    let file = glb_of(
+        LitMesh {
+            lamps: &many,
+            ..lit
+        },
+        &MeshOptions::default(),
+    );
+    assert!(file.0["bufferViews"][0]["byteStride"].as_u64().unwrap() <= 252);
+    assert_eq!(attribute(&file, "_IRRADIANCE_39"), [Vec3::splat(3.0); 3]);
 }
 
 #[test]
