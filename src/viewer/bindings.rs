@@ -109,8 +109,8 @@ pub const FOCUS: [(&str, &str); 3] = [
 /// Keys that move the camera while the right button is held; Ctrl slows it then, and means nothing else.
 const FLYING: [Key; 6] = [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E];
 
-/// Keys of the first bookmarks.
-const BOOKMARK_KEYS: [Key; 9] = [
+/// The row of digits in the order of the keyboard: of view modes, and its first keys of bookmarks.
+const ROW: [Key; ViewMode::ALL.len()] = [
     Key::Num1,
     Key::Num2,
     Key::Num3,
@@ -120,7 +120,12 @@ const BOOKMARK_KEYS: [Key; 9] = [
     Key::Num7,
     Key::Num8,
     Key::Num9,
+    Key::Num0,
+    Key::Minus,
 ];
+
+/// Bookmarks that have a key.
+const BOOKMARK_KEYS: usize = 9;
 
 /// What two keys do, since one of them needs Shift on some keyboards.
 const LARGER: &str = "Larger text and panels";
@@ -327,7 +332,7 @@ pub fn bindings() -> Vec<Binding> {
         plain(Key::Questionmark, File, "This sheet", Action::ToggleHelp),
         command(Key::Q, File, "Quit", Action::Quit),
     ];
-    for (index, key) in BOOKMARK_KEYS.into_iter().enumerate() {
+    for (index, key) in ROW.into_iter().take(BOOKMARK_KEYS).enumerate() {
         all.push(command(
             key,
             Camera,
@@ -335,20 +340,6 @@ pub fn bindings() -> Vec<Binding> {
             Action::GoTo(index),
         ));
     }
-    // In the order of the keyboard.
-    const ROW: [Key; ViewMode::ALL.len()] = [
-        Key::Num1,
-        Key::Num2,
-        Key::Num3,
-        Key::Num4,
-        Key::Num5,
-        Key::Num6,
-        Key::Num7,
-        Key::Num8,
-        Key::Num9,
-        Key::Num0,
-        Key::Minus,
-    ];
     all.extend(
         ROW.into_iter()
             .zip(ViewMode::ALL)
