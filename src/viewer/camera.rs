@@ -264,6 +264,15 @@ impl Camera {
         self.distance = needed.min(MAX_DISTANCE);
     }
 
+    /// The same angle of view and projection from another place.
+    pub fn placed(&self, eye: Vec3, pivot: Vec3, up: Vec3) -> Self {
+        Self {
+            fov_y_radians: self.fov_y_radians,
+            orthographic: self.orthographic,
+            ..Self::looking(eye, pivot, up)
+        }
+    }
+
     /// Look along an axis; the other way along it where the camera does so already.
     pub fn look_from(&mut self, view: AxisView) {
         let along = Self::angles_from(view);

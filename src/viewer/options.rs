@@ -50,12 +50,7 @@ impl CameraRequest {
     pub fn apply(&self, camera: Camera, frame: &Frame) -> Camera {
         let mut camera = camera;
         if let Some(up) = self.up.filter(|up| *up != camera.up) {
-            let (eye, pivot) = (camera.eye(), camera.pivot);
-            camera = Camera {
-                fov_y_radians: camera.fov_y_radians,
-                orthographic: camera.orthographic,
-                ..Camera::looking(eye, pivot, up)
-            };
+            camera = camera.placed(camera.eye(), camera.pivot, up);
         }
         if self.position.is_some() || self.focal_point.is_some() {
             let eye = self
@@ -64,11 +59,7 @@ impl CameraRequest {
             let target = self
                 .focal_point
                 .map_or(camera.pivot, |point| frame.from_world(point));
-            camera = Camera {
-                fov_y_radians: camera.fov_y_radians,
-                orthographic: camera.orthographic,
-                ..Camera::looking(eye, target, camera.up)
-            };
+            camera = camera.placed(eye, target, camera.up);
         }
         if let Some(degrees) = self.view_angle_degrees {
             camera.fov_y_radians = degrees.clamp(1.0, 170.0).to_radians();

@@ -104,12 +104,7 @@ impl App {
             let place = |point| to.from_world(from.to_world(point));
             let moved = |camera: &Camera| {
                 let [eye, pivot] = [camera.eye(), camera.pivot].map(place);
-                let moved = Camera {
-                    fov_y_radians: camera.fov_y_radians,
-                    orthographic: camera.orthographic,
-                    ..Camera::looking(eye, pivot, camera.up)
-                };
-                Some(moved).filter(Camera::is_valid)
+                Some(camera.placed(eye, pivot, camera.up)).filter(Camera::is_valid)
             };
             if let Some(camera) = moved(&self.state.rig.target) {
                 self.state.rig.jump(camera);
