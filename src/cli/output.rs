@@ -11,7 +11,7 @@ use std::{
 use anyhow::{Context as _, Result, anyhow, bail};
 
 use super::UsageError;
-use crate::scene::{self, folder_of};
+use crate::scene::{self, folder_of, place_of};
 
 /// Whether a name means standard output.
 pub(super) fn is_stdout(path: &Path) -> bool {
@@ -111,29 +111,6 @@ pub(super) fn check_inputs_kept(destinations: &[Destination], inputs: &[PathBuf]
         }
     }
     Ok(())
-}
-
-/// Symbolic links that are followed one after another before they count as a circle, as on most systems.
-const MOST_LINKS: usize = 40;
-
-/// The file that a name leads to, without symbolic links, `.` and `..`, whether or not there is a file yet.
-fn place_of(path: &Path) -> PathBuf {
-    let mut path = path.to_owned();
-    for _ in 0..MOST_LINKS {
-        if let Ok(place) = fs::canonicalize(&path) {
-            return place;
-        }
-        let folder = folder_of(&path);
-        // A link to a file that is not there yet.
-        match fs::read_link(&path) {
-            Ok(target) => path = folder.join(target),
-            Err(_) => {
-                let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-                return folder.join(path.file_name().unwrap_or_default());
-            }
-        }
-    }
-    path
 }
 
 /// Write a file whole or not at all; or write to standard output, as much of it as its reader wants.

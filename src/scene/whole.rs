@@ -59,6 +59,29 @@ pub fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// Symbolic links that are followed one after another before they count as a circle, as on most systems.
+const MOST_LINKS: usize = 40;
+
+/// The file that a name leads to, without symbolic links, `.` and `..`, whether or not there is a file yet.
+pub fn place_of(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Ok(place) = fs::canonicalize(&path) {
+            return place;
+        }
+        let folder = folder_of(&path);
+        // A link to a file that is not there yet.
+        match fs::read_link(&path) {
+            Ok(target) => path = folder.join(target),
+            Err(_) => {
+                let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+                return folder.join(path.file_name().unwrap_or_default());
+            }
+        }
+    }
+    path
+}
+
 /// Whether there is something that is neither a file nor a folder.
 fn is_device(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())

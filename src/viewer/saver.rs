@@ -19,7 +19,7 @@ use crate::{
     geometry::RayTree,
     metrics::SceneComparison,
     picture::harmonics_at_vertices,
-    scene::{MaterialLibrary, Scene, folder_of, is_scene_ending, write_whole},
+    scene::{MaterialLibrary, Scene, folder_of, is_scene_ending, place_of, write_whole},
     solver::{Cancel, Snapshot},
     worker::{self, Wake},
 };
@@ -159,11 +159,9 @@ impl LitMesh {
 
 /// Whether a path leads to one of some files.
 fn is_one_of(path: &Path, files: &[PathBuf]) -> bool {
-    let Ok(place) = path.canonicalize() else {
-        return false;
-    };
-    let mut places = files.iter().filter_map(|file| file.canonicalize().ok());
-    places.any(|other| other == place)
+    let place = place_of(path);
+    // A file that does not exist yet is none of them.
+    place.exists() && files.iter().any(|file| place_of(file) == place)
 }
 
 /// Something on its way to a file.
