@@ -25,6 +25,7 @@ mod environment;
 mod finish;
 mod fit;
 mod frame;
+mod geodesic;
 mod gltf;
 mod hosek;
 mod known_light;
@@ -95,7 +96,7 @@ pub use texture::{OmittedTextures, Texture};
 pub use up_axis::UpAxis;
 pub use upright::UpEvidence;
 pub use warning::{Warning, WarningKind};
-pub use whole::{folder_of, try_writing, write_whole};
+pub use whole::{folder_of, place_of, try_writing, write_whole};
 pub use write::{MaterialLibrary, write_builtin, write_obj};
 pub(crate) use write::{coordinates, write_name};
 

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use earcut::Earcut;
 use glam::{DQuat, DVec2, DVec3, Vec2};
 
-use crate::scene::{Face, MaterialId, SceneBuilder};
+use crate::scene::{Face, MaterialId, SceneBuilder, geodesic};
 
 /// Triangles in the making, in world coordinates.
 #[derive(Clone, Debug, Default)]
@@ -41,11 +41,8 @@ impl Mesh {
 
     /// Triangles between a row of vertices and one that has one more.
     pub(super) fn strip(&mut self, above: &[u32], below: &[u32], material: MaterialId) {
-        for (column, &apex) in above.iter().enumerate() {
-            self.triangle([apex, below[column], below[column + 1]], material);
-            if let Some(&beside) = above.get(column + 1) {
-                self.triangle([apex, below[column + 1], beside], material);
-            }
+        for corners in geodesic::strip(above, below) {
+            self.triangle(corners, material);
         }
     }
 
@@ -290,80 +287,17 @@ pub(super) fn lines_through(breaks: &[f64], cell: f64) -> Vec<f64> {
     lines
 }
 
-/// A unit sphere of `20 · frequency²` triangles: the icosahedron with every face cut into `frequency` rows.
+/// A unit sphere, see [`geodesic::sphere`].
 pub(super) fn geodesic_sphere(frequency: u32, material: MaterialId) -> Mesh {
-    let (corners, faces) = icosahedron();
-    let mut mesh = Mesh::default();
-    // A vertex is known by the weights of the icosahedron's corners, so that neighbouring faces share it exactly.
-    let mut known: HashMap<[(u8, u32); 3], u32> = HashMap::new();
-    for face in faces {
-        let mut row_above: Vec<u32> = Vec::new();
-        for row in 0..=frequency {
-            let this_row: Vec<u32> = (0..=row)
-                .map(|column| {
-                    let weights = [frequency - row, row - column, column];
-                    let mut key = [0, 1, 2].map(|k| match weights[k] {
-                        0 => (0, 0),
-                        weight => (face[k], weight),
-                    });
-                    key.sort_unstable();
-                    *known.entry(key).or_insert_with(|| {
-                        let sum: DVec3 = key
-                            .iter()
-                            .map(|&(corner, weight)| corners[corner as usize] * f64::from(weight))
-                            .sum();
-                        mesh.vertex(sum.normalize_or_zero())
-                    })
-                })
-                .collect();
-            mesh.strip(&row_above, &this_row, material);
-            row_above = this_row;
-        }
+    let (positions, faces) = geodesic::sphere(frequency);
+    let mut mesh = Mesh {
+        positions,
+        ..Mesh::default()
+    };
+    for corners in faces {
+        mesh.triangle(corners, material);
     }
     mesh
-}
-
-/// Corners and outward faces of the regular icosahedron.
-fn icosahedron() -> ([DVec3; 12], [[u8; 3]; 20]) {
-    const GOLDEN: f64 = 1.618_033_988_749_895;
-    let corners = [
-        (-1.0, GOLDEN, 0.0),
-        (1.0, GOLDEN, 0.0),
-        (-1.0, -GOLDEN, 0.0),
-        (1.0, -GOLDEN, 0.0),
-        (0.0, -1.0, GOLDEN),
-        (0.0, 1.0, GOLDEN),
-        (0.0, -1.0, -GOLDEN),
-        (0.0, 1.0, -GOLDEN),
-        (GOLDEN, 0.0, -1.0),
-        (GOLDEN, 0.0, 1.0),
-        (-GOLDEN, 0.0, -1.0),
-        (-GOLDEN, 0.0, 1.0),
-    ]
-    .map(|(x, y, z)| DVec3::new(x, y, z));
-    let faces = [
-        [0, 11, 5],
-        [0, 5, 1],
-        [0, 1, 7],
-        [0, 7, 10],
-        [0, 10, 11],
-        [1, 5, 9],
-        [5, 11, 4],
-        [11, 10, 2],
-        [10, 7, 6],
-        [7, 1, 8],
-        [3, 9, 4],
-        [3, 4, 2],
-        [3, 2, 6],
-        [3, 6, 8],
-        [3, 8, 9],
-        [4, 9, 5],
-        [2, 4, 11],
-        [6, 2, 10],
-        [8, 6, 7],
-        [9, 8, 1],
-    ];
-    (corners, faces)
 }
 
 /// A solid of revolution about the y axis. `profile` runs upwards in (radius, height), all radii above 0, and is

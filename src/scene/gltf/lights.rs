@@ -11,7 +11,7 @@ use super::document::{Cone, Document, Light};
 use super::meshes::MAX_TRIANGLES;
 use super::nodes::Placed;
 use super::printable;
-use super::shapes::{icosphere, ring};
+use super::shapes::{ring, small_sphere};
 use crate::scene::listed::{MOST_LISTED, listed};
 use crate::scene::warning::WarningLog;
 use crate::scene::{Material, SceneBuilder, Sides, Sun, WarningKind, luminance};
@@ -97,7 +97,7 @@ pub(super) fn add_lights(
         log.note_times(WarningKind::Light, message, unknown - lamps.len(), "", 0);
     }
     let faces_left = MAX_TRIANGLES.saturating_sub(builder.faces.len());
-    let most = faces_left / icosphere(1.0).len();
+    let most = faces_left / small_sphere(1.0).len();
     if lamps.len() > most {
         let message = "lights were left out, since the scene would have too many triangles";
         log.note_times(WarningKind::Light, message, lamps.len() - most, "", 0);
@@ -168,7 +168,7 @@ fn place_lamps(lamps: &[Lamp], builder: &mut SceneBuilder, log: &mut WarningLog)
 
 /// A sphere whose mean intensity is that of the light: radiance times a quarter of its surface.
 fn add_point(lamp: &Lamp, radius: f64, builder: &mut SceneBuilder) {
-    let triangles = icosphere(radius);
+    let triangles = small_sphere(radius);
     let area = |[a, b, c]: &[DVec3; 3]| 0.5 * (*b - *a).cross(*c - *a).length();
     let surface: f64 = triangles.iter().map(area).sum();
     push(builder, lamp, &triangles, (4.0 / surface) as f32);

@@ -4,42 +4,14 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-/// A sphere of 80 triangles: an icosahedron, each face of which is cut into four. Its front looks outward. The light that it
-/// sends to different directions differs by little more than a percent.
-pub(super) fn icosphere(radius: f64) -> Vec<[DVec3; 3]> {
-    let middle = |a: DVec3, b: DVec3| (a + b).normalize_or_zero();
-    icosahedron()
-        .into_iter()
-        .flat_map(|[a, b, c]| {
-            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-        })
-        .map(|triangle| triangle.map(|corner| corner * radius))
-        .collect()
-}
+use crate::scene::geodesic;
 
-/// The icosahedron with corners at distance 1.
-fn icosahedron() -> Vec<[DVec3; 3]> {
-    let pole = DVec3::Y;
-    // Two rings of five between the poles, at a height of 1/√5.
-    let height = 1.0 / 5.0_f64.sqrt();
-    let corner = |number: usize, height: f64, turn: f64| {
-        let (sine, cosine) = ((number as f64 + turn) * TAU / 5.0).sin_cos();
-        let across = (1.0 - height * height).sqrt();
-        DVec3::new(across * sine, height, across * cosine)
-    };
-    let upper = |number: usize| corner(number, height, 0.0);
-    let lower = |number: usize| corner(number, -height, 0.5);
-    (0..5)
-        .flat_map(|at| {
-            [
-                [pole, upper(at), upper(at + 1)],
-                [upper(at), lower(at), upper(at + 1)],
-                [lower(at), lower(at + 1), upper(at + 1)],
-                [-pole, lower(at + 1), lower(at)],
-            ]
-        })
-        .collect()
+/// A sphere of 80 triangles, whose front looks outward. The light that it sends to different directions differs by little more
+/// than a percent.
+pub(super) fn small_sphere(radius: f64) -> Vec<[DVec3; 3]> {
+    let (positions, faces) = geodesic::sphere(2);
+    let places = |face: [u32; 3]| face.map(|corner| positions[corner as usize] * radius);
+    faces.into_iter().map(places).collect()
 }
 
 /// Corners of a regular polygon with the area of a disc of this radius, counter-clockwise about a unit vector.
@@ -64,7 +36,7 @@ mod tests {
 
     #[test]
     fn the_sphere_is_closed_looks_outward_and_is_round() {
-        let sphere = icosphere(2.0);
+        let sphere = small_sphere(2.0);
         assert_eq!(sphere.len(), 80);
         let sum: DVec3 = sphere.iter().map(area_vector).sum();
         assert!(sum.length() < 1e-12);
