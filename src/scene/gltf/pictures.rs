@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
-use image::DynamicImage;
+use image::{DynamicImage, Primitive};
 
 use super::buffers::Buffers;
 use super::document::{Document, Image, TextureInfo};
@@ -218,6 +218,20 @@ fn name_of(image: &Image, index: usize) -> String {
     }
 }
 
+/// Make pixels whole or nothing, by whether their alpha, 0…1, is at least this.
+fn cut_below<T: Primitive>(pixels: &mut [T], least: f32)
+where
+    f32: From<T>,
+{
+    let whole = f32::from(T::DEFAULT_MAX_VALUE);
+    for alpha in pixels.iter_mut().skip(3).step_by(4) {
+        *alpha = match f32::from(*alpha) / whole >= least {
+            true => T::DEFAULT_MAX_VALUE,
+            false => T::DEFAULT_MIN_VALUE,
+        };
+    }
+}
+
 /// A picture whose alpha says what a cut-out takes from it, and its mean alpha.
 fn with_alpha(picture: DynamicImage, alpha: Alpha) -> (DynamicImage, f32) {
     if !picture.color().has_alpha() {
@@ -228,21 +242,13 @@ fn with_alpha(picture: DynamicImage, alpha: Alpha) -> (DynamicImage, f32) {
         (Alpha::Ignored, false) => (picture.into_rgb8().into(), 1.0),
         (Alpha::Ignored, true) => (picture.into_rgb16().into(), 1.0),
         (Alpha::CutBelow(bits), false) => {
-            let least = f32::from_bits(bits);
             let mut pixels = picture.into_rgba8();
-            for alpha in pixels.iter_mut().skip(3).step_by(4) {
-                let is_there = f32::from(*alpha) / 255.0 >= least;
-                *alpha = if is_there { u8::MAX } else { 0 };
-            }
+            cut_below(&mut pixels, f32::from_bits(bits));
             (pixels.into(), 1.0)
         }
         (Alpha::CutBelow(bits), true) => {
-            let least = f32::from_bits(bits);
             let mut pixels = picture.into_rgba16();
-            for alpha in pixels.iter_mut().skip(3).step_by(4) {
-                let is_there = f32::from(*alpha) / 65_535.0 >= least;
-                *alpha = if is_there { u16::MAX } else { 0 };
-            }
+            cut_below(&mut pixels, f32::from_bits(bits));
             (pixels.into(), 1.0)
         }
         (Alpha::Seen, _) => {

@@ -1,5 +1,7 @@
 //! Uniform resource identifiers as glTF files have them: data in base64, or names of files.
 
+use percent_encoding::percent_decode_str;
+
 /// What a URI names.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Resource {
@@ -75,26 +77,7 @@ fn decoded(text: &str) -> String {
 }
 
 fn decoded_bytes(text: &str) -> Vec<u8> {
-    let digit = |byte: &u8| char::from(*byte).to_digit(16);
-    let mut rest = text.as_bytes();
-    let mut bytes = Vec::with_capacity(rest.len());
-    while let Some((&first, behind)) = rest.split_first() {
-        let code = match (first, behind) {
-            (b'%', [high, low, ..]) => digit(high).zip(digit(low)),
-            _ => None,
-        };
-        match code {
-            Some((high, low)) => {
-                bytes.push((high << 4 | low) as u8);
-                rest = &behind[2..];
-            }
-            None => {
-                bytes.push(first);
-                rest = behind;
-            }
-        }
-    }
-    bytes
+    percent_decode_str(text).collect()
 }
 
 #[cfg(test)]
