@@ -7,7 +7,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
-    incoming::{Incoming, copy_repeated, vertex_places},
+    incoming::{Incoming, vertex_places},
     lamps::Source,
     surface::LitScene,
 };
@@ -77,7 +77,7 @@ pub fn gloss_at_vertices(
     };
     let mut vertices: Vec<GlossVertex> = places.par_iter().enumerate().map(light).collect();
     cancel.proceed()?;
-    copy_repeated(lit.mesh, &mut vertices);
+    lit.mesh.repeat(&mut vertices);
     Some(GlossLight {
         lamps: found.list,
         vertices,

@@ -74,7 +74,7 @@ pub fn harmonics_at_vertices(
     };
     let mut found: Vec<Harmonics> = places.par_iter().enumerate().map(harmonics).collect();
     cancel.proceed()?;
-    copy_repeated(lit.mesh, &mut found);
+    lit.mesh.repeat(&mut found);
     Some(found)
 }
 
@@ -93,11 +93,6 @@ pub(super) fn vertex_places(
     mesh: &DisplayMesh,
     is_wanted: impl Fn(usize) -> bool,
 ) -> Vec<Option<VertexPlace>> {
-    let own = mesh.positions.len() - mesh.repeated.len();
-    let original = |vertex: u32| match (vertex as usize).checked_sub(own) {
-        Some(repeated) => mesh.repeated[repeated] as usize,
-        None => vertex as usize,
-    };
     let mut places: Vec<Option<VertexPlace>> = vec![None; mesh.positions.len()];
     for triangle in (0..mesh.indices.len()).filter(|&triangle| is_wanted(triangle)) {
         let vertices = mesh.indices[triangle];
@@ -107,7 +102,7 @@ pub(super) fn vertex_places(
         };
         let (centre, inset) = (centroid(corners), inset(corners));
         for (vertex, corner) in vertices.into_iter().zip(corners) {
-            let vertex = original(vertex);
+            let vertex = mesh.own_vertex(vertex);
             let normal = mesh.normals[vertex].normalize_or(flat_normal);
             let fitness = normal.dot(flat_normal);
             let is_best = |best: VertexPlace| fitness > best.normal.dot(best.flat_normal);
@@ -134,14 +129,6 @@ fn inset(corners: [Vec3; 3]) -> f32 {
     let distance = 2.0 / 3.0 * area_vector(corners).length() / longest.max(f32::MIN_POSITIVE);
     let [least, most] = INSET;
     (CLEARANCE / distance.max(f32::MIN_POSITIVE)).clamp(least, most)
-}
-
-/// Give vertices that repeat others the values of these.
-pub(super) fn copy_repeated<T: Copy>(mesh: &DisplayMesh, values: &mut [T]) {
-    let own = mesh.positions.len() - mesh.repeated.len();
-    for (repeated, &vertex) in mesh.repeated.iter().enumerate() {
-        values[own + repeated] = values[vertex as usize];
-    }
 }
 
 /// Gathers light by direction.

@@ -37,6 +37,27 @@ pub struct DisplayMesh {
     pub repeated: Vec<u32>,
 }
 
+impl DisplayMesh {
+    /// Number of vertices that are not copies.
+    pub fn own_vertex_count(&self) -> usize {
+        self.positions.len() - self.repeated.len()
+    }
+
+    /// The vertex of which a vertex is a copy, or itself.
+    pub fn own_vertex(&self, vertex: u32) -> usize {
+        let repetition = (vertex as usize).checked_sub(self.own_vertex_count());
+        repetition.map_or(vertex, |place| self.repeated[place]) as usize
+    }
+
+    /// Give copies the values of their vertices.
+    pub fn repeat<T: Copy>(&self, values: &mut Vec<T>) {
+        values.truncate(self.own_vertex_count());
+        for &vertex in &self.repeated {
+            values.push(values[vertex as usize]);
+        }
+    }
+}
+
 /// Light at the vertices of a [`DisplayMesh`], linear RGB; all finite and not negative.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VertexLight {

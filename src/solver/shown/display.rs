@@ -4,7 +4,7 @@ use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::seams::{Seams, repeat};
+use super::seams::Seams;
 use crate::{
     geometry::area_vector,
     hierarchy::{Channels as _, Cluster, Hierarchy, NodeId},
@@ -136,10 +136,10 @@ impl View<'_> {
         }
         cancel.proceed()?;
         // Values of the vertices.
-        for normal in &mut display.normals {
-            *normal = normal.normalize_or_zero();
-        }
-        repeat(&mut display.normals, count, &display.repeated);
+        let normals = display.normals.iter();
+        let mut normals: Vec<Vec3> = normals.map(|normal| normal.normalize_or_zero()).collect();
+        display.repeat(&mut normals);
+        display.normals = normals;
         // Vertices without a triangle.
         for uv in display.texcoords.iter_mut().filter(|uv| uv.is_nan()) {
             *uv = Vec2::ZERO;
@@ -195,8 +195,8 @@ impl View<'_> {
                 .push(displayable((linked + direct).min(brightest)));
             light.direct.push(displayable(direct));
         }
-        repeat(&mut light.irradiance, count, &mesh.repeated);
-        repeat(&mut light.direct, count, &mesh.repeated);
+        mesh.repeat(&mut light.irradiance);
+        mesh.repeat(&mut light.direct);
         light
     }
 
@@ -289,7 +289,7 @@ pub(crate) fn color(hierarchy: &Hierarchy, appearances: &[Appearance], display: 
             *weights += weight;
         }
     }
-    repeat(&mut sums, display.own_vertex_count(), &display.repeated);
+    display.repeat(&mut sums);
     let mean = |sum: Vec3, weight: f32| if weight > 0.0 { sum / weight } else { sum };
     let means = sums.iter();
     display.appearances = appearances.to_vec();

@@ -48,27 +48,6 @@ impl Seams {
     }
 }
 
-/// Copy values of the first `count` vertices to their copies.
-pub(super) fn repeat<T: Copy>(values: &mut Vec<T>, count: usize, repeated: &[u32]) {
-    values.truncate(count);
-    for &vertex in repeated {
-        values.push(values[vertex as usize]);
-    }
-}
-
-impl DisplayMesh {
-    /// Number of vertices that are not copies.
-    pub(super) fn own_vertex_count(&self) -> usize {
-        self.positions.len() - self.repeated.len()
-    }
-
-    /// The vertex of which a vertex is a copy, or itself.
-    pub(super) fn own_vertex(&self, vertex: u32) -> usize {
-        let repetition = (vertex as usize).checked_sub(self.own_vertex_count());
-        repetition.map_or(vertex, |place| self.repeated[place]) as usize
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -92,7 +71,7 @@ mod tests {
         assert_eq!(mesh.positions, [Vec3::X, Vec3::Y, Vec3::X, Vec3::X]);
         assert_eq!([0, 1, 2, 3].map(|v| mesh.own_vertex(v)), [0, 1, 0, 0]);
         let mut light = vec![3.0, 4.0, 9.0, 9.0];
-        repeat(&mut light, mesh.own_vertex_count(), &mesh.repeated);
+        mesh.repeat(&mut light);
         assert_eq!(light, [3.0, 4.0, 3.0, 3.0]);
     }
 }
