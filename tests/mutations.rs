@@ -9,8 +9,8 @@ mod spoiled;
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use spoiled::{Chance, assert_promises, case_count, folder, spoil};
-use vecrad::scene::{ReadError, Scene, SceneOptions, Warning, WarningKind, read_scene};
+use spoiled::{Chance, assert_promises, assert_same, case_count, folder, spoil};
+use vecrad::scene::{ReadError, SceneOptions, Warning, WarningKind, read_scene};
 
 /// An OBJ file that is valid but for what a reader must bear anyway: names without a file, lines of other kinds.
 fn obj(chance: &mut Chance) -> String {
@@ -132,18 +132,6 @@ fn pictures(folder: &Path) {
     fs::write(folder.join("cut.png"), &whole[..whole.len() / 2]).unwrap();
     fs::write(folder.join("words.png"), "not a picture").unwrap();
     fs::create_dir(folder.join("folder.png")).unwrap();
-}
-
-/// Everything of two readings of one file that could differ.
-fn assert_same(one: &Scene, other: &Scene) {
-    assert_eq!(one.positions, other.positions);
-    assert_eq!(one.triangles, other.triangles);
-    assert_eq!(one.surfaces, other.surfaces);
-    assert_eq!(one.materials, other.materials);
-    assert_eq!(one.objects, other.objects);
-    assert_eq!(one.texcoords, other.texcoords);
-    assert_eq!(one.normals, other.normals);
-    assert_eq!(one.warnings, other.warnings);
 }
 
 fn line_count(text: &[u8]) -> usize {

@@ -5,11 +5,11 @@
 use std::{fs, path::Path};
 
 use serde_json::{Value, json};
-use vecrad::scene::{Scene, SceneOptions, read_scene};
+use vecrad::scene::{SceneOptions, read_scene};
 
 use super::{
     glb::{Glb, HALVES, SQUARE, container},
-    spoiled::{Chance, assert_promises, case_count, folder, spoil},
+    spoiled::{Chance, assert_promises, assert_same, case_count, folder, spoil},
 };
 
 /// A file that is valid, with some of everything.
@@ -136,17 +136,6 @@ fn with_other_number(text: &str, chance: &mut Chance) -> String {
         chance.pick(&NUMBERS),
         &text[end..]
     )
-}
-
-/// Everything of two readings of one file that could differ.
-fn assert_same(one: &Scene, other: &Scene) {
-    assert_eq!(one.positions, other.positions);
-    assert_eq!(one.triangles, other.triangles);
-    assert_eq!(one.surfaces, other.surfaces);
-    assert_eq!(one.materials, other.materials);
-    assert_eq!(one.objects, other.objects);
-    assert_eq!(one.warnings, other.warnings);
-    assert_eq!(one.files, other.files);
 }
 
 fn check(path: &Path, bytes: &[u8]) -> bool {

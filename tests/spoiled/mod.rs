@@ -173,6 +173,19 @@ pub(crate) fn assert_promises(scene: &Scene, bytes: usize) {
     }
 }
 
+/// Everything of two readings of one file that could differ.
+pub(crate) fn assert_same(one: &Scene, other: &Scene) {
+    assert_eq!(one.positions, other.positions);
+    assert_eq!(one.triangles, other.triangles);
+    assert_eq!(one.surfaces, other.surfaces);
+    assert_eq!(one.materials, other.materials);
+    assert_eq!(one.objects, other.objects);
+    assert_eq!(one.texcoords, other.texcoords);
+    assert_eq!(one.normals, other.normals);
+    assert_eq!(one.warnings, other.warnings);
+    assert_eq!(one.files, other.files);
+}
+
 /// A folder for one test's files, on a disk in memory where there is one.
 pub(crate) fn folder() -> (tempfile::TempDir, PathBuf) {
     let memory = std::path::Path::new("/dev/shm");
