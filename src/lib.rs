@@ -15,6 +15,7 @@
 //! * [`experiments`]: suites of runs, on omissions, stability and growth with size;
 //! * [`export`] writes files;
 //! * [`picture`]: pictures by rays from the eye over the light of a solve;
+//! * [`lightmap`]: that light in one picture over all surfaces, with the mesh that shows it;
 //! * [`worker`]: the solver thread;
 //! * `viewer`: the window and its pictures;
 //! * [`cli`]: flags to settings, headless commands.
@@ -26,6 +27,7 @@ pub mod experiments;
 pub mod export;
 pub mod geometry;
 pub mod hierarchy;
+pub mod lightmap;
 pub mod metrics;
 pub mod picture;
 pub mod reference;

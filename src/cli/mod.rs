@@ -6,6 +6,7 @@
 mod check;
 mod flags;
 mod light_flags;
+mod lightmap;
 mod load;
 mod observed;
 mod output;

@@ -113,6 +113,15 @@ pub(super) fn check_inputs_kept(destinations: &[Destination], inputs: &[PathBuf]
     Ok(())
 }
 
+/// A scene's name as a file's, without its ending.
+pub(super) fn file_stem(scene: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || c == '-';
+    scene
+        .chars()
+        .map(|c| if plain(c) { c } else { '_' })
+        .collect()
+}
+
 /// Write a file whole or not at all; or write to standard output, as much of it as its reader wants.
 ///
 /// Where the file cannot be written, it is saved in the folder for temporary files, so that a long solve is not lost;

@@ -5,6 +5,7 @@ use std::fmt;
 use glam::Vec3;
 use serde::Serialize;
 
+use super::lightmap::BakedFacts;
 use crate::{
     export::ColorOptions,
     metrics::ErrorMeasures,
@@ -29,6 +30,9 @@ pub(super) struct SolveReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) reference: Option<ReferenceFacts>,
     pub(super) steps: Vec<StepFacts>,
+    /// Of `--export-lightmap`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) lightmap: Option<BakedFacts>,
     pub(super) stop_reason: StopReason,
     pub(super) totals: Totals,
     pub(super) threads: usize,

@@ -14,6 +14,7 @@ use clap::Args;
 
 use super::{
     Outcome, Reference, RunFlags, SceneFlags, SettingFlags, UsageError,
+    lightmap::{Baked, LightmapFlags},
     load::load,
     output::{self, Destination},
     progress::Progress,
@@ -75,6 +76,9 @@ pub struct SolveArguments {
         help_heading = "Output"
     )]
     pub reference: Option<Reference>,
+    /// Lightmap
+    #[command(flatten)]
+    pub lightmap: LightmapFlags,
     /// Pictures
     #[cfg(feature = "viewer")]
     #[command(flatten)]
@@ -117,7 +121,7 @@ struct Run {
 /// Light the scene, write the files, say how it ended.
 pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     let interruption = Interruption::listen()?;
-    let destinations = check_outputs(arguments)?;
+    let mut destinations = check_outputs(arguments)?;
     let begin = Instant::now();
     let options = arguments.scene_flags.options();
     interruption.ends_at_once(true);
@@ -131,6 +135,8 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     interruption.ends_at_once(false);
     let interrupted = interruption.flag;
     let read_s = begin.elapsed().as_secs_f64();
+    destinations.extend(arguments.lightmap.mesh(&scene.name));
+    output::check_distinct(&destinations)?;
     output::check_inputs_kept(&destinations, &scene.files)?;
     let companions = companions(arguments, &scene)?;
     output::check_inputs_kept(&companions, &scene.files)?;
@@ -162,13 +168,26 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         ..Totals::default()
     };
     let measured = Measured { reference, errors };
+    let has_light = !run.snapshot.mesh.positions.is_empty();
+    let seed = arguments.setting_flags.settings().seed;
+    let lightmap = match has_light {
+        true => {
+            (arguments.lightmap).bake(&scene, &run.snapshot, seed, arguments.quiet, &interrupted)
+        }
+        false => Ok(None),
+    };
+    let baked = lightmap.as_ref().ok().and_then(Option::as_ref);
     // A file that cannot be written does not stop the others from being written.
-    let report = write_report(arguments, &scene, &run, &measured, totals);
-    if run.snapshot.mesh.positions.is_empty() && writes_light(arguments) {
+    let report = write_report(arguments, &scene, &run, baked, &measured, totals);
+    if !has_light && writes_light(arguments) {
         report?;
         bail!("stopped before there was any light, so no mesh and no picture was written");
     }
     let export = write_export(arguments, &scene, &run);
+    let written = baked.map(|baked| {
+        let options = arguments.run_flags.export(scene.up, scene.radiance_unit);
+        (arguments.lightmap).write(baked, &scene, &run.snapshot, &options)
+    });
     #[cfg(feature = "viewer")]
     let picture = arguments.picture.write(
         &scene,
@@ -176,14 +195,16 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &run.snapshot,
         errors_of(arguments, &scene, &run, &measured.errors, &interrupted).as_ref(),
         &arguments.run_flags,
-        arguments.setting_flags.settings().seed,
+        seed,
     );
     export?;
     report?;
     #[cfg(feature = "viewer")]
     picture?;
+    written.transpose()?;
+    let is_complete = lightmap?.is_some() || !arguments.lightmap.is_wanted();
     Ok(match run.stop_reason {
-        StopReason::Converged => Outcome::Done,
+        StopReason::Converged if is_complete => Outcome::Done,
         _ => Outcome::StoppedEarly,
     })
 }
@@ -247,6 +268,7 @@ fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
         }
     }
     arguments.report.as_deref().map_or(Ok(()), output::check)?;
+    arguments.lightmap.check()?;
     let named = [
         ("--export", &arguments.export),
         ("--report", &arguments.report),
@@ -256,6 +278,7 @@ fn check_outputs(arguments: &SolveArguments) -> Result<Vec<Destination>> {
     let destinations: Vec<Destination> = named
         .into_iter()
         .filter_map(|(label, path)| Destination::new(label, path.as_deref()?))
+        .chain(arguments.lightmap.pictures())
         .collect();
     output::check_distinct(&destinations)?;
     // The rest of the scene's files is known once it is read.
@@ -297,7 +320,7 @@ fn writes_light(arguments: &SolveArguments) -> bool {
     let draws = arguments.picture.screenshot.is_some();
     #[cfg(not(feature = "viewer"))]
     let draws = false;
-    arguments.export.is_some() || draws
+    arguments.export.is_some() || arguments.lightmap.is_wanted() || draws
 }
 
 /// Reacts to Ctrl+C and to a request of the system to end the program; a second one has the same effect.
@@ -459,13 +482,15 @@ fn write_report(
     arguments: &SolveArguments,
     scene: &Scene,
     run: &Run,
+    lightmap: Option<&Baked>,
     measured: &Measured,
     totals: Totals,
 ) -> Result<()> {
     let Some(path) = &arguments.report else {
         return Ok(());
     };
-    let report = report(arguments, scene, run, measured, totals);
+    let mut report = report(arguments, scene, run, measured, totals);
+    report.lightmap = lightmap.map(Baked::facts);
     output::write_whole(path, |out| {
         serde_json::to_writer_pretty(&mut *out, &report)?;
         out.write_all(b"\n")
@@ -508,6 +533,7 @@ fn report(
         left_out: run.snapshot.omitted.to_vec(),
         warnings: scene.warnings.iter().map(WarningFacts::of).collect(),
         reference: measured.reference.clone(),
+        lightmap: None,
         stop_reason: run.stop_reason,
         totals: Totals {
             steps: steps.len(),

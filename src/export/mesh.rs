@@ -57,13 +57,6 @@ pub struct MeshOptions {
     pub merge: bool,
 }
 
-impl MeshOptions {
-    /// Factors of all light.
-    fn scale(&self) -> [f64; 2] {
-        [self.emission_scale, self.radiance_unit].map(f64::from)
-    }
-}
-
 impl Default for MeshOptions {
     fn default() -> Self {
         Self {
@@ -73,6 +66,16 @@ impl Default for MeshOptions {
             radiance_unit: 1.0,
             merge: false,
         }
+    }
+}
+
+impl MeshOptions {
+    /// Light of the scene as files have it: in watts, with the factor on all emission; finite and not negative.
+    pub fn scaled(&self, light: Vec3) -> Vec3 {
+        scaled(
+            light,
+            [self.emission_scale, self.radiance_unit].map(f64::from),
+        )
     }
 }
 
@@ -94,8 +97,7 @@ impl Light {
         let emission = snapshot.mesh.emission[index];
         let harmonics = lit.harmonics.map(|harmonics| {
             let Harmonics(values) = harmonics.get(index).copied().unwrap_or_default();
-            let scale = options.scale();
-            values.map(|value| scaled(value, scale) - scaled(-value, scale))
+            values.map(|value| options.scaled(value) - options.scaled(-value))
         });
         Self {
             harmonics,
@@ -138,10 +140,9 @@ impl Light {
     ) -> Self {
         let irradiance = presentable(arriving.unwrap_or_default());
         let radiance = emission + snapshot.mesh.reflectance[index] * irradiance * FRAC_1_PI;
-        let scale = options.scale();
         Self {
-            radiance: scaled(radiance, scale),
-            irradiance: scaled(irradiance, scale),
+            radiance: options.scaled(radiance),
+            irradiance: options.scaled(irradiance),
             harmonics: None,
         }
     }

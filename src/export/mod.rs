@@ -10,6 +10,8 @@ mod plot;
 mod ply;
 mod table;
 
+pub(crate) use glb::container as glb_container;
+
 pub use color::{ColorOptions, ToneMap};
 pub use mesh::{LitMesh, MeshOptions};
 pub use mesh_format::{MeshFormat, UnknownMeshFormat};

@@ -3,6 +3,7 @@
 //! From the surface of each pixel a few rays go to the lights and over the hemisphere (`record`): these look up the light
 //! stored where they end. Pixels share what their rays found where light changes slowly (`share`), and more rays are shot
 //! where that is noisy. Further rays from the eye then find textures, cut-outs and edges (`shade`), sharing that light.
+//! The texels of lightmaps get their light in the same way (`texels`), without an eye.
 //! Needs no graphics adapter; on all processors, and the same bits on any number of them.
 
 mod film;
@@ -15,12 +16,15 @@ mod sampler;
 mod shade;
 mod share;
 mod surface;
+mod survey;
+mod texels;
 mod turn;
 
 pub use film::Developed;
 pub use gloss::{GLOSS_LAMPS, GlossLamp, GlossLight, GlossVertex, gloss_at_vertices};
 pub use incoming::harmonics_at_vertices;
 pub use lens::Lens;
+pub use texels::{TexelGrid, TexelLight, TexelPlace, TexelSource, light_texels};
 
 use std::{f32::consts::PI, ops::Range};
 
@@ -37,8 +41,9 @@ use film::Pixel;
 use record::{Record, Recorder};
 use sampler::{Sampler, Use};
 use shade::{Seen, Sight};
-use share::{Records, SHARED_ROWS, SharedLight};
+use share::{SHARED_ROWS, SharedLight};
 use surface::{LitScene, Surface};
+use survey::Survey;
 
 /// Which surfaces a camera does not see: point, and unit normal towards the camera.
 pub type HiddenFrom<'a> = &'a (dyn Fn(Vec3, Vec3) -> bool + Sync);
@@ -74,17 +79,6 @@ pub struct Exposure {
 /// Samples of each pixel before it is known which are noisy. Fewer miss edges and penumbrae; more take time where nothing
 /// changes.
 const FIRST_SAMPLES: u32 = 4;
-
-/// Rays of each record over the hemisphere and to each kind of light. Fewer are noisy where many pixels share them; more take
-/// time.
-const RAYS: u32 = 4;
-
-/// Most rays of a record. Fewer leave noise in corners; more take time there.
-const MOST_RAYS: u32 = 128;
-
-/// Standard error of the light at a pixel, relative to itself and a part of that of the picture, above which it gets more
-/// rays. Smaller takes time; larger leaves grain.
-const RECORD_NOISE: f32 = 0.01;
 
 /// By how much the number of samples grows from round to round where pixels are noisy.
 const GROWTH: u32 = 4;
@@ -141,19 +135,22 @@ struct Tools<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn tools(&self) -> Tools<'a> {
-        Tools {
-            sight: Sight::default(),
-            recorder: Recorder::new(self.lit),
-        }
-    }
-
     /// Some rows of the picture.
     fn band(&self, rows: Range<u32>) -> Option<Vec<Pixel>> {
         let [width, height] = self.exposure.size;
         let about = rows.start.saturating_sub(SHARED_ROWS)..(rows.end + SHARED_ROWS).min(height);
-        let mut records = self.records(about)?;
-        self.refine(&mut records)?;
+        let survey = Survey {
+            width,
+            seed: self.exposure.seed,
+            cancel: self.cancel,
+            tools: &|| Tools {
+                sight: Sight::default(),
+                recorder: Recorder::new(self.lit),
+            },
+            record: &|tools, at, sampler, counts| self.record(tools, at, sampler, counts),
+            told: &|| {},
+        };
+        let records = survey.rows(about)?;
         let light = records.shared(self.cancel)?;
         let mut pixels = vec![Pixel::default(); width as usize * rows.len()];
         let mut is_wanted = vec![true; pixels.len()];
@@ -169,64 +166,6 @@ impl<'a> Pass<'a> {
         Some(pixels)
     }
 
-    /// A record of the middle of each pixel of some rows.
-    fn records(&self, rows: Range<u32>) -> Option<Records> {
-        let width = self.exposure.size[0] as usize;
-        let sampler = Sampler::new(RAYS, self.exposure.seed);
-        let mut list: Vec<Option<Record>> = vec![None; width * rows.len()];
-        let by_row = list.par_chunks_mut(width).zip(rows.clone().into_par_iter());
-        by_row.for_each_init(
-            || self.tools(),
-            |tools, (records, row)| {
-                for (column, record) in records.iter_mut().enumerate() {
-                    let at = [column as u32, row];
-                    *record = self.record(tools, at, &sampler, [RAYS; 2]);
-                }
-            },
-        );
-        self.cancel.proceed()?;
-        let mut records = Records {
-            list,
-            width,
-            top: rows.start,
-        };
-        records.smooth_changes();
-        Some(records)
-    }
-
-    /// More rays for records that are noisy however many are shared.
-    fn refine(&self, records: &mut Records) -> Option<()> {
-        let width = records.width;
-        let sampler = Sampler::new(MOST_RAYS, !self.exposure.seed);
-        let floor = OF_MEAN * records.mean_stored();
-        let shared = records.shared(self.cancel)?;
-        let more = |tools: &mut Tools<'a>, at: usize| {
-            let more = shared.relative_errors(at, floor).map(|error| {
-                let noise = error / RECORD_NOISE;
-                let wanted = (RAYS as f32 * noise * noise) as u32;
-                wanted.min(MOST_RAYS).saturating_sub(RAYS)
-            });
-            if more == [0; 2] {
-                return None;
-            }
-            let at = [(at % width) as u32, records.top + (at / width) as u32];
-            self.record(tools, at, &sampler, more)
-        };
-        let more: Vec<Option<Record>> = (0..records.list.len())
-            .into_par_iter()
-            .map_init(|| self.tools(), more)
-            .collect();
-        self.cancel.proceed()?;
-        for (record, more) in records.list.iter_mut().zip(more) {
-            if let (Some(record), Some(more)) = (record, more) {
-                for (light, more) in record.light.iter_mut().zip(&more.light) {
-                    light.merge(more);
-                }
-            }
-        }
-        Some(())
-    }
-
     /// The record of a pixel, of what is seen through its middle, by so many rays to each kind of light and over the
     /// hemisphere.
     fn record(
@@ -236,7 +175,6 @@ impl<'a> Pass<'a> {
         sampler: &Sampler,
         counts: [u32; 2],
     ) -> Option<Record> {
-        self.cancel.proceed()?;
         if self.subject.is_unlit {
             return None;
         }

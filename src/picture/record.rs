@@ -25,6 +25,8 @@ pub(super) const INDIRECT: usize = LIGHT_KINDS;
 pub(super) struct Record {
     pub(super) position: Vec3,
     pub(super) normal: Vec3,
+    /// Records of other groups do not count: there is one of all pixels, and one of each chart of a lightmap.
+    pub(super) group: u32,
     /// Distance to the next pixel on a surface square to the view.
     pub(super) spacing: f32,
     /// Unoccluded direct irradiance, W/m².
@@ -110,6 +112,7 @@ impl<'a> Recorder<'a> {
         let mut record = Record {
             position: surface.position,
             normal: surface.normal,
+            group: 0,
             spacing,
             unoccluded: Vec3::ZERO,
             stored: luminance(all),

@@ -33,6 +33,9 @@ const LEAST_PIXELS: f32 = 2.0;
 /// Rows on each side from which a pixel may share.
 pub(super) const SHARED_ROWS: u32 = 2 * ((1 << ROUNDS) - 1);
 
+/// Pixels of a round, 5 × 5: the middle one is that which they are shared by.
+const AROUND: usize = 25;
+
 /// The records of some rows of a picture, row by row; `None` where there is no surface.
 pub(super) struct Records {
     pub(super) list: Vec<Option<Record>>,
@@ -60,6 +63,12 @@ fn reach(kind: usize) -> f32 {
         INDIRECT => INDIRECT_REACH,
         _ => DIRECT_REACH,
     }
+}
+
+/// How much the pixels of a round count by their number, row by row.
+fn bell(index: usize) -> f32 {
+    const BELL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
+    BELL[index / 5] * BELL[index % 5]
 }
 
 impl Record {
@@ -93,8 +102,8 @@ impl Records {
         let smoothed = |at: usize| -> Option<[f32; KINDS]> {
             let own = self.list[at].as_ref()?;
             let (mut sums, mut weights) = ([0.0; KINDS], [0.0; KINDS]);
-            for (_, other, bell) in self.around(at, 1) {
-                let weight = bell * own.fit(other.position - own.position, other.normal);
+            for (index, _, other) in self.around(at, 1) {
+                let weight = bell(index) * own.fit(other.position - own.position, other.normal);
                 for kind in 0..KINDS {
                     // Where nothing is blocked it is not known.
                     if other.changes[kind] > 0.0 {
@@ -139,8 +148,8 @@ impl Records {
         let own = |at: usize| -> Option<[Shared; KINDS]> {
             let own = self.list[at].as_ref()?;
             let (mut sums, mut weights) = ([0.0; KINDS], f32::MIN_POSITIVE);
-            for (_, other, bell) in self.around(at, 1) {
-                let weight = bell * own.fit(other.position - own.position, other.normal);
+            for (index, _, other) in self.around(at, 1) {
+                let weight = bell(index) * own.fit(other.position - own.position, other.normal);
                 weights += weight;
                 for (sum, light) in sums.iter_mut().zip(&other.light) {
                     *sum += weight * light.variance();
@@ -167,7 +176,8 @@ impl Records {
         })
     }
 
-    /// The mean about a pixel over pixels so far apart.
+    /// The mean about a pixel over pixels so far apart. Two that lie opposite each other count alike: otherwise a pixel at an
+    /// edge would have the light of places further in, and shadows would shift there.
     fn mean(
         &self,
         list: &[Option<[Shared; KINDS]>],
@@ -175,13 +185,20 @@ impl Records {
         step: usize,
     ) -> Option<[Shared; KINDS]> {
         let (record, own) = (self.list[at].as_ref()?, list[at]?);
+        let mut near = [[0.0; KINDS]; AROUND];
+        let mut places = [at; AROUND];
+        for (index, other, place) in self.around(at, step) {
+            if list[other].is_some() {
+                (near[index], places[index]) = (record.weights(place), other);
+            }
+        }
         let mut sums = [(Vec3::ZERO, 0.0, 0.0); KINDS];
-        for (other, place, bell) in self.around(at, step) {
-            let Some(others) = &list[other] else { continue };
-            let near = record.weights(place);
+        for index in 0..AROUND {
+            let Some(others) = &list[places[index]] else { continue };
+            let opposite = near[AROUND - 1 - index];
             for kind in 0..KINDS {
                 let (mean, weights, variance) = &mut sums[kind];
-                let weight = bell * near[kind];
+                let weight = bell(index) * near[index][kind].min(opposite[kind]);
                 *mean += others[kind].mean * weight;
                 *weights += weight;
                 *variance += others[kind].variance * weight * weight;
@@ -197,13 +214,19 @@ impl Records {
     }
 
     /// The light of a pixel within that of its neighbours on the same surface: where few pixels share, one of the rare rays
-    /// that meet something bright would make a speck.
+    /// that meet something bright would make a speck. Neighbours count with those opposite, as in means: at an edge, light
+    /// may well go on rising.
     fn bounded(&self, list: &[Option<[Shared; KINDS]>], at: usize) -> Option<[Shared; KINDS]> {
         let (record, mut own) = (self.list[at].as_ref()?, list[at]?);
-        let mut bounds = [(Vec3::INFINITY, Vec3::NEG_INFINITY); KINDS];
-        for (other, place, _) in self.around(at, 1).filter(|&(other, ..)| other != at) {
-            let Some(others) = &list[other] else { continue };
+        let mut near = [None; AROUND];
+        for (index, other, place) in self.around(at, 1) {
             if record.fit(place.position - record.position, place.normal) > 0.0 {
+                near[index] = list[other].as_ref();
+            }
+        }
+        let mut bounds = [(Vec3::INFINITY, Vec3::NEG_INFINITY); KINDS];
+        for index in (0..AROUND).filter(|&index| index != AROUND / 2) {
+            if let (Some(others), Some(_)) = (near[index], near[AROUND - 1 - index]) {
                 for ((low, high), other) in bounds.iter_mut().zip(others) {
                     (*low, *high) = (low.min(other.mean), high.max(other.mean));
                 }
@@ -217,19 +240,19 @@ impl Records {
         Some(own)
     }
 
-    /// The records of the pixels about one, `step` apart: their indices, and weights of a bell.
-    fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, &Record, f32)> {
-        const BELL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
+    /// The records about one, `step` apart, of its group: each with its number among those about, row by row, and its index.
+    fn around(&self, at: usize, step: usize) -> impl Iterator<Item = (usize, usize, &Record)> {
         let (row, column) = ((at / self.width) as isize, (at % self.width) as isize);
         let height = (self.list.len() / self.width) as isize;
         let (width, step) = (self.width as isize, step as isize);
-        (0..25).filter_map(move |index| {
-            let (down, across) = (index / 5, index % 5);
+        let group = self.list[at].as_ref().map(|record| record.group);
+        (0..AROUND).filter_map(move |index| {
+            let (down, across) = (index as isize / 5, index as isize % 5);
             let (row, column) = (row + (down - 2) * step, column + (across - 2) * step);
             let is_inside = (0..height).contains(&row) && (0..width).contains(&column);
             let at = is_inside.then_some((row * width + column) as usize)?;
-            let weight = BELL[down as usize] * BELL[across as usize];
-            Some((at, self.list[at].as_ref()?, weight))
+            let record = self.list[at].as_ref()?;
+            (Some(record.group) == group).then_some((index, at, record))
         })
     }
 }
@@ -246,6 +269,12 @@ impl SharedLight<'_> {
             let variance: f32 = shared.iter().map(|shared| shared.variance).sum();
             variance.sqrt() / light
         })
+    }
+
+    /// What irradiance is more than the indirect light stored, W/m², at the place of a record.
+    pub(super) fn of(&self, at: usize) -> Option<Vec3> {
+        let (record, shared) = (self.records.list[at].as_ref()?, self.list[at]?);
+        Some(record.excess_of(shared.map(|shared| shared.mean)))
     }
 
     /// What irradiance is more than the indirect light stored at a place, W/m², that is `seen` at a place of the picture in

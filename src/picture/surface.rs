@@ -47,7 +47,7 @@ pub(super) struct Surface {
 }
 
 impl<'a> LitScene<'a> {
-    /// A scene under the light of a snapshot.
+    /// A scene, all of its triangles, and its light.
     pub(super) fn new(scene: &'a Scene, rays: &'a RayTree, snapshot: &'a Snapshot) -> Self {
         Self {
             scene,
@@ -79,14 +79,22 @@ impl LitScene<'_> {
     pub(super) fn surface(&self, origin: Vec3, direction: Vec3, hit: Hit) -> Option<Surface> {
         let triangle = hit.triangle;
         let (flat_normal, is_back) = self.side(triangle, direction);
-        let material = self.scene.material(triangle);
         let is_lit = self.is_lit(triangle, is_back);
-        if !is_lit && !material.is_glass() {
-            return None;
-        }
         let position = origin + direction * hit.distance;
+        (is_lit || self.scene.material(triangle).is_glass())
+            .then(|| self.surface_at(triangle, is_back, flat_normal, position))
+    }
+
+    /// A point of a side of a triangle, which has this unit normal.
+    pub(super) fn surface_at(
+        &self,
+        triangle: TriangleId,
+        is_back: bool,
+        flat_normal: Vec3,
+        position: Vec3,
+    ) -> Surface {
         let at = barycentric(position, self.scene.corners(triangle));
-        let shown = if is_lit {
+        let shown = if self.is_lit(triangle, is_back) {
             self.appearance(triangle)
         } else {
             Appearance {
@@ -104,7 +112,7 @@ impl LitScene<'_> {
             Some(place) => self.smooth(position, flat_normal, &place),
             None => (flat_normal, position),
         };
-        Some(Surface {
+        Surface {
             triangle,
             position,
             start,
@@ -112,10 +120,10 @@ impl LitScene<'_> {
             normal,
             reflectance: self.scene.reflected_at(triangle, shown.reflectance, at),
             emission: self.scene.emitted_at(triangle, shown.emission, at),
-            specular: material.specular,
+            specular: self.scene.material(triangle).specular,
             is_back,
             place,
-        })
+        }
     }
 
     /// The present appearance of the material of a triangle.

@@ -14,7 +14,7 @@ use std::{
 use circles::{ModulePath, SiblingImports, circle, sibling_imports, upward};
 
 /// From the top of the house to its foundation's users; a room may import those before it.
-const ROOMS: [&str; 13] = [
+const ROOMS: [&str; 14] = [
     "scene",
     "geometry",
     "sampling",
@@ -26,6 +26,7 @@ const ROOMS: [&str; 13] = [
     "experiments",
     "export",
     "picture",
+    "lightmap",
     "worker",
     "viewer",
 ];

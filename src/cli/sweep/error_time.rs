@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     cli::{
-        output::{Destination, check_inputs_kept, write_whole},
+        output::{self, Destination, check_inputs_kept, write_whole},
         report::{LightFacts, Machine},
     },
     export::{Curve, CurvePlot, write_csv},
@@ -279,22 +279,12 @@ fn curve(run: &Trajectory) -> Curve {
     }
 }
 
-/// A scene's name as a file's.
+/// A scene's name as a file's that is none of the report.
 fn file_stem(scene: &str) -> String {
-    let stem: String = scene
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || c == '-' {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
     // The table has a name of its own, and a scene may have none.
-    match stem.as_str() {
-        "" | "report" => format!("scene-{stem}"),
-        _ => stem,
+    match output::file_stem(scene) {
+        stem if matches!(stem.as_str(), "" | "report") => format!("scene-{stem}"),
+        stem => stem,
     }
 }
 

@@ -1,8 +1,7 @@
 //! The description of a GLB, its JSON chunk.
 
-use std::{collections::BTreeMap, f64::consts::FRAC_1_SQRT_2};
+use std::collections::BTreeMap;
 
-use glam::Vec3;
 use serde_json::{Map, Value, json};
 
 use super::{
@@ -10,20 +9,19 @@ use super::{
         MeshOptions,
         mesh::{HARMONICS_MEANING, LitMesh},
     },
-    ATTRIBUTE_BYTES, Content, Mesh, TRIANGLE_BYTES, from_node,
+    ATTRIBUTE_BYTES, Content, Mesh,
+    container::{
+        ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, TRIANGLE_BYTES, asset, bound, floats, from_node,
+        indices, name_of, nodes,
+    },
 };
-use crate::scene::{Frame, Material, ObjectName, UpAxis};
-
-/// Numbers that the glTF specification gives to kinds of values and of buffers.
-pub(super) const FLOAT: u32 = 5126;
-const UNSIGNED_INT: u32 = 5125;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+use crate::scene::Material;
 
 /// Describe what follows in the file.
 pub(super) fn document(content: &Content<'_>, lit: LitMesh<'_>, options: &MeshOptions) -> Value {
     let sizes = content.sizes();
-    let nodes = nodes(content, &lit.scene.frame, options.up);
+    let names = content.meshes.iter().map(|mesh| mesh.name);
+    let (nodes, root) = nodes(names, &lit.scene.frame, options.up);
     let used = used_materials(content);
     let materials: Vec<Value> = used
         .keys()
@@ -41,13 +39,10 @@ pub(super) fn document(content: &Content<'_>, lit: LitMesh<'_>, options: &MeshOp
         })
         .collect();
     json!({
-        "asset": {
-            "version": "2.0",
-            "generator": concat!("vecrad ", env!("CARGO_PKG_VERSION")),
-        },
+        "asset": asset(),
         "extensionsUsed": ["KHR_materials_unlit"],
         "scene": 0,
-        "scenes": [{ "nodes": [root(nodes.len(), options.up)] }],
+        "scenes": [{ "nodes": [root] }],
         "nodes": nodes,
         "meshes": meshes,
         "materials": materials,
@@ -87,44 +82,6 @@ fn extras(lit: LitMesh<'_>, options: &MeshOptions) -> Value {
         extras["lamps"] = names.collect();
     }
     extras
-}
-
-/// What an object is called, with its group.
-fn name_of(name: Option<&ObjectName>) -> String {
-    let parts = name.map(|name| [&*name.object, &*name.group]);
-    let named: Vec<&str> = parts
-        .into_iter()
-        .flatten()
-        .filter(|part| !part.is_empty())
-        .collect();
-    match named[..] {
-        [] => "lit mesh".to_owned(),
-        _ => named.join("/"),
-    }
-}
-
-/// The place of all objects, then one node for each; last the root that turns +Z up, where the scene needs one.
-fn nodes(content: &Content<'_>, frame: &Frame, up: UpAxis) -> Vec<Value> {
-    let children: Vec<usize> = (1..=content.meshes.len()).collect();
-    let centre = frame.centre.to_array();
-    let lit = json!({ "name": "lit scene", "children": children, "translation": centre });
-    let objects = content.meshes.iter().enumerate();
-    let objects = objects.map(|(index, mesh)| json!({ "name": name_of(mesh.name), "mesh": index }));
-    let mut nodes: Vec<Value> = std::iter::once(lit).chain(objects).collect();
-    if up == UpAxis::Z {
-        // A quarter turn about X takes +Z to +Y.
-        let rotation = [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2];
-        nodes.push(json!({ "name": "+Z is up", "rotation": rotation, "children": [0] }));
-    }
-    nodes
-}
-
-/// The node that holds all others.
-fn root(count: usize, up: UpAxis) -> usize {
-    match up {
-        UpAxis::Y => 0,
-        UpAxis::Z => count - 1,
-    }
 }
 
 /// Number in the file by material of the scene.
@@ -187,44 +144,22 @@ fn accessors(content: &Content<'_>, lit: LitMesh<'_>) -> Vec<Value> {
     let (mut vertices, mut triangles) = (0, 0);
     for mesh in &content.meshes {
         let start = vertices * sizes.vertex_bytes();
-        let count = mesh.vertices.len() as u64;
+        let count = mesh.vertices.len();
         let position = accessors.len();
         accessors.extend((0..sizes.attributes).map(|attribute| {
-            json!({
-                "bufferView": 0,
-                "byteOffset": start + ATTRIBUTE_BYTES * count * attribute,
-                "componentType": FLOAT,
-                "count": count,
-                "type": "VEC3",
-            })
+            floats(start + ATTRIBUTE_BYTES * count as u64 * attribute, count, "VEC3")
         }));
-        let [least, most] = bounds(mesh, lit);
-        accessors[position]["min"] = json!(least.to_array().map(f64::from));
-        accessors[position]["max"] = json!(most.to_array().map(f64::from));
+        let places = mesh.vertices.iter().map(|&vertex| {
+            let position = lit.snapshot.mesh.positions[vertex as usize];
+            from_node(position, &lit.scene.frame)
+        });
+        bound(&mut accessors[position], places);
         for primitive in &mesh.primitives {
-            let count = primitive.triangles.len() as u64;
-            accessors.push(json!({
-                "bufferView": 1,
-                "byteOffset": triangles * TRIANGLE_BYTES,
-                "componentType": UNSIGNED_INT,
-                "count": 3 * count,
-                "type": "SCALAR",
-            }));
-            triangles += count;
+            let count = primitive.triangles.len();
+            accessors.push(indices(triangles * TRIANGLE_BYTES, count));
+            triangles += count as u64;
         }
-        vertices += count;
+        vertices += count as u64;
     }
     accessors
-}
-
-/// Least and largest coordinates of an object, from its node.
-fn bounds(mesh: &Mesh<'_>, lit: LitMesh<'_>) -> [Vec3; 2] {
-    let positions = &lit.snapshot.mesh.positions;
-    let places = mesh
-        .vertices
-        .iter()
-        .map(|&vertex| from_node(positions[vertex as usize], &lit.scene.frame));
-    places.fold([Vec3::MAX, Vec3::MIN], |[least, most], place| {
-        [least.min(place), most.max(place)]
-    })
 }

@@ -11,6 +11,7 @@
 //! scene with +Z up stands under a turned root node, its numbers stay. Each side of a two-sided face has triangles of its
 //! own, so that the material is one-sided always. Textures are omitted: vertices have their mean.
 
+pub(crate) mod container;
 mod document;
 
 use std::io::{self, Write};
@@ -22,7 +23,8 @@ use super::{
     mesh::{Light, LitMesh, write_vector},
     parts::by_object,
 };
-use crate::scene::{Frame, ObjectName};
+use crate::scene::ObjectName;
+use container::{TRIANGLE_BYTES, file_length, from_node, text, write_head, write_numbers};
 use document::document;
 
 /// Attributes of every vertex of a mesh, three floats each, in the order of the file; those that are asked for follow.
@@ -32,13 +34,6 @@ const ATTRIBUTES: [&str; 5] = ["POSITION", "NORMAL", "COLOR_0", "_RADIANCE", "_I
 const HARMONICS: [&str; 4] = ["_SH0", "_SH1", "_SH2", "_SH3"];
 
 const ATTRIBUTE_BYTES: u64 = 12;
-
-/// Three indices of 32 bits.
-const TRIANGLE_BYTES: u64 = 12;
-
-/// Header of the file; length and kind of a chunk.
-const HEADER_BYTES: u64 = 12;
-const CHUNK_HEADER_BYTES: u64 = 8;
 
 /// Why a mesh does not become a GLB.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -71,16 +66,9 @@ pub(super) fn write_glb(
     let sizes = content.sizes();
     let refused = |error| io::Error::new(io::ErrorKind::InvalidInput, error);
     sizes.check().map_err(refused)?;
-    let mut text = document(&content, lit, options).to_string().into_bytes();
-    text.resize(text.len().next_multiple_of(4), b' ');
+    let text = text(&document(&content, lit, options));
     let length = sizes.file_length(text.len() as u64).map_err(refused)?;
-    out.write_all(b"glTF")?;
-    write_numbers(out, &[2, length])?;
-    write_numbers(out, &[text.len() as u32])?;
-    out.write_all(b"JSON")?;
-    out.write_all(&text)?;
-    write_numbers(out, &[sizes.buffer_length() as u32])?;
-    out.write_all(b"BIN\0")?;
+    write_head(out, length, &text, sizes.buffer_length())?;
     for mesh in &content.meshes {
         // One attribute behind the other: vertices with all of theirs together may be longer than the format allows.
         let mut blocks = vec![Vec::new(); content.attributes.len()];
@@ -232,24 +220,11 @@ impl Sizes {
         if self.vertices == 0 || self.triangles == 0 {
             return Err(GlbError::Empty);
         }
-        let length = HEADER_BYTES + 2 * CHUNK_HEADER_BYTES + text_length + self.buffer_length();
-        u32::try_from(length).map_err(|_| GlbError::TooLarge {
+        file_length(text_length, self.buffer_length()).ok_or(GlbError::TooLarge {
             vertices: self.vertices,
             triangles: self.triangles,
         })
     }
-}
-
-/// A position of the mesh in world units from the place of its node.
-fn from_node(position: Vec3, frame: &Frame) -> Vec3 {
-    let distance = (position.as_dvec3() / frame.scale).as_vec3();
-    distance.clamp(Vec3::MIN, Vec3::MAX)
-}
-
-fn write_numbers(out: &mut dyn Write, numbers: &[u32]) -> io::Result<()> {
-    numbers
-        .iter()
-        .try_for_each(|number| out.write_all(&number.to_le_bytes()))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::{
     super::mesh::tests::{named_scene, scene_in, triangle},
-    document::FLOAT,
+    container::FLOAT,
     *,
 };
 use crate::{
