@@ -1,8 +1,8 @@
 //! The lights of `KHR_lights_punctual` as surfaces and as a sun, since light comes from these alone.
 //!
-//! A point becomes a small sphere of the same power; a spot a disc of the same intensity along its axis, at the bottom of a
-//! black tube that ends its cone where it should; the brightest directional light the sun. Candela count as W/sr and lux as
-//! W/m². Scale of nodes changes none of them.
+//! A point becomes a small sphere of the same intensity; a spot such a sphere in a black tube that ends its cone where it
+//! should; the brightest directional light the sun. Candela count as W/sr and lux as W/m². Scale of nodes changes none of
+//! them.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -29,17 +29,18 @@ const SMALLEST: f64 = 1e-5;
 /// Triangles and lamps, multiplied, up to which distances are measured. More take seconds.
 const MOST_DISTANCES: usize = 1 << 30;
 
-/// Corners of discs and tubes. Fewer show in the rim of a cone, more cost time.
+/// Corners of tubes. Fewer show in the rim of a cone, more cost time.
 const CORNERS: usize = 16;
 
-/// Cones that are wider from their axis end nowhere, radians: a tube would be flatter than its disc.
-const WIDEST_CONE: f64 = 1.4;
+/// Angles from their axis between which cones end, radians: tubes would be longer or flatter than single precision tells.
+const NARROWEST_CONE: f64 = 0.01;
+const WIDEST_CONE: f64 = 1.5;
 
-/// The part of a tube's radius that the disc has at least: a smaller one is too bright for its size …
-const SMALLEST_DISC: f64 = 0.05;
+/// The part of a tube's radius that its bulb has at least: a smaller one is too bright for its size …
+const SMALLEST_BULB: f64 = 0.05;
 
 /// … and at most: a larger one makes an edge so soft that most of a beam is half shadow, which takes many times the rays.
-const LARGEST_DISC: f64 = 0.4;
+const LARGEST_BULB: f64 = 0.4;
 
 /// A light where it stands.
 struct Lamp<'a> {
@@ -103,7 +104,7 @@ pub(super) fn add_lights(
         log.note_times(WarningKind::Light, message, lamps.len() - most, "", 0);
         lamps.truncate(most);
     }
-    place_lamps(&lamps, builder, log);
+    place_lamps(&lamps, builder);
     suns.sort_by(|a, b| luminance(b.intensity).total_cmp(&luminance(a.intensity)));
     let (sun, others) = suns.split_first()?;
     if !others.is_empty() {
@@ -121,7 +122,7 @@ pub(super) fn add_lights(
     })
 }
 
-fn place_lamps(lamps: &[Lamp], builder: &mut SceneBuilder, log: &mut WarningLog) {
+fn place_lamps(lamps: &[Lamp], builder: &mut SceneBuilder) {
     let finite = || {
         builder
             .positions
@@ -144,89 +145,83 @@ fn place_lamps(lamps: &[Lamp], builder: &mut SceneBuilder, log: &mut WarningLog)
         })
         .map(|radius| radius.max(SMALLEST * diagonal))
         .collect();
-    let mut spots = Vec::new();
     for (lamp, radius) in lamps.iter().zip(radii) {
         builder
             .objects
             .push((lamp.name.as_str().into(), builder.faces.len()));
         match lamp.light.kind.as_str() {
-            "spot" => {
-                spots.push(lamp.name.as_str());
-                add_spot(lamp, radius, builder);
-            }
+            "spot" => add_spot(lamp, radius, builder),
             _ => add_point(lamp, radius, builder),
         }
     }
-    if !spots.is_empty() {
-        let names = listed(spots.iter().copied(), MOST_LISTED);
-        let message = format!(
-            "spots are discs in black tubes, whose light falls off with the cosine of the angle to their axis, too: {names}"
-        );
-        log.note_times(WarningKind::Light, &message, spots.len(), "", 0);
-    }
 }
 
-/// A sphere whose mean intensity is that of the light: radiance times a quarter of its surface.
+/// A sphere with the intensity of the light.
 fn add_point(lamp: &Lamp, radius: f64, builder: &mut SceneBuilder) {
-    let triangles = small_sphere(radius);
-    let area = |[a, b, c]: &[DVec3; 3]| 0.5 * (*b - *a).cross(*c - *a).length();
-    let surface: f64 = triangles.iter().map(area).sum();
-    push(builder, lamp, &triangles, (4.0 / surface) as f32);
+    push(builder, lamp, &small_sphere(radius), sphere_factor(radius));
 }
 
-/// A disc, and the tube that it shines out of.
+/// A sphere, and the tube that it shines out of.
 fn add_spot(lamp: &Lamp, radius: f64, builder: &mut SceneBuilder) {
     let axis = lamp.direction;
     let tube = Tube::of(&lamp.light.spot, radius);
-    let disc_radius = tube.as_ref().map_or(radius, |tube| tube.disc_radius);
-    let rim = ring(axis, CORNERS, disc_radius);
-    let next = |corner: usize| (corner + 1) % CORNERS;
-    let disc: Vec<[DVec3; 3]> = (0..CORNERS)
-        .map(|corner| [DVec3::ZERO, rim[corner], rim[next(corner)]])
-        .collect();
-    let area = std::f64::consts::PI * disc_radius * disc_radius;
-    push(builder, lamp, &disc, (1.0 / area) as f32);
-    let Some(tube) = tube else { return };
+    let mut bulb = small_sphere(tube.bulb);
+    // What faces away from all of the cone would only light the tube.
+    let away = -tube.outer.sin();
+    bulb.retain(|[a, b, c]| (*b - *a).cross(*c - *a).normalize_or_zero().dot(axis) > away);
+    push(builder, lamp, &bulb, sphere_factor(tube.bulb));
     let rim = ring(axis, CORNERS, tube.radius);
-    let wall: Vec<[DVec3; 3]> = (0..CORNERS)
+    let next = |corner: usize| (corner + 1) % CORNERS;
+    let [bottom, top] = [-tube.bulb, tube.length].map(|height| axis * height);
+    let tube: Vec<[DVec3; 3]> = (0..CORNERS)
         .flat_map(|corner| {
-            let [a, b] = [rim[corner], rim[next(corner)]];
-            let [c, d] = [a, b].map(|corner| corner + axis * tube.length);
-            [[a, b, d], [a, d, c]]
+            let [a, b] = [rim[corner], rim[next(corner)]].map(|corner| corner + bottom);
+            let [c, d] = [rim[corner], rim[next(corner)]].map(|corner| corner + top);
+            [[bottom, a, b], [a, b, d], [a, d, c]]
         })
         .collect();
-    push(builder, lamp, &wall, 0.0);
+    push(builder, lamp, &tube, 0.0);
 }
 
-/// A black tube about the axis of a spot, with a disc at its bottom. From within the inner cone all of the disc is seen
-/// through its end, from outside the outer one nothing, unless the edge of the cone is too soft or too sharp for that.
+/// By what an intensity is multiplied for the radiance of a small sphere: its mean intensity is the radiance times a quarter
+/// of its surface.
+fn sphere_factor(radius: f64) -> f32 {
+    let area = |[a, b, c]: [DVec3; 3]| 0.5 * (b - a).cross(c - a).length();
+    let surface: f64 = small_sphere(radius).into_iter().map(area).sum();
+    (4.0 / surface) as f32
+}
+
+/// A black tube about the axis of a spot, closed behind the bulb at the place of the light. From within the inner cone all
+/// of the bulb is seen through its end, from outside the outer one nothing, unless the edge of the cone is too soft or too
+/// sharp for that.
 struct Tube {
+    /// Angle from the axis at which the cone ends, radians.
+    outer: f64,
     radius: f64,
+    /// From the middle of the bulb to the end.
     length: f64,
-    disc_radius: f64,
+    /// Radius of the bulb.
+    bulb: f64,
 }
 
 impl Tube {
-    /// No wider than twice the radius, and no longer. Nothing where the cone is too wide to end.
-    fn of(cone: &Cone, radius: f64) -> Option<Self> {
-        let outer = cone.outer_cone_angle;
-        if !(outer > 0.0 && outer < WIDEST_CONE) {
-            return None;
-        }
-        let outer = outer.tan();
-        let inner = cone
-            .inner_cone_angle
-            .clamp(0.0, WIDEST_CONE)
-            .tan()
-            .min(outer);
-        let length = 2.0 * radius / (outer + inner).max(1.0);
-        let radius = 0.5 * length * (outer + inner);
-        let softness = (outer - inner) / (outer + inner);
-        Some(Self {
+    /// No wider than twice a radius, and no longer before its bulb.
+    fn of(cone: &Cone, radius: f64) -> Self {
+        let outer = cone.outer_cone_angle.clamp(NARROWEST_CONE, WIDEST_CONE);
+        let inner = cone.inner_cone_angle.clamp(0.0, outer);
+        // A bulb of radius b just clears the rim in a direction where the distance of the rim from the line through the
+        // middle of the bulb, R cos - L sin, is b; it is just hidden where that is -b.
+        let bulb = (outer.tan() - inner.tan()) / (outer.cos().recip() + inner.cos().recip());
+        let rim = inner.tan() + bulb * inner.cos().recip();
+        let length = radius / rim.max(0.5);
+        let radius = length * rim;
+        let share = (bulb / rim).clamp(SMALLEST_BULB, LARGEST_BULB);
+        Self {
+            outer,
             radius,
             length,
-            disc_radius: radius * softness.clamp(SMALLEST_DISC, LARGEST_DISC),
-        })
+            bulb: radius * share,
+        }
     }
 }
 
