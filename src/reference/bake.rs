@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    estimator::{Bounce, Estimator},
+    estimator::{Bounce, Estimator, bending_rays},
     outside::{Outside, Place},
 };
 use crate::{
@@ -57,7 +57,7 @@ impl<'a> VertexBake<'a> {
         Self {
             scene,
             rays,
-            bending: scene.with_solid_glass().map(|solid| RayTree::new(&solid)),
+            bending: bending_rays(scene),
             emitters: Emitters::new(scene),
             outside: Outside::new(scene),
             starts: points.iter().map(|point| inset(scene, point)).collect(),

@@ -51,6 +51,11 @@ impl Bounce {
     }
 }
 
+/// The rays of paths where they differ from those of others, which pass straight on through glass: paths bend in it.
+pub(super) fn bending_rays(scene: &Scene) -> Option<RayTree> {
+    scene.with_solid_glass().map(|solid| RayTree::new(&solid))
+}
+
 /// The inputs of an estimate.
 pub(super) struct Estimator<'a> {
     /// The scene.

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    estimator::{Bounce, Estimator},
+    estimator::{Bounce, Estimator, bending_rays},
     outside::{Outside, Place},
     point::ReferencePoint,
 };
@@ -84,11 +84,7 @@ impl PathTracer {
     /// Choose the points. `rays` is the ray tree of the scene.
     pub fn new(scene: Arc<Scene>, rays: Arc<RayTree>, settings: PathSettings) -> Self {
         let (points, surfaces) = sample_points(&scene, &rays, settings.point_count, settings.seed);
-        // Paths bend in glass, where the rays of others pass straight on.
-        let rays = match scene.with_solid_glass() {
-            Some(solid) => Arc::new(RayTree::new(&solid)),
-            None => rays,
-        };
+        let rays = bending_rays(&scene).map_or(rays, Arc::new);
         let points: Vec<ReferencePoint> = points.into_iter().map(ReferencePoint::from).collect();
         Self {
             emitters: Emitters::new(&scene),
