@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{camera::AxisView, loader::SceneSource, materials::Materials, view::ViewMode};
 use crate::{
     scene::{Lighting, Sides, UpAxis},
-    solver::SolveSettings,
+    solver::{Lamp, SolveSettings},
     worker::RunOptions,
 };
 
@@ -42,6 +42,8 @@ pub enum Action {
     Relight(Materials),
     /// Light the scene from another sky and sun.
     Light(Lighting),
+    /// One light alone; or, where it is that already, all lights that were on before.
+    Solo(Lamp),
     /// Left drags move the sun, or again the camera.
     ToggleSunDrag,
     /// Lights and materials as before the last change.

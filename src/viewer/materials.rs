@@ -1,11 +1,9 @@
 //! Lights and materials as the user has changed them: what is switched on, how bright, in which colour.
 
-use std::time::{Duration, Instant};
-
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{Appearance, Lamp, Lighting, Material, Scene, Surface, TriangleId};
+use crate::scene::{Appearance, Lamp, Material, Scene, Surface, TriangleId};
 
 /// A light as its controls show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,6 +211,20 @@ impl Materials {
         self.now != self.of_file
     }
 
+    /// Which materials emit.
+    pub fn are_lamps(&self) -> Vec<bool> {
+        (0..self.now.len())
+            .map(|index| self.is_lamp(index))
+            .collect()
+    }
+
+    /// Switch materials that have a light on or off.
+    pub fn switch(&mut self, index: usize, is_on: bool) {
+        if let Some(light) = &mut self.now[index].light {
+            light.is_on = is_on;
+        }
+    }
+
     /// Indices of the materials that emit, switched off or not.
     pub fn lights(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.now.len()).filter(|&index| self.now[index].light.is_some())
@@ -328,64 +340,6 @@ fn is_named_like_lamp(name: &str) -> bool {
         })
 }
 
-/// All that can be changed about the light of a scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Lights {
-    /// Its lamps and materials.
-    pub materials: Materials,
-    /// Sky and sun.
-    pub lighting: Lighting,
-}
-
-/// Lights and materials before and after changes, to go back and forth between.
-#[derive(Clone, Debug, Default)]
-pub struct History {
-    past: Vec<Lights>,
-    future: Vec<Lights>,
-    changed: Option<Instant>,
-}
-
-impl History {
-    /// Changes that are remembered.
-    const KEPT: usize = 100;
-    /// Changes that follow each other sooner belong together, as those of one drag do.
-    const TOGETHER: Duration = Duration::from_millis(700);
-
-    /// Remember lights and materials before a change that is made at this time.
-    pub fn note(&mut self, before: Lights, now: Instant) {
-        let last = self.changed.replace(now);
-        self.future.clear();
-        if last.is_some_and(|last| now.duration_since(last) < Self::TOGETHER) {
-            return;
-        }
-        if self.past.len() >= Self::KEPT {
-            self.past.remove(0);
-        }
-        self.past.push(before);
-    }
-
-    /// Whether there is a change to undo.
-    pub fn can_undo(&self) -> bool {
-        !self.past.is_empty()
-    }
-
-    /// Lights and materials before the last change, given those of now.
-    pub fn undo(&mut self, now: Lights) -> Option<Lights> {
-        let before = self.past.pop()?;
-        self.future.push(now);
-        self.changed = None;
-        Some(before)
-    }
-
-    /// Lights and materials after the change that was undone last, given those of now.
-    pub fn redo(&mut self, now: Lights) -> Option<Lights> {
-        let after = self.future.pop()?;
-        self.past.push(now);
-        self.changed = None;
-        Some(after)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -497,24 +451,6 @@ mod tests {
         assert_eq!(again.restore(&[gone.clone()], &[]), ["gone"]);
         gone.emission[1] = f32::NAN;
         assert!(gone.check().is_err());
-    }
-
-    #[test]
-    fn changes_are_undone_and_made_again() {
-        let first = Lights {
-            materials: Materials::of(&cornell()),
-            lighting: Lighting::default(),
-        };
-        let mut second = first.clone();
-        second.materials.make_lamp(0);
-        let (mut history, start) = (History::default(), Instant::now());
-        history.note(first.clone(), start);
-        // Still the same drag.
-        history.note(second.clone(), start + Duration::from_millis(100));
-        assert_eq!(history.undo(second.clone()), Some(first.clone()));
-        assert_eq!(history.undo(first.clone()), None);
-        assert_eq!(history.redo(first), Some(second.clone()));
-        assert_eq!(history.redo(second), None);
     }
 
     #[test]

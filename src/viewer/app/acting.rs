@@ -10,7 +10,8 @@ use super::{
         bindings,
         camera::Camera,
         camera_text, clusters, focus,
-        materials::{Lights, Materials},
+        lights::Lights,
+        materials::Materials,
         messages::Severity,
         navigation::Picked,
         panel_state::PanelState,
@@ -64,11 +65,24 @@ impl App {
             }
             Action::Relight(materials) => {
                 self.remember_lights();
+                if materials.are_lamps() != self.state.materials.are_lamps() {
+                    self.state.solo = None;
+                }
                 self.relight(materials);
             }
             Action::Light(lighting) => {
                 self.remember_lights();
+                let are_off = |lighting: &Lighting| [lighting.is_sky_off, lighting.is_sun_off];
+                if are_off(&lighting) != are_off(&self.state.lighting) {
+                    self.state.solo = None;
+                }
                 self.light(lighting);
+            }
+            Action::Solo(lamp) => {
+                self.remember_lights();
+                let mut lights = self.state.lights();
+                lights.toggle_solo(lamp, self.state.has_outside());
+                self.change_lights(lights);
             }
             Action::Undo | Action::Redo => {
                 let now = self.state.lights();
@@ -77,17 +91,8 @@ impl App {
                     Action::Undo => history.undo(now),
                     _ => history.redo(now),
                 };
-                if let Some(Lights {
-                    materials,
-                    lighting,
-                }) = other
-                {
-                    if lighting != self.state.lighting {
-                        self.light(lighting);
-                    }
-                    if materials != self.state.materials {
-                        self.relight(materials);
-                    }
+                if let Some(lights) = other {
+                    self.change_lights(lights);
                 }
             }
             Action::Sides(sides) => {
@@ -341,6 +346,22 @@ impl App {
     fn remember_lights(&mut self) {
         let before = self.state.lights();
         self.state.history.note(before, Instant::now());
+    }
+
+    /// Change what is different.
+    fn change_lights(&mut self, lights: Lights) {
+        let Lights {
+            materials,
+            lighting,
+            solo,
+        } = lights;
+        self.state.solo = solo;
+        if lighting != self.state.lighting {
+            self.light(lighting);
+        }
+        if materials != self.state.materials {
+            self.relight(materials);
+        }
     }
 
     /// Light the scene from another sky and sun: from the beginning, with the same geometry and the same rays.

@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::{
     super::{
+        lights::Lights,
         material_file,
         messages::Severity,
         saver::{self, Content},
@@ -126,11 +127,23 @@ impl App {
         saving.start(self.notices.0.clone(), &self.unfinished, self.wake.clone());
     }
 
+    /// All lights, also while one is shown alone.
+    fn lights_to_save(&self) -> Lights {
+        let mut lights = self.state.lights();
+        lights.end_solo();
+        lights
+    }
+
     pub(super) fn save_materials(&mut self) {
         let Some(loaded) = &self.state.loaded else {
             return;
         };
-        let changes = self.state.materials.changes(&self.state.lighting.lamps);
+        let Lights {
+            materials,
+            lighting,
+            ..
+        } = self.lights_to_save();
+        let changes = materials.changes(&lighting.lamps);
         let is_srgb = self.state.scene_options.mtl_color_is_srgb;
         let (severity, text) =
             match material_file::save(&loaded.source, &loaded.scene, &changes, is_srgb) {
@@ -150,13 +163,18 @@ impl App {
         let Some(loaded) = &self.state.loaded else {
             return;
         };
+        let Lights {
+            materials,
+            lighting,
+            ..
+        } = self.lights_to_save();
         let saved = Session {
             camera: Some(self.state.rig.target),
             bookmarks: self.state.bookmarks.clone(),
             view: self.state.view.clone(),
             settings: self.state.settings.clone(),
-            light: session::saved_light(&loaded.source, &self.state.lighting),
-            materials: self.state.materials.changes(&self.state.lighting.lamps),
+            light: session::saved_light(&loaded.source, &lighting),
+            materials: materials.changes(&lighting.lamps),
         };
         match session::save(&loaded.source, &saved, &loaded.scene.frame) {
             Ok(path) => self

@@ -9,12 +9,16 @@ use super::{
     color::color_button,
     outside,
     row::{self, slider},
+    solo::Solos,
 };
-use crate::viewer::{
-    action::Action,
-    figures::seconds,
-    materials::{LightControl, Materials},
-    state::State,
+use crate::{
+    solver::Lamp,
+    viewer::{
+        action::Action,
+        figures::seconds,
+        materials::{LightControl, Materials},
+        state::State,
+    },
 };
 
 /// Height of the list of lights, and of that of materials, above which it scrolls, in points.
@@ -26,7 +30,7 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Acti
         return;
     };
     let mut materials = state.materials.clone();
-    lights_ui(ui, &mut materials);
+    lights_ui(ui, &mut materials, &Solos::of(state), actions);
     row::section(ui, "Materials", false, |ui| {
         reflectances_ui(ui, &mut materials, loaded.scene.max_reflectance);
     });
@@ -55,7 +59,12 @@ pub fn materials_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Acti
     outside::outside_ui(ui, state, actions);
 }
 
-fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
+fn lights_ui(
+    ui: &mut egui::Ui,
+    materials: &mut Materials,
+    solos: &Solos,
+    actions: &mut Vec<Action>,
+) {
     let lights: Vec<usize> = materials.lights().collect();
     if lights.is_empty() {
         ui.weak("No material emits light.");
@@ -72,7 +81,7 @@ fn lights_ui(ui: &mut egui::Ui, materials: &mut Materials) {
         .min_scrolled_height(MOST_HEIGHT)
         .show_rows(ui, height, lights.len(), |ui, shown| {
             for &index in &lights[shown] {
-                ui.push_id(index, |ui| light_ui(ui, materials, index));
+                ui.push_id(index, |ui| light_ui(ui, materials, index, solos, actions));
             }
         });
 }
@@ -123,7 +132,13 @@ pub(super) fn material_ui(ui: &mut egui::Ui, materials: &mut Materials, index: u
     });
 }
 
-fn light_ui(ui: &mut egui::Ui, materials: &mut Materials, index: usize) {
+fn light_ui(
+    ui: &mut egui::Ui,
+    materials: &mut Materials,
+    index: usize,
+    solos: &Solos,
+    actions: &mut Vec<Action>,
+) {
     let default = materials.of_file(index).light;
     let material = &mut materials.now[index];
     let Some(light) = &mut material.light else {
@@ -135,6 +150,7 @@ fn light_ui(ui: &mut egui::Ui, materials: &mut Materials, index: usize) {
         color_button(ui, &name, &mut light.color);
         ui.checkbox(&mut light.is_on, &material.name)
             .on_hover_text("Whether it emits light");
+        solos.button(ui, Lamp::Material(index), &material.name, actions);
     });
     ui.add_enabled_ui(light.is_on, |ui| intensity_ui(ui, light, &default));
 }

@@ -27,6 +27,7 @@ pub mod row;
 pub mod scene;
 pub mod settings;
 pub mod sides;
+pub mod solo;
 pub mod statistics;
 pub mod status;
 pub mod table;

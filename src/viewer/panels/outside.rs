@@ -6,9 +6,11 @@ use glam::Vec3;
 use super::{
     color::color_button,
     row::{self, slider},
+    solo::Solos,
 };
 use crate::{
     scene::{HosekSky, Lighting, Sky, SkySource, Sun, SunSource},
+    solver::Lamp,
     viewer::{action::Action, loader::LoadedScene, state::State},
 };
 
@@ -18,9 +20,22 @@ pub fn outside_ui(ui: &mut egui::Ui, state: &mut State, actions: &mut Vec<Action
         return;
     };
     let mut lighting = state.lighting.clone();
+    let solos = Solos::of(state);
+    let [has_sky, has_sun] = state.has_outside();
+    let mut solo = |ui: &mut egui::Ui, lamp: Lamp| match lamp {
+        Lamp::Sky if has_sky => solos.button(ui, lamp, "the sky", actions),
+        Lamp::Sun if has_sun => solos.button(ui, lamp, "the sun", actions),
+        _ => {}
+    };
     // Both, and no comparison of the pictures in it.
-    let has_changed = sky_ui(ui, &loaded, &mut lighting)
-        | sun_ui(ui, &loaded, &mut lighting, &mut state.panels.drags_sun);
+    let has_changed = sky_ui(ui, &loaded, &mut lighting, &mut solo)
+        | sun_ui(
+            ui,
+            &loaded,
+            &mut lighting,
+            &mut state.panels.drags_sun,
+            &mut solo,
+        );
     if has_changed {
         actions.push(Action::Light(lighting));
     }
@@ -47,6 +62,9 @@ fn sky_of(loaded: &LoadedScene, lighting: &Lighting) -> SkySource {
     }
 }
 
+/// Shows the button of a light that may be shown alone.
+type SoloButton<'a> = &'a mut dyn FnMut(&mut egui::Ui, Lamp);
+
 /// Kinds of sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SkyKind {
@@ -58,7 +76,12 @@ enum SkyKind {
 /// Turbidity of a clear day.
 const CLEAR: f32 = 3.0;
 
-fn sky_ui(ui: &mut egui::Ui, loaded: &LoadedScene, lighting: &mut Lighting) -> bool {
+fn sky_ui(
+    ui: &mut egui::Ui,
+    loaded: &LoadedScene,
+    lighting: &mut Lighting,
+    solo: SoloButton<'_>,
+) -> bool {
     let mut sky = sky_of(loaded, lighting);
     let was_on = sky != SkySource::Dark && !lighting.is_sky_off;
     let mut is_on = was_on;
@@ -75,6 +98,7 @@ fn sky_ui(ui: &mut egui::Ui, loaded: &LoadedScene, lighting: &mut Lighting) -> b
         }
         ui.checkbox(&mut is_on, "Sky")
             .on_hover_text("Light from all around");
+        solo(ui, Lamp::Sky);
     });
     if is_on != was_on {
         lighting.is_sky_off = !is_on;
@@ -228,6 +252,7 @@ fn sun_ui(
     loaded: &LoadedScene,
     lighting: &mut Lighting,
     is_dragged: &mut bool,
+    solo: SoloButton<'_>,
 ) -> bool {
     let mut sun = sun_of(loaded, lighting);
     let was_on = sun != SunSource::Dark && !lighting.is_sun_off;
@@ -241,6 +266,7 @@ fn sun_ui(
         }
         ui.checkbox(&mut is_on, "Sun")
             .on_hover_text("A small disc in the sky");
+        solo(ui, Lamp::Sun);
         if was_on {
             ui.toggle_value(is_dragged, "Drag sun").on_hover_text(
                 "Left drag in the view moves the sun: across its azimuth, up and down its elevation (U)",
