@@ -222,7 +222,10 @@ impl PictureFlags {
         let look = first_look(scene, &rays);
         let opening = match builtin_name.and_then(builtin::find_builtin) {
             Some(found) => loader::builtin_camera(found, scene),
-            None => loader::file_camera(scene, &rays).unwrap_or(look.camera),
+            None => loader::file_cameras(scene, &rays)
+                .first()
+                .copied()
+                .unwrap_or(look.camera),
         };
         let camera = self.view.camera().apply(opening, &scene.frame);
         let view = self.view.request(run_flags).apply(&ViewSettings::default());

@@ -240,7 +240,10 @@ impl File<'_> {
                 attributes.entry("TEXCOORD_0").or_insert(places);
                 let position = accessors.len() - self.attributes.len();
                 let places = part.vertices.iter();
-                bound(&mut accessors[position], places.map(|vertex| self.position(vertex)));
+                bound(
+                    &mut accessors[position],
+                    places.map(|vertex| self.position(vertex)),
+                );
                 primitives.push(json!({
                     "attributes": attributes,
                     "indices": accessors.len(),

@@ -57,7 +57,8 @@ pub(super) fn parts(scene: &Scene, map: &Lightmap) -> Vec<Vec<Part>> {
                     known,
                     Vertex {
                         point: points[corner],
-                        normal: toward(smooth, flat),
+                        // A zero has two signs, which would part vertices.
+                        normal: toward(smooth, flat) + Vec3::ZERO,
                         own: Vec2::new(own.x, 1.0 - own.y),
                         place: map.layout.corners[number][corner] / map.layout.side as f32,
                     },

@@ -194,7 +194,9 @@ impl Records {
         }
         let mut sums = [(Vec3::ZERO, 0.0, 0.0); KINDS];
         for index in 0..AROUND {
-            let Some(others) = &list[places[index]] else { continue };
+            let Some(others) = &list[places[index]] else {
+                continue;
+            };
             let opposite = near[AROUND - 1 - index];
             for kind in 0..KINDS {
                 let (mean, weights, variance) = &mut sums[kind];

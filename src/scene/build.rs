@@ -79,7 +79,7 @@ impl SceneBuilder {
             up: options.up.unwrap_or_default(),
             up_evidence: None,
             is_in_metres,
-            start_view: None,
+            views: Vec::new(),
             environment: Arc::default(),
             radiance_unit,
         };

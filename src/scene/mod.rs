@@ -55,6 +55,7 @@ mod sidedness;
 mod size_classes;
 mod sky_file;
 mod source;
+mod specular;
 mod suggestion;
 #[cfg(test)]
 pub(crate) mod test_shapes;
@@ -224,7 +225,7 @@ pub struct Surface {
 
 /// A camera of a file, in its coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StartView {
+pub struct FileView {
     /// The eye.
     pub position: DVec3,
     /// Unit vector in which it looks.
@@ -281,8 +282,8 @@ pub struct Scene {
     pub up_evidence: Option<UpEvidence>,
     /// Whether its file says that its unit of length is the metre, as glTF does and OBJ does not.
     pub is_in_metres: bool,
-    /// The view that its file brings along.
-    pub start_view: Option<StartView>,
+    /// The cameras of its file; the first is the view to open with.
+    pub views: Vec<FileView>,
     /// Light from outside; dark as a scene is read.
     pub environment: Arc<Environment>,
     /// Warnings: what was skipped, corrected or clamped.

@@ -20,7 +20,9 @@ use super::{
 };
 use crate::{
     geometry::RayTree,
-    scene::{self, Environment, Frame, Lighting, ReadProgress, Scene, SceneOptions, builtin},
+    scene::{
+        self, Environment, FileView, Frame, Lighting, ReadProgress, Scene, SceneOptions, builtin,
+    },
     worker::Wake,
 };
 
@@ -90,6 +92,8 @@ pub struct LoadedScene {
     pub is_grey: bool,
     /// The view to open with: the one that the scene brings along, or the one that sees most.
     pub viewpoint: Camera,
+    /// The cameras of its file.
+    pub own_views: Vec<Camera>,
 }
 
 impl LoadedScene {
@@ -268,8 +272,10 @@ fn load(
     let rays = RayTree::new(&scene);
     tracker.enter(Phase::ChoosingView);
     let look = first_look(&scene, &rays);
-    let own = || file_camera(&scene, &rays);
-    let viewpoint = viewpoint.or_else(own).unwrap_or(look.camera);
+    let own_views = file_cameras(&scene, &rays);
+    let viewpoint = viewpoint
+        .or(own_views.first().copied())
+        .unwrap_or(look.camera);
     let [min, max] = look.bounds;
     let emits = |surface: &&scene::Surface| surface.emission != Vec3::ZERO;
     Ok(LoadedScene {
@@ -286,6 +292,7 @@ fn load(
         is_lit: look.is_lit,
         interior: look.interior,
         viewpoint,
+        own_views,
     })
 }
 
@@ -305,18 +312,20 @@ pub fn builtin_camera(builtin: &builtin::Builtin, scene: &Scene) -> Camera {
     Camera::looking(eye, target, scene.up.vector())
 }
 
-/// The view that a file brings along, around the first thing that it sees.
-pub fn file_camera(scene: &Scene, rays: &RayTree) -> Option<Camera> {
-    let view = scene.start_view?;
-    let eye = scene.frame.from_world(view.position);
-    let direction = view.direction.as_vec3();
-    let seen = rays.closest(eye, direction, None);
-    let distance = seen.map_or(Frame::EXTENT as f32, |hit| hit.distance);
-    let camera = Camera {
-        fov_y_radians: view.fov_y_radians,
-        ..Camera::looking(eye, eye + direction * distance, scene.up.vector())
+/// The views that a file brings along, each around the first thing that it sees.
+pub fn file_cameras(scene: &Scene, rays: &RayTree) -> Vec<Camera> {
+    let camera = |view: &FileView| {
+        let eye = scene.frame.from_world(view.position);
+        let direction = view.direction.as_vec3();
+        let seen = rays.closest(eye, direction, None);
+        let distance = seen.map_or(Frame::EXTENT as f32, |hit| hit.distance);
+        Camera {
+            fov_y_radians: view.fov_y_radians,
+            ..Camera::looking(eye, eye + direction * distance, scene.up.vector())
+        }
     };
-    camera.is_valid().then_some(camera)
+    let cameras = scene.views.iter().map(camera);
+    cameras.filter(Camera::is_valid).collect()
 }
 
 #[cfg(test)]

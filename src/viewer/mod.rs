@@ -23,6 +23,7 @@ mod glossing;
 pub mod headless;
 pub mod inspection;
 pub mod light_range;
+pub mod lights;
 mod line_cache;
 pub mod links;
 pub mod loader;

@@ -8,8 +8,9 @@ use super::{
     exposure::Follower,
     frame_time::FrameTimes,
     inspection::Inspections,
+    lights::{History, Lights, Solo},
     loader::{LoadedScene, Loader},
-    materials::{History, Lights, Materials},
+    materials::Materials,
     messages::Messages,
     options::CameraRequest,
     panel_state::PanelState,
@@ -23,7 +24,7 @@ use super::{
 };
 use crate::{
     hierarchy::NodeId,
-    scene::{Lighting, Scene, SceneOptions, SunSource},
+    scene::{Environment, Lighting, Scene, SceneOptions, Sky, SkySource, SunSource},
     solver::{SolveSettings, StepReport, Subject},
     worker::RunOptions,
 };
@@ -65,6 +66,8 @@ pub struct State {
     pub lighting: Lighting,
     /// Its lights and materials, as they were changed.
     pub materials: Materials,
+    /// Where one light is shown alone.
+    pub solo: Option<Solo>,
     /// How they were before and after changes.
     pub history: History,
     /// How the light is shown.
@@ -123,7 +126,26 @@ impl State {
         Lights {
             materials: self.materials.clone(),
             lighting: self.lighting.clone(),
+            solo: self.solo.clone(),
         }
+    }
+
+    /// Whether there are a sky and a sun, switched on or off.
+    pub fn has_outside(&self) -> [bool; 2] {
+        let Some(loaded) = &self.loaded else {
+            return [false; 2];
+        };
+        let Environment { sky, sun, .. } = &*loaded.own_environment;
+        let has_sky = match &self.lighting.sky {
+            Some(sky) => *sky != SkySource::Dark,
+            // Where nothing emits there is one by default.
+            None => !matches!(sky, Sky::Dark) || loaded.emitter_count == 0,
+        };
+        let has_sun = match &self.lighting.sun {
+            Some(sun) => *sun != SunSource::Dark,
+            None => sun.is_some(),
+        };
+        [has_sky, has_sun]
     }
 
     /// The sun that shines, if there is one.

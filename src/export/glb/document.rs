@@ -147,7 +147,11 @@ fn accessors(content: &Content<'_>, lit: LitMesh<'_>) -> Vec<Value> {
         let count = mesh.vertices.len();
         let position = accessors.len();
         accessors.extend((0..sizes.attributes).map(|attribute| {
-            floats(start + ATTRIBUTE_BYTES * count as u64 * attribute, count, "VEC3")
+            floats(
+                start + ATTRIBUTE_BYTES * count as u64 * attribute,
+                count,
+                "VEC3",
+            )
         }));
         let places = mesh.vertices.iter().map(|&vertex| {
             let position = lit.snapshot.mesh.positions[vertex as usize];

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     geometry::Harmonics,
-    scene::{Scene, Specular, UpAxis},
+    scene::{Frame, Scene, Specular, UpAxis},
     solver::{Lamp, LampLight, Snapshot},
 };
 

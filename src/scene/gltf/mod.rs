@@ -37,9 +37,7 @@ use super::builder::{BuildError, SceneBuilder, Source};
 use super::listed::{MOST_LISTED, listed, shortened};
 use super::warning::WarningLog;
 use super::whole::folder_of;
-use super::{
-    Environment, ReadError, Scene, SceneOptions, Sky, StartView, Sun, UpAxis, WarningKind,
-};
+use super::{Environment, FileView, ReadError, Scene, SceneOptions, Sky, Sun, UpAxis, WarningKind};
 
 /// Extensions that are followed, and those of materials that may be left out without harm to what is lit.
 const KNOWN_EXTENSIONS: [&str; 16] = [
@@ -72,7 +70,7 @@ const MOST_UNSHOWN: usize = 4096;
 pub(super) struct Imported {
     pub(super) builder: SceneBuilder,
     sun: Option<Sun>,
-    start_view: Option<StartView>,
+    views: Vec<FileView>,
 }
 
 /// Take a file apart that lies at a path.
@@ -152,10 +150,11 @@ pub(super) fn import(
     Ok(Imported {
         builder,
         sun,
-        start_view: walk
+        views: walk
             .placed
             .iter()
-            .find_map(|placed| start_view(document, placed)),
+            .filter_map(|placed| view(document, placed))
+            .collect(),
     })
 }
 
@@ -170,7 +169,7 @@ impl Imported {
             BuildError::NoFaces { detail } => ReadError::NoFaces { detail, path },
             BuildError::TooLarge { count, limit } => ReadError::TooLarge { count, limit, path },
         })?;
-        finished.start_view = self.start_view;
+        finished.views = self.views;
         Ok(match self.sun {
             Some(sun) => finished.in_environment(Environment {
                 sky: Sky::Dark,
@@ -183,10 +182,10 @@ impl Imported {
 }
 
 /// The camera of a node, where it has one with a perspective.
-fn start_view(document: &Document, placed: &Placed) -> Option<StartView> {
+fn view(document: &Document, placed: &Placed) -> Option<FileView> {
     let camera = document.cameras.get(placed.node.camera?)?;
     let direction = (placed.world.matrix3 * DVec3::NEG_Z).try_normalize()?;
-    Some(StartView {
+    Some(FileView {
         position: placed.world.translation,
         direction,
         fov_y_radians: camera.perspective.as_ref()?.yfov as f32,

@@ -8,8 +8,9 @@ use super::{
     super::{
         camera::Camera,
         exposure::Follower,
+        lights::History,
         loader::{LoadedScene, Loader, SceneSource},
-        materials::{History, Materials, SavedMaterial},
+        materials::{Materials, SavedMaterial},
         messages::Severity,
         session,
         truth::Truth,
@@ -84,6 +85,7 @@ impl App {
         );
         self.state.lighting = loaded.lighting.clone();
         self.state.materials = Materials::of(&loaded.scene);
+        self.state.solo = None;
         self.state.history = History::default();
         self.state.loaded = Some(Arc::new(loaded));
         self.restore(&changed);
@@ -111,7 +113,9 @@ impl App {
             }
             self.state.bookmarks = self.state.bookmarks.iter().filter_map(moved).collect();
         }
-        self.state.materials.changes(&[])
+        let mut lights = self.state.lights();
+        lights.end_solo();
+        lights.materials.changes(&[])
     }
 
     /// Nothing of the scene before is to be shown.
@@ -129,7 +133,7 @@ impl App {
     /// Returns the materials that its sidecar changes.
     fn open_view(&mut self, loaded: &LoadedScene) -> Vec<SavedMaterial> {
         let mut changed = Vec::new();
-        self.state.bookmarks = Vec::new();
+        self.state.bookmarks.clone_from(&loaded.own_views);
         let frame = &loaded.scene.frame;
         let mut camera = loaded.viewpoint;
         match session::load(&loaded.source, frame) {

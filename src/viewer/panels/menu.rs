@@ -16,6 +16,9 @@ use crate::{
     },
 };
 
+/// Height of the list of bookmarks above which it scrolls, in points.
+const MOST_HEIGHT: f32 = 240.0;
+
 /// Show the bar; requested actions go into `actions`.
 pub fn menu_ui(
     ui: &mut egui::Ui,
@@ -274,16 +277,21 @@ fn camera_menu(ui: &mut egui::Ui, state: &State, table: &[Binding], actions: &mu
     );
     ui.separator();
     item(ui, table, actions, "Keep as bookmark", Action::AddBookmark);
-    for index in 0..state.bookmarks.len() {
-        let label = format!("Bookmark {}", index + 1);
-        ui.horizontal(|ui| {
-            item(ui, table, actions, &label, Action::GoTo(index));
-            let remove = ui.small_button("×").on_hover_text("Forget this bookmark");
-            if remove.clicked() {
-                actions.push(Action::RemoveBookmark(index));
+    // A file may bring many.
+    egui::ScrollArea::vertical()
+        .max_height(MOST_HEIGHT)
+        .show(ui, |ui| {
+            for index in 0..state.bookmarks.len() {
+                let label = format!("Bookmark {}", index + 1);
+                ui.horizontal(|ui| {
+                    item(ui, table, actions, &label, Action::GoTo(index));
+                    let remove = ui.small_button("×").on_hover_text("Forget this bookmark");
+                    if remove.clicked() {
+                        actions.push(Action::RemoveBookmark(index));
+                    }
+                });
             }
         });
-    }
     item(ui, table, actions, "Copy as flags", Action::CopyCamera);
     item(ui, table, actions, "Paste", Action::RequestPaste);
     ui.separator();
