@@ -526,6 +526,34 @@ fn a_dark_room_is_as_precise_within_walls_that_the_sky_lights() {
 }
 
 #[test]
+fn the_outside_of_a_deep_shaft_sees_the_whole_sky_though_little_reaches_its_inside() {
+    // Walls that are lit on both sides; deep within, rays are guided to the opening.
+    let mut builder = SceneBuilder::default();
+    let grey = material(&mut builder, 0.8, 0.0);
+    let [u, v, w] = [DVec3::X, DVec3::Y * 8.0, DVec3::Z];
+    for (origin, edges) in [
+        (DVec3::ZERO, [w, u]),
+        (DVec3::ZERO, [v, w]),
+        (DVec3::ZERO, [u, v]),
+        (u, [w, v]),
+        (w, [v, u]),
+    ] {
+        plate(&mut builder, grey, 1, origin, edges);
+    }
+    let scene = under(builder, Sides::Two, uniform(1.0));
+    let (solver, _) = solve(&scene, SolveSettings::default());
+    let places: Vec<DVec3> = (0..200)
+        .map(|step| {
+            let [along, up] = [0.618, 0.754].map(|part| (0.5 + part * f64::from(step)).fract());
+            DVec3::new(0.0, 8.0 * up, along)
+        })
+        .collect();
+    for found in irradiance_at(&scene, &solver, &places, Vec3::NEG_X) {
+        assert_close(found.x, PI, 1e-3, "outside");
+    }
+}
+
+#[test]
 fn a_closed_room_shoots_no_ray_to_the_sky() {
     let mut builder = SceneBuilder::default();
     let grey = material(&mut builder, 0.5, 0.0);
