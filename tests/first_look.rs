@@ -166,6 +166,32 @@ fn an_object_is_seen_from_outside_and_above() {
 }
 
 #[test]
+fn solids_that_overlap_on_a_ground_are_no_room() {
+    let mut builder = SceneBuilder::default();
+    let [wall, _] = paints(&mut builder);
+    // A body and a cabin that stands in it, over a ground.
+    let [low, high] = [DVec3::new(-1.0, 0.2, -1.0), DVec3::new(1.0, 1.2, 1.0)];
+    cuboid(&mut builder, low, high, false, wall);
+    let raise = DVec3::new(0.0, 0.6, 0.0);
+    cuboid(
+        &mut builder,
+        low * 0.6 + raise,
+        high * 0.6 + raise,
+        false,
+        wall,
+    );
+    let ground = [[-6.0, -6.0], [-6.0, 6.0], [6.0, 6.0], [6.0, -6.0]];
+    let corners = ground.map(|[x, z]| builder.push_position(DVec3::new(x, 0.0, z)));
+    for half in [[0, 1, 2], [0, 2, 3]] {
+        builder.push_triangle(half.map(|corner| corners[corner]), wall);
+    }
+    for sides in [Sides::Auto, Sides::One, Sides::Two] {
+        let scene = finished(builder.clone(), sides);
+        assert_eq!(look(&scene).interior, None, "{sides:?}");
+    }
+}
+
+#[test]
 fn far_things_do_not_move_the_camera_away() {
     let mut builder = SceneBuilder::default();
     let [wall, _] = paints(&mut builder);

@@ -39,6 +39,9 @@ pub struct ViewFlags {
     /// Leave out what mirrors, gloss and glass send to the eye where light at vertices is drawn
     #[arg(long, help_heading = "Picture")]
     pub no_gloss: bool,
+    /// Draw what stands before a room that is looked into from outside
+    #[arg(long, help_heading = "Picture")]
+    pub no_see_through: bool,
     /// Logarithmic scale for false colours
     #[arg(long, help_heading = "Picture")]
     pub logarithmic: bool,
@@ -91,6 +94,7 @@ impl ViewFlags {
             fixed_range: self.range.map(|range| range.0),
             edges: self.edges,
             lacks_gloss: self.no_gloss,
+            shows_all: self.no_see_through,
             clusters: self.clusters.map(|clusters| clusters.0),
         }
     }

@@ -1,8 +1,9 @@
 //! Faces that lie over each other in one plane are cut, so that no light is counted twice and no two of them flicker.
 //!
-//! Of faces that look the same way, the first in the file stays, and later ones lose what it covers. Of faces that look
-//! opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are covered in part are cut
-//! along the edges of what covers them. What light passes through covers only what has its material.
+//! Of faces that look the same way one stays whole, and others lose what it covers: lamps go before what they lie on, and
+//! smaller surfaces, as rugs and pictures are, before larger ones; of those that are alike, the first in the file. Of faces
+//! that look opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are covered in part
+//! are cut along the edges of what covers them. What light passes through covers only what has its material.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -22,12 +23,12 @@ const PARTLY_DOUBLED: &str = "it lay on another face that looks the same way, an
 enum Fate {
     /// Its back is covered.
     OneSided,
-    /// All of it is covered by earlier ones.
+    /// All of it is covered by others.
     Dropped,
     /// Only these pieces of it are left.
     Cut {
         pieces: Vec<Piece>,
-        /// Whether something is covered by earlier ones.
+        /// Whether something is covered by others.
         is_doubled: bool,
     },
 }
@@ -38,19 +39,29 @@ struct Piece {
     has_back: bool,
 }
 
-/// Faces that have the corners of an earlier one in the same sense; `may_cover` tells whether the second of two faces
-/// covers the first where it lies on it.
+/// What goes before what: the least stays.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Rank {
+    is_dark: bool,
+    size: i32,
+    face: u32,
+}
+
+/// Size classes of surfaces to a factor of two of their areas: what differs by rounding has the same.
+const CLASSES: f64 = 4.0;
+
+/// Faces that have the corners of another one in the same sense; `covers` tells whether the second of two faces covers the
+/// first where it lies on it.
 pub(super) fn repeated(
     overlaps: &Overlaps,
     corners: &[[u32; 3]],
-    may_cover: impl Fn(u32, u32) -> bool,
+    covers: impl Fn(u32, u32) -> bool,
 ) -> Vec<u32> {
     let sorted = |triangle: u32| sorted_corners(corners[triangle as usize]);
     overlaps
         .by_triangle()
         .filter_map(|(face, mut others)| {
-            let repeats =
-                |other| other < face && sorted(other) == sorted(face) && may_cover(face, other);
+            let repeats = |other| sorted(other) == sorted(face) && covers(face, other);
             others.any(repeats).then_some(face)
         })
         .collect()
@@ -78,12 +89,13 @@ impl SceneBuilder {
             .by_triangle()
             .map(|(face, others)| (face, others.collect()))
             .collect();
+        let ranks = self.ranks(triangles, positions);
         let fates: Vec<(u32, Fate)> = overlapping
             .par_iter()
             .filter_map(|(face, others)| {
                 let may_cover = |&other: &u32| self.may_cover(*face, other);
                 let others: Vec<u32> = others.iter().copied().filter(may_cover).collect();
-                let fate = fate(*face, &others, triangles, positions)?;
+                let fate = fate(*face, &others, &ranks, triangles, positions)?;
                 Some((*face, fate))
             })
             .collect();
@@ -144,6 +156,37 @@ impl SceneBuilder {
         self.doubled_faces += dropped.len();
         self.warn_of_lines("a face", DOUBLED, &dropped);
         self.warn_of_lines("a part of a face", PARTLY_DOUBLED, &cut);
+    }
+
+    /// Whether a face emits light.
+    fn emits(&self, face: u32) -> bool {
+        let material = self.faces[face as usize].material.index();
+        self.materials[material].emission != Vec3::ZERO
+    }
+
+    /// What goes before what, by face.
+    fn ranks(&self, triangles: &ShelledTriangles, positions: &[Vec3]) -> Vec<Rank> {
+        let shells = &triangles.shells;
+        let mut areas = vec![0.0; shells.closed.len()];
+        for (triangle, &shell) in triangles.list.iter().zip(&shells.of_triangle) {
+            let [a, b, c] = triangle
+                .corners
+                .map(|corner| positions[corner as usize].as_dvec3());
+            areas[shell as usize] += (b - a).cross(c - a).length();
+        }
+        let faces = (0..).zip(&shells.of_triangle);
+        faces
+            .map(|(face, &shell)| Rank {
+                is_dark: !self.emits(face),
+                size: (CLASSES * areas[shell as usize].log2()).round() as i32,
+                face,
+            })
+            .collect()
+    }
+
+    /// Which of two faces with the same corners stays: a lamp, else the first in the file.
+    pub(super) fn goes_before(&self, other: u32, face: u32) -> bool {
+        (!self.emits(other), other) < (!self.emits(face), face)
     }
 
     /// Whether nothing of a face is seen through another one that lies on it.
@@ -209,6 +252,7 @@ fn cut_face(face: &Face, piece: &Piece, corners: [u32; 3]) -> Face {
 fn fate(
     face: u32,
     others: &[u32],
+    ranks: &[Rank],
     triangles: &ShelledTriangles,
     positions: &[Vec3],
 ) -> Option<Fate> {
@@ -230,7 +274,7 @@ fn fate(
     let has_back = triangles.list[face as usize].two_sided;
     for &other in others {
         if own.dot(normal(other)) > 0.0 {
-            if other < face {
+            if ranks[other as usize] < ranks[face as usize] {
                 same.push(flat(other));
                 if !(is_solid(face) && is_solid(other)) {
                     cutting.push(flat(other));
@@ -373,6 +417,9 @@ mod tests {
             let area = f64::from(surface.area_vector.length());
             let area = scene.frame.area_to_world(area);
             let first = 2 * triangle.material.index();
+            if first >= areas.len() {
+                continue;
+            }
             areas[first] += area;
             areas[first + 1] += if triangle.two_sided { area } else { 0.0 };
         }
@@ -438,6 +485,46 @@ mod tests {
             .rectangle([0.0, 0.0], [4.0, 3.0], 3, true)
             .rectangle([3.5, 1.0], [6.0, 4.0], 1, true);
         assert_areas(&floors.scene(Sides::Auto), [18.5, 18.5, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn lamps_and_what_is_small_stay_whole_wherever_they_stand_in_the_file() {
+        let sheets = |is_small_first: bool, small_is_lamp: bool, small_size: f64| {
+            let mut sheets = Sheets::new();
+            let lamp = sheets.0.push_material(Material::plain(
+                "lamp",
+                Vec3::ZERO,
+                Vec3::splat(f32::from(u8::from(small_is_lamp))),
+            ));
+            for is_small in [is_small_first, !is_small_first] {
+                let first = sheets.0.faces.len();
+                sheets = match is_small {
+                    true => sheets.rectangle([0.0, 0.0], [small_size, small_size], 1, true),
+                    false => sheets.rectangle([0.0, 0.0], [4.0, 4.0], 5, true),
+                };
+                if is_small {
+                    sheets.0.faces[first..]
+                        .iter_mut()
+                        .for_each(|face| face.material = lamp);
+                }
+            }
+            sheets.scene(Sides::One)
+        };
+        for is_small_first in [false, true] {
+            let rug = sheets(is_small_first, false, 1.5);
+            assert_areas(&rug, [16.0 - 2.25, 0.0, 0.0, 0.0]);
+            let spot = sheets(is_small_first, true, 1.5);
+            let of_lamp = |scene: &Scene| -> f64 {
+                let surfaces = scene.triangles.iter().zip(&scene.surfaces);
+                let emitting = surfaces.filter(|(triangle, _)| triangle.material.index() == 2);
+                let areas = emitting.map(|(_, surface)| f64::from(surface.area_vector.length()));
+                scene.frame.area_to_world(areas.sum())
+            };
+            assert!((of_lamp(&spot) - 2.25).abs() < 1e-3);
+            // A ceiling that is a lamp, once more as a ceiling.
+            let panel = sheets(is_small_first, true, 4.0);
+            assert!((of_lamp(&panel) - 16.0).abs() < 1e-3);
+        }
     }
 
     #[test]

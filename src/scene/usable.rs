@@ -36,7 +36,7 @@ impl SceneBuilder {
         skipped
     }
 
-    /// Remove faces with the corners of an earlier one that look the same way, so that the shells of both are as one; returns
+    /// Remove faces with the corners of another one that look the same way, so that the shells of both are as one; returns
     /// which of the others lie over each other.
     pub(super) fn drop_repeated_faces(
         &mut self,
@@ -51,7 +51,7 @@ impl SceneBuilder {
                 .collect();
             let overlaps = Overlaps::of(&corners, positions);
             let repeated = overlay::repeated(&overlaps, &corners, |face, other| {
-                self.may_cover(face, other)
+                self.goes_before(other, face) && self.may_cover(face, other)
             });
             if repeated.is_empty() {
                 return overlaps;

@@ -293,6 +293,8 @@ pub struct ViewRequest {
     pub edges: bool,
     /// Whether no gloss was asked for.
     pub lacks_gloss: bool,
+    /// Whether what stands before a room was asked for.
+    pub shows_all: bool,
     /// Which cluster boxes.
     pub clusters: Option<ClusterRequest>,
 }
@@ -310,6 +312,7 @@ impl ViewRequest {
             fixed_range: self.fixed_range.or(view.fixed_range),
             edges: view.edges || self.edges,
             gloss: view.gloss && !self.lacks_gloss,
+            see_through: view.see_through && !self.shows_all,
             clusters: self
                 .clusters
                 .map_or(view.clusters, |asked| asked.apply(view.clusters)),

@@ -358,7 +358,7 @@ impl Judge<'_> {
     }
 
     /// The room that a camera shows: about the place that it was found from, or, of one around the scene that looks
-    /// into it, about the middle.
+    /// into it, about a place from which most of what the camera sees is seen, too. Within a solid nothing of that is.
     fn interior(&self, best: &Candidate, places: &[Vec3]) -> Option<Interior> {
         if let Some(place) = best.place {
             // Long rooms show their ends from other places in them.
@@ -367,20 +367,29 @@ impl Judge<'_> {
             places.push(best.camera.eye());
             return Interior::about(self.rays, &places);
         }
+        let seen: Vec<(&Spot, f32)> = self
+            .spots
+            .all
+            .iter()
+            .map(|spot| (spot, self.view_of(&best.camera, spot)))
+            .filter(|(_, seen)| *seen > 0.0)
+            .collect();
+        let all: f32 = seen.iter().map(|(_, seen)| seen).sum();
+        let shared = |&place: &Vec3| -> f32 {
+            let looks = |spot: &Spot| {
+                spot.normal.dot(place - spot.point) > 0.0
+                    && !self
+                        .rays
+                        .occluded(spot.point, place, [Some(spot.triangle), None])
+            };
+            let inward = seen.iter().filter(|(spot, _)| looks(spot));
+            inward.map(|(_, seen)| seen).sum()
+        };
         let [min, max] = self.bounds;
         let middle = 0.5 * (min + max);
-        let (mut inward, mut all) = (0.0, 0.0);
-        for spot in &self.spots.all {
-            let seen = self.view_of(&best.camera, spot);
-            all += seen;
-            if spot.normal.dot(middle - spot.point) > 0.0 {
-                inward += seen;
-            }
-        }
-        if inward <= 0.5 * all {
-            return None;
-        }
-        Interior::about(self.rays, &[middle])
+        let mut places = std::iter::once(middle).chain(places.iter().copied());
+        let place = places.find(|place| shared(place) > 0.5 * all)?;
+        Interior::about(self.rays, &[place])
     }
 }
 
