@@ -36,6 +36,9 @@ pub(super) struct Record {
     /// By kind: how fast it changes, as the inverse of a distance. Of direct light the sharpness of its shadows, 0 where
     /// nothing is blocked; of indirect light the inverse of the harmonic mean of the lengths of its rays.
     pub(super) changes: [f32; KINDS],
+    /// Mean of unit vectors towards what the rays of indirect light met, along the surface, each over the length of its ray:
+    /// light changes in this direction, along a corner it does not.
+    pub(super) towards: Vec3,
     /// By kind, W/m²: what is missing of direct light, and what is more than stored of indirect light.
     pub(super) light: [Estimate; KINDS],
 }
@@ -117,6 +120,7 @@ impl<'a> Recorder<'a> {
             unoccluded: Vec3::ZERO,
             stored: luminance(all),
             changes: [0.0; KINDS],
+            towards: Vec3::ZERO,
             light: [Estimate::default(); KINDS],
         };
         let [to_lights, over_hemisphere] = counts;
@@ -130,14 +134,18 @@ impl<'a> Recorder<'a> {
             }
         }
         let stored = (all - direct).max(Vec3::ZERO);
-        let (indirect, nearness) =
-            self.indirect(surface, stored, sampler, numbers, over_hemisphere);
-        record.light[INDIRECT] = indirect;
-        record.changes[INDIRECT] = nearness;
+        self.indirect(
+            surface,
+            stored,
+            sampler,
+            numbers,
+            over_hemisphere,
+            &mut record,
+        );
         record
     }
 
-    /// What indirect light is more than stored, and the inverse of the harmonic mean of the lengths of the rays.
+    /// What indirect light is more than stored, and how fast it changes.
     fn indirect(
         &mut self,
         surface: &Surface,
@@ -145,8 +153,9 @@ impl<'a> Recorder<'a> {
         sampler: &Sampler,
         numbers: Numbers,
         count: u32,
-    ) -> (Estimate, f32) {
-        let (mut light, mut nearness) = (Estimate::default(), 0.0);
+        record: &mut Record,
+    ) {
+        let (mut light, mut nearness, mut towards) = (Estimate::default(), 0.0, Vec3::ZERO);
         for numbers in (0..count).map(|ray| numbers.after(ray)) {
             let square = sampler.point(numbers, Use::Hemisphere);
             let direction = cosine_direction(surface.normal, square);
@@ -155,7 +164,10 @@ impl<'a> Recorder<'a> {
                 continue;
             }
             let (met, tint, distance) = self.meet(surface, direction);
-            nearness += 1.0 / distance.max(f32::MIN_POSITIVE);
+            let near = 1.0 / distance.max(f32::MIN_POSITIVE);
+            nearness += near;
+            let along = direction - surface.normal * surface.normal.dot(direction);
+            towards += along.normalize_or_zero() * near;
             let arriving = met.map_or(Vec3::ZERO, |met| {
                 let irradiance = match distance < self.lit.element_size(&met) {
                     true => self.irradiance(&met, sampler, numbers),
@@ -165,7 +177,9 @@ impl<'a> Recorder<'a> {
             });
             light.add(arriving * PI - stored);
         }
-        (light, nearness / count.max(1) as f32)
+        let rays = count.max(1) as f32;
+        record.light[INDIRECT] = light;
+        (record.changes[INDIRECT], record.towards) = (nearness / rays, towards / rays);
     }
 
     /// The surface that a ray from another one meets over mirrors, the tint of its light, and the length of its way.

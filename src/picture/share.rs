@@ -79,11 +79,23 @@ impl Record {
         if fit <= 0.0 {
             return [0.0; KINDS];
         }
-        let apart = apart.length();
+        let distance = apart.length();
         std::array::from_fn(|kind| {
-            let changes = self.changes[kind].max(other.changes[kind]);
-            (fit - apart * changes / reach(kind)).max(0.0)
+            let change = match kind {
+                INDIRECT => self
+                    .indirect_change(apart, distance)
+                    .max(other.indirect_change(apart, distance)),
+                _ => distance * self.changes[kind].max(other.changes[kind]),
+            };
+            (fit - change / reach(kind)).max(0.0)
         })
+    }
+
+    /// How much indirect light changes over a way of this length, as far as what is near tells: where that lies in one
+    /// direction, as in a corner, light changes in this direction alone; where it is all around, in each.
+    fn indirect_change(&self, way: Vec3, length: f32) -> f32 {
+        let around = (self.changes[INDIRECT] - self.towards.length()).max(0.0);
+        length * around + self.towards.dot(way).abs()
     }
 
     /// How well a place so far away belongs to the same surface, 0…1.
@@ -99,11 +111,15 @@ impl Records {
     /// Replace how fast the light of each record changes by the mean about it, since that of a few rays is noise, and bound
     /// it for indirect light so that some pixels share always.
     pub(super) fn smooth_changes(&mut self) {
-        let smoothed = |at: usize| -> Option<[f32; KINDS]> {
+        let smoothed = |at: usize| -> Option<([f32; KINDS], Vec3)> {
             let own = self.list[at].as_ref()?;
             let (mut sums, mut weights) = ([0.0; KINDS], [0.0; KINDS]);
+            let mut towards = Vec3::ZERO;
             for (index, _, other) in self.around(at, 1) {
                 let weight = bell(index) * own.fit(other.position - own.position, other.normal);
+                if other.changes[INDIRECT] > 0.0 {
+                    towards += other.towards * weight;
+                }
                 for kind in 0..KINDS {
                     // Where nothing is blocked it is not known.
                     if other.changes[kind] > 0.0 {
@@ -116,15 +132,19 @@ impl Records {
                 0.0 => 0.0,
                 weights => sums[kind] / weights,
             });
-            changes[INDIRECT] =
-                changes[INDIRECT].min(INDIRECT_REACH / (LEAST_PIXELS * own.spacing));
-            Some(changes)
+            towards /= weights[INDIRECT].max(f32::MIN_POSITIVE);
+            let most = INDIRECT_REACH / (LEAST_PIXELS * own.spacing);
+            if changes[INDIRECT] > most {
+                towards *= most / changes[INDIRECT];
+                changes[INDIRECT] = most;
+            }
+            Some((changes, towards))
         };
-        let all: Vec<Option<[f32; KINDS]>> =
+        let all: Vec<Option<([f32; KINDS], Vec3)>> =
             (0..self.list.len()).into_par_iter().map(smoothed).collect();
-        for (record, changes) in self.list.iter_mut().zip(all) {
-            if let (Some(record), Some(changes)) = (record, changes) {
-                record.changes = changes;
+        for (record, smoothed) in self.list.iter_mut().zip(all) {
+            if let (Some(record), Some(smoothed)) = (record, smoothed) {
+                (record.changes, record.towards) = smoothed;
             }
         }
     }
