@@ -1,9 +1,9 @@
 //! Faces that lie over each other in one plane are cut, so that no light is counted twice and no two of them flicker.
 //!
 //! Of faces that look the same way one stays whole, and others lose what it covers: lamps go before what they lie on, and
-//! smaller surfaces, as rugs and pictures are, before larger ones; of those that are alike, the first in the file. Of faces
-//! that look opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are covered in part
-//! are cut along the edges of what covers them. What light passes through covers only what has its material.
+//! smaller sheets, as rugs and pictures are, before larger ones and before solids; of those that are alike, the first in the
+//! file. Of faces that look opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are
+//! covered in part are cut along the edges of what covers them. What light passes through covers only what has its material.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -174,11 +174,14 @@ impl SceneBuilder {
                 .map(|corner| positions[corner as usize].as_dvec3());
             areas[shell as usize] += (b - a).cross(c - a).length();
         }
-        let faces = (0..).zip(&shells.of_triangle);
+        let faces = (0..).zip(&triangles.list).zip(&shells.of_triangle);
         faces
-            .map(|(face, &shell)| Rank {
+            .map(|((face, triangle), &shell)| Rank {
                 is_dark: !self.emits(face),
-                size: (CLASSES * areas[shell as usize].log2()).round() as i32,
+                size: match triangle.bounds_solid {
+                    true => i32::MAX,
+                    false => (CLASSES * areas[shell as usize].log2()).round() as i32,
+                },
                 face,
             })
             .collect()
