@@ -63,6 +63,16 @@ def add(name, of_material):
     bpy.context.object.data.materials.append(of_material)
 
 
+def build_much():
+    """So much in the room that a precise run takes many seconds on any machine."""
+    preferences().error = 0.1
+    for place in range(8):
+        at = (1.5 * np.cos(place), 1.5 * np.sin(place), 0.4 + 0.4 * place)
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6, radius=0.2, location=at)
+        add(f"ball {place}", bpy.data.materials["green"])
+    bpy.ops.object.select_all(action="DESELECT")
+
+
 def preferences():
     """Those of the add-on."""
     return bpy.context.preferences.addons[MODULE].preferences
@@ -262,7 +272,7 @@ class Light(unittest.TestCase):
         self.assertEqual(len(bare.material_slots), 0)
 
     def test_a_cancelled_run_leaves_nothing(self):
-        preferences().error = 0.1
+        build_much()
         window = Window()
         operator = Operator()
         self.assertTrue(operator._start(window))
@@ -308,7 +318,7 @@ class Light(unittest.TestCase):
         self.assertTrue(warnings[1].endswith("keep the light: box"), warnings)
 
     def test_a_program_that_is_killed_is_one_sentence(self):
-        preferences().error = 0.1
+        build_much()
         handover = sys.modules[f"{MODULE}.handover"]
         started = []
 
