@@ -341,11 +341,8 @@ fn blocks(reflectance: f32, emission: f32) -> SceneBuilder {
     builder
 }
 
-/// A box without a lid.
-fn open_box(reflectance: f32, emission: f32) -> SceneBuilder {
-    let mut builder = SceneBuilder::default();
-    let grey = material(&mut builder, reflectance, emission);
-    let [u, v, w] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 4.0);
+/// A box without a lid, between these edges, of plates of `count` by `count` quads.
+fn lidless(builder: &mut SceneBuilder, paint: MaterialId, count: u32, [u, v, w]: [DVec3; 3]) {
     for (origin, edges) in [
         (DVec3::ZERO, [w, u]),
         (DVec3::ZERO, [v, w]),
@@ -353,8 +350,16 @@ fn open_box(reflectance: f32, emission: f32) -> SceneBuilder {
         (u, [w, v]),
         (w, [v, u]),
     ] {
-        plate(&mut builder, grey, 2, origin, edges);
+        plate(builder, paint, count, origin, edges);
     }
+}
+
+/// A cube without a lid.
+fn open_box(reflectance: f32, emission: f32) -> SceneBuilder {
+    let mut builder = SceneBuilder::default();
+    let grey = material(&mut builder, reflectance, emission);
+    let edges = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * 4.0);
+    lidless(&mut builder, grey, 2, edges);
     builder
 }
 
@@ -530,16 +535,7 @@ fn the_outside_of_a_deep_shaft_sees_the_whole_sky_though_little_reaches_its_insi
     // Walls that are lit on both sides; deep within, rays are guided to the opening.
     let mut builder = SceneBuilder::default();
     let grey = material(&mut builder, 0.8, 0.0);
-    let [u, v, w] = [DVec3::X, DVec3::Y * 8.0, DVec3::Z];
-    for (origin, edges) in [
-        (DVec3::ZERO, [w, u]),
-        (DVec3::ZERO, [v, w]),
-        (DVec3::ZERO, [u, v]),
-        (u, [w, v]),
-        (w, [v, u]),
-    ] {
-        plate(&mut builder, grey, 1, origin, edges);
-    }
+    lidless(&mut builder, grey, 1, [DVec3::X, DVec3::Y * 8.0, DVec3::Z]);
     let scene = under(builder, Sides::Two, uniform(1.0));
     let (solver, _) = solve(&scene, SolveSettings::default());
     let places: Vec<DVec3> = (0..200)
