@@ -42,12 +42,16 @@ struct Piece {
 /// What goes before what: the least stays.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Rank {
+    /// Whether it emits nothing.
     is_dark: bool,
+    /// Size class of its sheet; a solid has the largest.
     size: i32,
+    /// Its place in the file.
     face: u32,
 }
 
-/// Size classes of surfaces to a factor of two of their areas: what differs by rounding has the same.
+/// Size classes of sheets to a factor of two of their areas. With fewer, a rug is as large as its floor; with more, rounding
+/// tells which of two copies stays.
 const CLASSES: f64 = 4.0;
 
 /// Faces that have the corners of another one in the same sense; `covers` tells whether the second of two faces covers the
@@ -89,6 +93,9 @@ impl SceneBuilder {
             .by_triangle()
             .map(|(face, others)| (face, others.collect()))
             .collect();
+        if overlapping.is_empty() {
+            return;
+        }
         let ranks = self.ranks(triangles, positions);
         let fates: Vec<(u32, Fate)> = overlapping
             .par_iter()
