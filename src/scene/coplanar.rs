@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::clip::{are_apart, turned_left};
+use super::{DisjointSets, Triangle, half_edges};
 
 /// Triangles whose corners are at most this far from each other's planes lie in one plane, relative to their [`reach`]: a
 /// few roundings of positions in single precision, and the sixth decimal of a scene of 50 m. Less misses backs that were
@@ -167,6 +168,42 @@ fn around(coordinate: f32, cells: f64, slack: f32) -> [u32; 2] {
     let place = f64::from(coordinate) * cells + 0.37;
     let slack = (f64::from(slack) * cells).min(0.5);
     [place - slack, place + slack].map(|place| place.floor() as i32 as u32)
+}
+
+/// Area of the flat region that each triangle belongs to, among those that are meant; 0 for others. Triangles of a region
+/// share edges.
+pub(super) fn flat_areas(
+    triangles: &[Triangle],
+    positions: &[Vec3],
+    is_meant: impl Fn(u32) -> bool,
+) -> Vec<f64> {
+    let meant: Vec<u32> = (0..triangles.len() as u32)
+        .filter(|&triangle| is_meant(triangle))
+        .collect();
+    let corners = |at: usize| triangles[meant[at] as usize].corners;
+    let planes: Vec<Plane> = (0..meant.len())
+        .map(|at| Plane::of(corners(at), positions))
+        .collect();
+    let mut forest = DisjointSets::new(meant.len());
+    let edges = half_edges((0..meant.len()).map(corners));
+    for group in edges.chunk_by(|a, b| a.ends == b.ends) {
+        for pair in group.windows(2) {
+            let [a, b] = [pair[0].triangle, pair[1].triangle];
+            if planes[a as usize].agrees(&planes[b as usize]) {
+                forest.join(a, b);
+            }
+        }
+    }
+    let mut of_region = vec![0.0; meant.len()];
+    for at in 0..meant.len() {
+        let [a, b, c] = corners(at).map(|corner| positions[corner as usize].as_dvec3());
+        of_region[forest.root(at as u32) as usize] += 0.5 * (b - a).cross(c - a).length();
+    }
+    let mut areas = vec![0.0; triangles.len()];
+    for (at, &triangle) in meant.iter().enumerate() {
+        areas[triangle as usize] = of_region[forest.root(at as u32) as usize];
+    }
+    areas
 }
 
 /// Pairs of those triangles that overlap, the lesser first.

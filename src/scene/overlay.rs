@@ -1,15 +1,15 @@
 //! Faces that lie over each other in one plane are cut, so that no light is counted twice and no two of them flicker.
 //!
 //! Of faces that look the same way one stays whole, and others lose what it covers: lamps go before what they lie on, and
-//! smaller sheets, as rugs and pictures are, before larger ones and before solids; of those that are alike, the first in the
-//! file. Of faces that look opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are
-//! covered in part are cut along the edges of what covers them. What light passes through covers only what has its material.
+//! smaller flat regions, as rugs, pictures and tiles are, before larger ones; of those that are alike, the first in the file.
+//! Of faces that look opposite ways each is the other's back: where it is covered, it is one-sided. Faces that are covered in
+//! part are cut along the edges of what covers them. What light passes through covers only what has its material.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::clip::{cut_out, turned_left};
-use super::coplanar::{Overlaps, TOUCHING, TOUCHING_SHARE, in_plane, projected, reach};
+use super::coplanar::{Overlaps, TOUCHING, TOUCHING_SHARE, flat_areas, in_plane, projected, reach};
 use super::shells::ShelledTriangles;
 use super::{Face, Frame, SceneBuilder, Triangle};
 
@@ -44,13 +44,13 @@ struct Piece {
 struct Rank {
     /// Whether it emits nothing.
     is_dark: bool,
-    /// Size class of its sheet; a solid has the largest.
+    /// Size class of the flat region that it belongs to.
     size: i32,
     /// Its place in the file.
     face: u32,
 }
 
-/// Size classes of sheets to a factor of two of their areas. With fewer, a rug is as large as its floor; with more, rounding
+/// Size classes of regions to a factor of two of their areas. With fewer, a rug is as large as its floor; with more, rounding
 /// tells which of two copies stays.
 const CLASSES: f64 = 4.0;
 
@@ -96,7 +96,7 @@ impl SceneBuilder {
         if overlapping.is_empty() {
             return;
         }
-        let ranks = self.ranks(triangles, positions);
+        let ranks = self.ranks(&overlapping, triangles, positions);
         let fates: Vec<(u32, Fate)> = overlapping
             .par_iter()
             .filter_map(|(face, others)| {
@@ -171,24 +171,25 @@ impl SceneBuilder {
         self.materials[material].emission != Vec3::ZERO
     }
 
-    /// What goes before what, by face.
-    fn ranks(&self, triangles: &ShelledTriangles, positions: &[Vec3]) -> Vec<Rank> {
-        let shells = &triangles.shells;
-        let mut areas = vec![0.0; shells.closed.len()];
-        for (triangle, &shell) in triangles.list.iter().zip(&shells.of_triangle) {
-            let [a, b, c] = triangle
-                .corners
-                .map(|corner| positions[corner as usize].as_dvec3());
-            areas[shell as usize] += (b - a).cross(c - a).length();
+    /// What goes before what, by face; of faces in shells without an overlap, not told.
+    fn ranks(
+        &self,
+        overlapping: &[(u32, Vec<u32>)],
+        triangles: &ShelledTriangles,
+        positions: &[Vec3],
+    ) -> Vec<Rank> {
+        let shell_of = &triangles.shells.of_triangle;
+        let mut is_shell_meant = vec![false; triangles.shells.closed.len()];
+        for (face, _) in overlapping {
+            is_shell_meant[shell_of[*face as usize] as usize] = true;
         }
-        let faces = (0..).zip(&triangles.list).zip(&shells.of_triangle);
+        let is_meant = |face: u32| is_shell_meant[shell_of[face as usize] as usize];
+        let areas = flat_areas(&triangles.list, positions, is_meant);
+        let faces = (0..).zip(areas);
         faces
-            .map(|((face, triangle), &shell)| Rank {
+            .map(|(face, area)| Rank {
                 is_dark: !self.emits(face),
-                size: match triangle.bounds_solid {
-                    true => i32::MAX,
-                    false => (CLASSES * areas[shell as usize].log2()).round() as i32,
-                },
+                size: (CLASSES * area.log2()).round() as i32,
                 face,
             })
             .collect()
@@ -377,6 +378,11 @@ mod tests {
     #[derive(Clone)]
     struct Sheets(SceneBuilder);
 
+    /// A point of the plane of the sheets, or above it, in the world.
+    fn placed(point: DVec3) -> DVec3 {
+        glam::DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7) * point + DVec3::splat(3.0)
+    }
+
     impl Sheets {
         fn new() -> Self {
             let mut builder = SceneBuilder::default();
@@ -391,8 +397,7 @@ mod tests {
                 let [u, v] = [column, row].map(|step| f64::from(step) / f64::from(count));
                 let flat =
                     DVec2::from(min) + (DVec2::from(max) - DVec2::from(min)) * DVec2::new(u, v);
-                let turn = glam::DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
-                turn * flat.extend(0.0) + DVec3::splat(3.0)
+                placed(flat.extend(0.0))
             };
             let material = MaterialId(u32::from(!is_up));
             for row in 0..count {
@@ -408,6 +413,29 @@ mod tests {
                         self.0.push_triangle(half, material);
                     }
                 }
+            }
+            self
+        }
+
+        /// A closed box below the plane, whose top lies in it.
+        fn tile(mut self, min: [f64; 2], max: [f64; 2], depth: f64, material: MaterialId) -> Self {
+            let corners: [u32; 8] = std::array::from_fn(|corner| {
+                let along = |axis: usize| [min, max][corner >> axis & 1][axis];
+                let z = [-depth, 0.0][corner >> 2];
+                self.0
+                    .push_position(placed(DVec3::new(along(0), along(1), z)))
+            });
+            let sides = [
+                [4, 5, 7, 6],
+                [0, 2, 3, 1],
+                [0, 1, 5, 4],
+                [2, 6, 7, 3],
+                [0, 4, 6, 2],
+                [1, 3, 7, 5],
+            ];
+            for [a, b, c, d] in sides.map(|side: [usize; 4]| side.map(|corner| corners[corner])) {
+                self.0.push_triangle([a, b, c], material);
+                self.0.push_triangle([a, c, d], material);
             }
             self
         }
@@ -534,6 +562,35 @@ mod tests {
             // A ceiling that is a lamp, once more as a ceiling.
             let panel = sheets(is_small_first, true, 4.0);
             assert!((of_lamp(&panel) - 16.0).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_solid_let_into_a_floor_stays_whole() {
+        for is_first in [false, true] {
+            let mut sheets = Sheets::new();
+            let stone =
+                sheets
+                    .0
+                    .push_material(Material::plain("stone", Vec3::splat(0.3), Vec3::ZERO));
+            let floor = |sheets: Sheets| sheets.rectangle([0.0, 0.0], [4.0, 4.0], 5, true);
+            let tile = |sheets: Sheets| sheets.tile([1.0, 1.0], [2.5, 2.0], 0.25, stone);
+            let sheets = match is_first {
+                true => floor(tile(sheets)),
+                false => tile(floor(sheets)),
+            };
+            let scene = sheets.scene(Sides::Auto);
+            let front_of = |material: usize| -> f64 {
+                let surfaces = scene.triangles.iter().zip(&scene.surfaces);
+                surfaces
+                    .filter(|(triangle, _)| triangle.material.index() == material)
+                    .map(|(_, surface)| f64::from(surface.area_vector.length()))
+                    .sum()
+            };
+            let [floor, stone] =
+                [0, 2].map(|material| scene.frame.area_to_world(front_of(material)));
+            assert!((floor - (16.0 - 1.5)).abs() < 1e-3, "{floor}");
+            assert!((stone - (2.0 * 1.5 + 0.25 * 5.0)).abs() < 1e-3, "{stone}");
         }
     }
 
