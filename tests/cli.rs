@@ -95,6 +95,11 @@ fn a_reference_puts_an_error_into_every_step() {
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     for step in report["steps"].as_array().unwrap() {
         assert!(step["error"]["relative_rms"].is_number(), "{step}");
+        let phases = step["phases"].as_object().unwrap();
+        assert!(
+            phases.values().any(|seconds| seconds.as_f64() > Some(0.0)),
+            "{step}"
+        );
     }
 }
 
@@ -149,6 +154,14 @@ fn an_error_that_is_asked_for_ends_the_run_and_wrong_ones_are_refused() {
             "{estimated}"
         );
     }
+    // Where it cannot be reached, the reason is told.
+    let output = with("0.0001%", &[]);
+    assert_eq!(output.status.code(), Some(4), "{}", error_of(&output));
+    let told = error_of(&output);
+    assert!(
+        told.contains("note: an error of 0.0001 % is not reached: "),
+        "{told}"
+    );
     for (error, more) in [
         ("0", &[][..]),
         ("120%", &[]),

@@ -33,7 +33,8 @@ struct ObservedSolver {
 
 impl Stepper for ObservedSolver {
     fn step(&mut self, cancel: &Cancel) -> Option<StepReport> {
-        self.solver.step(cancel)
+        // As a stepper: with the seconds of each phase.
+        Stepper::step(&mut self.solver, cancel)
     }
 
     fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {

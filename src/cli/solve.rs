@@ -31,7 +31,7 @@ use crate::{
     picture::harmonics_at_vertices,
     reference::MatrixError,
     scene::Scene,
-    solver::{Cancel, LampLight, Note, Snapshot, StepReport},
+    solver::{Cancel, LampLight, Snapshot, StepReport},
     worker::{Event, StopReason, WorkerHandle},
 };
 
@@ -161,7 +161,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         run.lamps = light_by_lamp(&worker)?;
     }
     drop(worker);
-    say_what_is_diffused(&run);
+    say_notes(&run);
     let totals = Totals {
         read_s,
         reference_s,
@@ -209,11 +209,10 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
     })
 }
 
-/// Say how much light counts as diffuse though it is not.
-fn say_what_is_diffused(run: &Run) {
+/// Say what limits the result: notes of the last step that are more than measures on its way.
+fn say_notes(run: &Run) {
     let notes = run.steps.last().map_or(&[][..], |step| &step.notes);
-    let is_meant = |note: &&Note| matches!(note, Note::Diffused { .. });
-    if let Some(note) = notes.iter().find(is_meant) {
+    for note in notes.iter().filter(|note| note.limits_result()) {
         output::say(format_args!("note: {note}"));
     }
 }

@@ -25,6 +25,11 @@ pub enum Note {
     },
     /// The memory limit prevented finer links or elements.
     MemoryLimit,
+    /// Finer links would have taken longer than the rays that do as well.
+    LinksLimited {
+        /// The threshold that the present links meet.
+        epsilon: f32,
+    },
     /// What curved mirrors, gloss and glass reflect counts as diffuse.
     Diffused {
         /// Its part of the reflected power, 0…1.
@@ -48,6 +53,20 @@ pub enum Obstacle {
     Noise,
     /// Finer links and elements no longer reduce the error.
     Mesh,
+}
+
+impl Note {
+    /// Whether it tells what the result lacks, and not only how it was reached.
+    pub fn limits_result(&self) -> bool {
+        match self {
+            Self::NotConverged { .. }
+            | Self::GrowthUnbounded
+            | Self::MemoryLimit
+            | Self::Diffused { .. }
+            | Self::ErrorNotReached { .. } => true,
+            Self::GrowthBounded | Self::CoarseLinks { .. } | Self::LinksLimited { .. } => false,
+        }
+    }
 }
 
 impl fmt::Display for Note {
@@ -83,6 +102,11 @@ impl fmt::Display for Note {
                 out,
                 "{:.1} % of the reflected light comes from gloss, curved mirrors and glass: it lights other surfaces as if it were diffuse",
                 100.0 * share
+            ),
+            Self::LinksLimited { epsilon } => write!(
+                out,
+                "the links keep a threshold of {epsilon}: finer ones would take longer than the rays of the final gather, \
+                 which do as well"
             ),
             Self::MemoryLimit => {
                 out.write_str("the memory limit is reached; refinement stops here with what fits")
