@@ -13,6 +13,7 @@ mod direct;
 mod estimate;
 mod iteration;
 mod limits;
+mod next_step;
 mod omission;
 mod output;
 mod places;

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use glam::Vec4;
 
 use super::{
-    Cancel, Phase, PhaseObserver, Snapshot, SolveSettings, StepReport,
-    budget::Budget,
+    Cancel, Note, Phase, PhaseObserver, Snapshot, SolveSettings, StepReport,
     coverage::{self, CoverageMap},
     direct::{self, DirectFields, Surfaces, Surroundings},
     estimate::ErrorEstimator,
@@ -37,7 +36,7 @@ pub struct Solver {
     pub(super) scene: Arc<Scene>,
     pub(super) settings: SolveSettings,
     pub(super) plan: Plan,
-    memory_limit: Option<u64>,
+    pub(super) memory_limit: Option<u64>,
     /// Occludes nothing in a clear scene.
     pub(super) rays: Arc<RayTree>,
     // The mesh and its light.
@@ -189,7 +188,7 @@ impl Solver {
     ) -> Option<StepReport> {
         let step_count = self.settings.step_count();
         let mut report = StepReport {
-            step: self.step + 1,
+            step: self.next_step(),
             ..StepReport::default()
         };
         let threshold_scale = threshold_scale(report.step, step_count);
@@ -210,7 +209,7 @@ impl Solver {
         cancel.proceed()?;
         self.mean_irradiance = self.linked.mean_irradiance(self.surfaces());
         // Links whose errors are below the threshold.
-        report.epsilon = self.refine(threshold_scale, cancel)?;
+        self.refine(threshold_scale, &mut report, cancel)?;
         self.probe_contacts(cancel)?;
         begin(Phase::Iterate, self.ray_count);
         // Factors of the senders, so that sent light adds up as received light does.
@@ -259,29 +258,6 @@ impl Solver {
 
     pub(super) fn surfaces(&self) -> Surfaces<'_> {
         Surfaces::new(&self.hierarchy, &self.direct)
-    }
-
-    /// The memory limit, and the memory beside the mesh and its light.
-    fn budget(&self) -> Budget {
-        let others = self.rays.memory_bytes()
-            + self.coverage.memory_bytes()
-            + size_of_val(self.leaves.as_slice())
-            + size_of_val(self.vertex_factors.as_slice())
-            + self.relighting.memory_bytes()
-            + self
-                .estimator
-                .as_ref()
-                .map_or(0, |estimator| estimator.memory_bytes(&self.rays))
-            + self.snapshot.memory_bytes();
-        Budget {
-            limit: self.memory_limit,
-            others: others as u64,
-        }
-    }
-
-    pub(super) fn limits(&self, threshold_scale: f32) -> Limits {
-        let most = self.budget().most_elements(self.surfaces(), &self.linked);
-        Limits::new(&self.settings, &self.hierarchy, threshold_scale, most)
     }
 
     pub(super) fn pull(&mut self) {
@@ -366,8 +342,13 @@ impl Solver {
         Some(())
     }
 
-    /// Refine the links to the threshold of a step. Returns the threshold that they meet.
-    pub(super) fn refine(&mut self, threshold_scale: f32, cancel: &Cancel) -> Option<f32> {
+    /// Refine the links to the threshold of a step. The report gets the threshold that they meet.
+    pub(super) fn refine(
+        &mut self,
+        threshold_scale: f32,
+        report: &mut StepReport,
+        cancel: &Cancel,
+    ) -> Option<()> {
         let refining = Refining {
             settings: &self.settings,
             plan: &self.plan,
@@ -391,7 +372,12 @@ impl Solver {
         )?;
         self.ray_count += refined.ray_count;
         self.is_full |= refined.is_full;
-        Some(refined.epsilon)
+        report.epsilon = refined.epsilon;
+        if refined.is_limited {
+            let epsilon = refined.epsilon;
+            report.notes.push(Note::LinksLimited { epsilon });
+        }
+        Some(())
     }
 
     /// Complete the coverage by what the sky fills, and find the factors of the senders.

@@ -1,5 +1,6 @@
 //! Transport between pairs of nodes: the kernel, visibility, the error oracle, refinement, and the links.
 
+mod arrival;
 mod bounds;
 mod clear;
 mod decide;

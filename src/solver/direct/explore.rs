@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 
 use super::{
-    lights::{Guidance, Lights, Shot, Source, shuffle_at},
+    lights::{Guidance, Lights, Source},
     openings::{SkyHit, openings},
     samples::DirectLight,
+    shooting::{Shot, shuffle_at},
     sky::SkyTree,
     sky_guide::{Explored, SkyGuide},
 };

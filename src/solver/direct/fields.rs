@@ -106,6 +106,11 @@ impl DirectFields {
         self.fields.iter().filter(is_lit)
     }
 
+    /// All fields.
+    pub(super) fn all_mut(&mut self) -> impl Iterator<Item = &mut DirectField> {
+        self.fields.iter_mut()
+    }
+
     /// Whether nothing is sampled.
     pub(crate) fn is_empty(&self) -> bool {
         self.fields.is_empty()
@@ -234,22 +239,6 @@ impl DirectFields {
         self.fields
             .first()
             .map_or(&self.no_offsets, |field| &field.offsets)
-    }
-
-    /// As [`DirectField::sample_vertices_first`].
-    pub(crate) fn sample_vertices_first(
-        &mut self,
-        rays: &RayTree,
-        hierarchy: &Hierarchy,
-        samples: u32,
-        seed: u64,
-        cancel: &Cancel,
-    ) -> Option<u64> {
-        let mut shot = 0;
-        for field in &mut self.fields {
-            shot += field.sample_vertices_first(rays, hierarchy, samples, seed, cancel)?;
-        }
-        Some(shot)
     }
 
     /// As [`DirectField::adapt`]. Errors are relative to the mean of all light.

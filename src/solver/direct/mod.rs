@@ -3,10 +3,12 @@
 mod adapt;
 mod before_walls;
 mod border;
+mod control;
 mod emitter;
 mod explore;
 mod field;
 mod fields;
+mod first_light;
 mod interpolation;
 mod light_parts;
 mod light_tree;
@@ -18,11 +20,13 @@ mod panel;
 mod point_lights;
 mod samples;
 mod scale;
+mod shooting;
 mod sky;
 mod sky_guide;
 mod smooth;
 mod sun;
 mod surfaces;
+mod tally;
 mod vertex_samples;
 
 pub(crate) use adapt::divide_coarse;

@@ -1,6 +1,6 @@
 //! Noise of shadow rays, and when more of them are shot.
 
-use super::samples::{DirectLight, Tally};
+use super::{samples::DirectLight, tally::Tally};
 use crate::{hierarchy::luminance, solver::limits::Limits};
 
 /// Tolerated noise of a point, times the square root of its share of the area, as a share of the tolerance. Larger

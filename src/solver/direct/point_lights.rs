@@ -8,11 +8,7 @@ use std::{
 
 use glam::{Vec3, Vec4};
 
-use super::{
-    fields::DirectFields,
-    lights::{Lights, Shot},
-    samples::DirectLight,
-};
+use super::{fields::DirectFields, lights::Lights, samples::DirectLight, shooting::Shot};
 use crate::{
     geometry::{RayTree, Shuffle},
     hierarchy::Channels as _,

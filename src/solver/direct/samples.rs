@@ -2,6 +2,7 @@
 
 use glam::{Vec3, Vec4};
 
+use super::{control::Control, tally::Tally};
 use crate::{geometry::SphericalTriangle, hierarchy::luminance};
 
 /// Shadow rays from a point to one target. The unoccluded light of the target is known, so only the ratios of their
@@ -50,158 +51,6 @@ impl Bundle {
     }
 }
 
-/// Sums over all rays of a point of their weights where rays are guided, and of those that they would have if all followed
-/// the unoccluded light. Both have the same mean, so that their difference tells a part of the error of the visible fraction:
-/// it is a control variate (Owen, "Monte Carlo theory, methods and examples", 8.9). Without it, the light of a point that
-/// sees the whole sky, but is guided to the opening that others near it see, would be noise about what is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Control {
-    /// Of weights without a guide.
-    sent: f32,
-    /// Of the weights.
-    weights: f32,
-    /// Of their squares.
-    squares: f32,
-    /// Of the weights, each times what passes along its ray.
-    passing: f32,
-    /// Of the squares, likewise.
-    products: f32,
-}
-
-impl Control {
-    /// Count a ray of a weight, which a guide changes by a factor.
-    fn count(&mut self, weight: f32, worth: f32, passing: Vec3) {
-        let passing = luminance(passing.extend(0.0));
-        self.sent += weight;
-        let weight = weight * worth;
-        self.weights += weight;
-        self.squares += weight * weight;
-        self.passing += weight * passing;
-        self.products += weight * weight * passing;
-    }
-
-    /// Add other rays, their weights times a factor.
-    fn add(&mut self, other: Self, factor: f32) {
-        self.sent += other.sent * factor;
-        self.weights += other.weights * factor;
-        self.squares += other.squares * factor * factor;
-        self.passing += other.passing * factor;
-        self.products += other.products * factor * factor;
-    }
-
-    /// Mean weight relative to that without a guide; 1 without rays.
-    fn mean(self) -> f32 {
-        match self.sent > 0.0 {
-            true => self.weights / self.sent,
-            false => 1.0,
-        }
-    }
-
-    /// What is to be added to the visible fraction that so many rays have found. 0 without a guide.
-    fn correction(self, shot: u32) -> f32 {
-        let off = 1.0 - self.mean();
-        let shot = shot as f32;
-        let variance = shot * self.squares - self.weights * self.weights;
-        if off == 0.0 || variance <= 0.0 {
-            return 0.0;
-        }
-        let covariance = shot * self.products - self.passing * self.weights;
-        (covariance / variance).clamp(0.0, 1.0) * off
-    }
-}
-
-/// Number of changes of the outcome between successive rays of one range.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcomes {
-    /// Outcomes of the first and of the last ray so far.
-    ends: Option<(bool, bool)>,
-    changes: u32,
-}
-
-impl Outcomes {
-    pub(super) fn count(&mut self, is_visible: bool) {
-        let (first, last) = self.ends.unwrap_or((is_visible, is_visible));
-        self.changes += u32::from(last != is_visible);
-        self.ends = Some((first, is_visible));
-    }
-
-    /// The changes, with the first ray following the last one, so that there are as many pairs as rays.
-    pub(super) fn changes(&self) -> u32 {
-        self.changes
-            + self
-                .ends
-                .map_or(0, |(first, last)| u32::from(first != last))
-    }
-}
-
-/// Counts of the shadow rays of one or several points.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Tally {
-    pub shot: u32,
-    pub visible: u32,
-    /// Pairs of rays to neighbouring strata with different outcomes; there are as many pairs as rays.
-    pub changes: u32,
-    /// Root mean square weight of a visible ray at each point relative to rays that follow the unoccluded light, summed over
-    /// the rays.
-    worth: f32,
-}
-
-/// Difference of a point's rays from those of its neighbours that chance explains, in standard errors. Smaller takes
-/// chance for a shadow border, which biases the light where few rays are visible; larger misses points that differ.
-const LIKELY_DEVIATIONS: f32 = 3.0;
-
-impl Tally {
-    /// Whether some rays are visible and others are not.
-    pub(super) fn is_mixed(self) -> bool {
-        self.visible > 0 && self.visible < self.shot
-    }
-
-    /// Root mean square weight of a visible ray relative to rays that follow the unoccluded light: 1 unless rays are guided.
-    fn scale(self) -> f32 {
-        if self.shot > 0 {
-            self.worth / self.shot as f32
-        } else {
-            1.0
-        }
-    }
-
-    /// The visible fraction, 0 without rays; of guided rays an upper bound.
-    pub(super) fn fraction(self) -> f32 {
-        self.scale() * self.visible as f32 / self.shot.max(1) as f32
-    }
-
-    /// Variance of a ray within its stratum, 0…¼: half the mean square of the differences between neighbouring strata
-    /// (the estimator of successive differences; Wolter, "Introduction to Variance Estimation", ch. 8), and at most
-    /// that among all strata, since a sequence of low discrepancy alternates. `more` rays are added, half of them
-    /// visible.
-    fn variance(self, more: f32) -> f32 {
-        let shot = (self.shot as f32 + more).max(1.0);
-        let fraction = (self.visible as f32 + 0.5 * more) / shot;
-        let within = 0.5 * (self.changes as f32 + more) / shot;
-        within.min(fraction * (1.0 - fraction)) * self.scale().powi(2)
-    }
-
-    /// Whether chance explains the difference of these rays from others, given the visible fraction of the others, with
-    /// half a hit and half a miss added.
-    pub(super) fn is_like(self, others: Self) -> bool {
-        let (own, count) = (self.shot.max(1) as f32, others.shot as f32 + 1.0);
-        let expected = others.scale() * (others.visible as f32 + 0.5) / count;
-        let variance = |scale: f32, rays: f32| expected * (scale - expected).max(0.0) / rays;
-        let variance = variance(self.scale(), own) + variance(others.scale(), count);
-        let gap = self.fraction() - expected;
-        self.shot == 0 || gap * gap <= LIKELY_DEVIATIONS * LIKELY_DEVIATIONS * variance
-    }
-}
-
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Self) {
-        self.shot += other.shot;
-        self.visible += other.visible;
-        self.changes += other.changes;
-        self.worth += other.worth;
-    }
-}
-
 /// Direct light of a point, estimated by its shadow rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DirectLight {
@@ -232,6 +81,16 @@ impl DirectLight {
     pub(super) fn expected(exact: Vec4) -> Self {
         Self {
             exact,
+            ..Self::default()
+        }
+    }
+
+    /// The light that another point near this one got, until this one is sampled itself.
+    pub(super) fn borrowed(self) -> Self {
+        Self {
+            exact: self.irradiance(),
+            sent: Vec4::ONE,
+            arrived: Vec4::ONE,
             ..Self::default()
         }
     }
@@ -381,7 +240,7 @@ impl DirectLight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Random;
+    use crate::{geometry::Random, solver::direct::tally::Outcomes};
 
     #[test]
     fn weights_of_rays_that_all_pass_do_not_make_noise_and_others_have_no_bias() {

@@ -4,7 +4,7 @@
 //! The sphere of directions is an octahedron whose triangles are halved, in the order of the Sierpiński curve, so that
 //! successive leaves share an edge: rays that are stratified along the curve are stratified over the sphere. A leaf has
 //! one radiance. Where a node lies above the horizon of a surface as a whole, its irradiance is the product of its
-//! vector irradiance with the normal; only leaves across the horizon are clipped (Lambert's formula).
+//! vector irradiance with the normal; only leaves across the horizon are cut off there.
 
 mod growth;
 
@@ -14,7 +14,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::light_tree::{Arriving, Target};
 use crate::{
-    geometry::{irradiance_vector, point_irradiance, triangle_point},
+    geometry::{irradiance_vector, triangle_point},
     hierarchy::{Moments, Reading},
     scene::Sky,
     transport::luminance,
@@ -42,6 +42,8 @@ struct Node {
     first_child: u32,
     /// Radiosity of a surface of the radiance of a leaf, W/m².
     radiosity: Vec4,
+    /// Solid angle over π: irradiance of a leaf of radiosity 1 at normal incidence.
+    facing_share: f32,
     /// Normal of the plane between its children, towards the first.
     halving: Vec3,
 }
@@ -81,6 +83,7 @@ impl Node {
             vector: vector.to_array().map(|component| radiosity * component),
             first_child: 0,
             radiosity,
+            facing_share: solid_angle(path) / PI,
             halving: Vec3::ZERO,
         }
     }
@@ -94,6 +97,23 @@ impl Node {
             Some(false)
         } else {
             None
+        }
+    }
+
+    /// Mean height above the horizon of a leaf across it, with 0 for its part below: that of a flat triangle, over which
+    /// heights are linear. Leaves are small and cosines at the horizon, too, so that the sky's irradiance is right to
+    /// 1e-4.
+    fn mean_height_above(&self, normal: Vec3) -> f32 {
+        let heights = self.path.map(|corner| corner.dot(normal));
+        // The corner alone on its side of the horizon cuts off a triangle.
+        let is_above = heights.map(|height| height > 0.0);
+        let majority = is_above.into_iter().filter(|&above| above).count() >= 2;
+        let alone = (0..3).find(|&side| is_above[side] != majority).unwrap_or(0);
+        let [apex, b, c] = [0, 1, 2].map(|step| heights[(alone + step) % 3]);
+        let cut_off = apex.powi(3) / (3.0 * (apex - b) * (apex - c));
+        match majority {
+            true => (heights.iter().sum::<f32>() / 3.0 - cut_off).max(0.0),
+            false => cut_off.max(0.0),
         }
     }
 
@@ -182,6 +202,10 @@ impl SkyTree {
             [beyond(a, b, c), beyond(b, c, a), beyond(c, a, b)]
         };
         self.neighbours = self.nodes.iter().map(across).collect();
+    }
+
+    pub(super) fn node_count(&self) -> usize {
+        self.nodes.len()
     }
 
     /// The leaves across the edges of a leaf.
@@ -301,7 +325,7 @@ impl SkyTree {
         match node.side_of(normal) {
             Some(false) => Vec4::ZERO,
             Some(true) => node.whole(normal),
-            None => node.radiosity * point_irradiance(Vec3::ZERO, normal, facing(node.path)),
+            None => node.radiosity * (node.facing_share * node.mean_height_above(normal)),
         }
     }
 

@@ -7,7 +7,7 @@
 //! (path guiding with parallax: Ruppert, Herholz and Lensch, "Robust fitting of parallax-aware mixtures for path
 //! guiding", 2020; mixture sampling: Hesterberg, "Weighted average importance sampling", 1995).
 
-use std::{cmp::Ordering, ops::Range};
+use std::ops::Range;
 
 use glam::Vec3;
 
@@ -69,12 +69,83 @@ pub(super) struct SkyGuide {
 
 /// A leaf of the sky's tree that is seen from a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lobe {
+struct Lobe {
     leaf: u32,
     /// Its visible part, up to a factor that is the same for all leaves.
     visible: f32,
     /// Luminance of its irradiance.
-    pub irradiance: f32,
+    irradiance: f32,
+}
+
+/// The leaves of the sky's tree that are seen from a point, in the order of their indices once complete.
+#[derive(Debug, Default)]
+pub(super) struct Lobes {
+    lobes: Vec<Lobe>,
+    /// By leaf, one more than its place among `lobes`; 0 for others.
+    places: Vec<u32>,
+    /// Scratch space: visible parts before they spread.
+    visible: Vec<f32>,
+}
+
+impl Lobes {
+    /// Discard all, for a tree of so many nodes.
+    fn clear(&mut self, node_count: usize) {
+        for lobe in self.lobes.drain(..) {
+            self.places[lobe.leaf as usize] = 0;
+        }
+        self.places.resize(node_count, 0);
+    }
+
+    /// Add to the visible part of a leaf.
+    fn add(&mut self, leaf: u32, visible: f32) {
+        match self.places[leaf as usize].checked_sub(1) {
+            Some(place) => self.lobes[place as usize].visible += visible,
+            None => {
+                self.lobes.push(Lobe {
+                    leaf,
+                    visible,
+                    irradiance: 0.0,
+                });
+                self.places[leaf as usize] = self.lobes.len() as u32;
+            }
+        }
+    }
+
+    /// Add a share of the visible part of each leaf to its neighbours.
+    fn spread(&mut self, tree: &SkyTree) {
+        self.visible.clear();
+        let visible = self.lobes.iter().map(|lobe| lobe.visible);
+        self.visible.extend(visible);
+        for index in 0..self.visible.len() {
+            for neighbour in tree.neighbours(self.lobes[index].leaf) {
+                self.add(neighbour, SPREAD * self.visible[index]);
+            }
+        }
+    }
+
+    /// Find the irradiance of each leaf, discard those without any, and sort the others.
+    fn complete(&mut self, irradiance: impl Fn(u32) -> f32) {
+        for lobe in &mut self.lobes {
+            lobe.irradiance = irradiance(lobe.leaf);
+            self.places[lobe.leaf as usize] = 0;
+        }
+        self.lobes.retain(|lobe| lobe.irradiance > 0.0);
+        self.lobes.sort_unstable_by_key(|lobe| lobe.leaf);
+        for (place, lobe) in self.lobes.iter().enumerate() {
+            self.places[lobe.leaf as usize] = place as u32 + 1;
+        }
+    }
+
+    /// Luminance of the irradiance of one of them, by its place.
+    pub(super) fn irradiance(&self, place: usize) -> f32 {
+        self.lobes[place].irradiance
+    }
+
+    /// Visible part of a leaf; 0 for those that are not among them.
+    fn visible(&self, leaf: u32) -> f32 {
+        let place = self.places[leaf as usize].checked_sub(1);
+        place.map_or(0.0, |place| self.lobes[place as usize].visible)
+    }
 }
 
 /// How the rays of a point are mixed: the weight of a ray by its leaf.
@@ -163,32 +234,18 @@ impl SkyGuide {
         point: Vec3,
         normal: Vec3,
         cut: &mut Vec<Arriving>,
-        lobes: &mut Vec<Lobe>,
+        lobes: &mut Lobes,
     ) -> Option<Mixture> {
-        lobes.clear();
+        lobes.clear(tree.node_count());
         let light = cut.last()?.until;
-        let to_lobe = |opening: &Opening| Lobe {
-            leaf: tree.leaf_towards(opening.place - point),
-            visible: opening.visible,
-            irradiance: 0.0,
-        };
-        lobes.extend(self.openings_at(point).iter().map(to_lobe));
-        merge(lobes);
+        for opening in self.openings_at(point) {
+            lobes.add(tree.leaf_towards(opening.place - point), opening.visible);
+        }
         for _ in 0..SPREADS {
-            for index in 0..lobes.len() {
-                let Lobe { leaf, visible, .. } = lobes[index];
-                lobes.extend(tree.neighbours(leaf).map(|leaf| Lobe {
-                    leaf,
-                    visible: SPREAD * visible,
-                    irradiance: 0.0,
-                }));
-            }
-            merge(lobes);
+            lobes.spread(tree);
         }
-        for lobe in lobes.iter_mut() {
-            lobe.irradiance = luminance(tree.leaf_irradiance(lobe.leaf as usize, normal));
-        }
-        lobes.retain(|lobe| lobe.irradiance > 0.0);
+        lobes.complete(|leaf| luminance(tree.leaf_irradiance(leaf as usize, normal)));
+        let lobes = &lobes.lobes;
         let sum: f32 = lobes
             .iter()
             .map(|lobe| lobe.visible * lobe.irradiance)
@@ -202,7 +259,7 @@ impl SkyGuide {
             per_visible: (1.0 - EVERYWHERE) * light / sum,
             square: 0.0,
         };
-        for lobe in lobes.iter() {
+        for lobe in lobes {
             let share = lobe.visible * lobe.irradiance / sum;
             until += share;
             mixture.square += share * mixture.weight_of(lobe.visible).powi(2);
@@ -217,30 +274,13 @@ impl SkyGuide {
 
 impl Mixture {
     /// Weight of a ray into a leaf, relative to one that follows the unoccluded light.
-    pub(super) fn weight(&self, lobes: &[Lobe], leaf: u32) -> f32 {
-        let found = lobes.binary_search_by_key(&leaf, |lobe| lobe.leaf);
-        self.weight_of(found.map_or(0.0, |at| lobes[at].visible))
+    pub(super) fn weight(&self, lobes: &Lobes, leaf: u32) -> f32 {
+        self.weight_of(lobes.visible(leaf))
     }
 
     fn weight_of(&self, visible: f32) -> f32 {
         1.0 / (EVERYWHERE + self.per_visible * visible)
     }
-}
-
-/// Sort lobes by leaf, and merge those of one leaf.
-fn merge(lobes: &mut Vec<Lobe>) {
-    lobes.sort_unstable_by(|a, b| {
-        (a.leaf, a.visible)
-            .partial_cmp(&(b.leaf, b.visible))
-            .unwrap_or(Ordering::Equal)
-    });
-    lobes.dedup_by(|next, kept| {
-        let is_same = next.leaf == kept.leaf;
-        if is_same {
-            kept.visible += next.visible;
-        }
-        is_same
-    });
 }
 
 /// Number of hits of some points.
@@ -325,7 +365,7 @@ mod tests {
     fn guided_rays_have_the_mean_of_unguided_ones_in_every_part_of_the_sky() {
         let guide = guide();
         let tree = SkyTree::new(&Sky::Uniform(Vec3::ONE), None).unwrap();
-        let (mut random, mut cut, mut lobes) = (Random::new(5, 0), Vec::new(), Vec::new());
+        let (mut random, mut cut, mut lobes) = (Random::new(5, 0), Vec::new(), Lobes::default());
         let (point, normal) = (Vec3::Y * 0.3, Vec3::Y);
         let light = luminance(tree.unoccluded(normal, &mut cut));
         let own = cut.len();
@@ -342,7 +382,7 @@ mod tests {
             let (chosen, share, place) = Arriving::choose(&cut, at);
             let irradiance = chosen
                 .checked_sub(own)
-                .map_or(share, |lobe| lobes[lobe].irradiance);
+                .map_or(share, |place| lobes.irradiance(place));
             let Target::Node(node) = cut[chosen].target else {
                 unreachable!()
             };

@@ -18,17 +18,37 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) hierarchy: &'a Hierarchy,
     /// Light that is sampled.
     pub(crate) direct: &'a DirectFields,
+    /// Its irradiance of each leaf, if it was computed for many sweeps.
+    known: Option<&'a [Vec4]>,
 }
 
 impl<'a> Surfaces<'a> {
     /// The elements of a hierarchy with their direct light.
     pub(crate) fn new(hierarchy: &'a Hierarchy, direct: &'a DirectFields) -> Self {
-        Self { hierarchy, direct }
+        Self {
+            hierarchy,
+            direct,
+            known: None,
+        }
+    }
+
+    /// The same, with the direct irradiance by element from [`Self::direct_of_leaves`], which sweeps need again and again.
+    pub(crate) fn knowing<'b>(self, direct: &'b [Vec4]) -> Surfaces<'b>
+    where
+        'a: 'b,
+    {
+        Surfaces {
+            known: Some(direct),
+            ..self
+        }
     }
 
     /// Direct irradiance of a leaf, W/m².
     pub(crate) fn direct(&self, element: usize) -> Vec4 {
-        self.direct.element(self.hierarchy, element)
+        match self.known {
+            Some(known) => known[element],
+            None => self.direct.element(self.hierarchy, element),
+        }
     }
 
     /// The same by element; 0 for elements that are not leaves.

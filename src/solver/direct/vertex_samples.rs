@@ -6,10 +6,7 @@ use std::{ops::Range, sync::Arc};
 use glam::Vec4;
 
 use super::{
-    field::DirectField,
-    samples::{DirectLight, Tally},
-    scale::Scale,
-    sky_guide::SELDOM,
+    field::DirectField, samples::DirectLight, scale::Scale, sky_guide::SELDOM, tally::Tally,
 };
 use crate::{
     geometry::RayTree,
@@ -20,10 +17,6 @@ use crate::{
         places::{LEAST_PART, Receiver, emitted_as_irradiance, vertex_share_roots},
     },
 };
-
-/// Approximate limit of the shadow rays before the first picture, for large meshes; the first step shoots the others.
-/// Fewer leave the first picture noisy; more delay it.
-const FIRST_RAYS: usize = 1 << 20;
 
 /// Share of the shadow rays that is shot first, to find shadow borders. Smaller misses borders; larger costs rays in
 /// even light.
@@ -37,20 +30,6 @@ impl DirectLight {
 }
 
 impl DirectField {
-    /// Sample the corners of leaves for the first picture, by `samples` rays each, or fewer for large meshes. Returns
-    /// the rays shot; `None` when cancelled.
-    pub(crate) fn sample_vertices_first(
-        &mut self,
-        rays: &RayTree,
-        hierarchy: &Hierarchy,
-        samples: u32,
-        seed: u64,
-        cancel: &Cancel,
-    ) -> Option<u64> {
-        let most = (FIRST_RAYS / hierarchy.mesh.vertices.len().max(1)).max(1);
-        self.sample_vertices(rays, hierarchy, samples.min(most as u32), seed, cancel)
-    }
-
     /// Sample the corners of leaves that have had fewer than `samples` rays. Returns the rays shot; `None` when
     /// cancelled.
     ///
@@ -80,32 +59,26 @@ impl DirectField {
         self.vertices.resize(hierarchy.mesh.vertices.len(), None);
         let emitted = emitted_as_irradiance(hierarchy);
         let is_due = |vertex: usize, light: Option<DirectLight>| {
-            light.is_none_or(|had| had.tried < samples && had.counts_beside(emitted[vertex]))
+            light.is_none_or(|had| {
+                had.tried == 0 || had.tried < samples && had.counts_beside(emitted[vertex])
+            })
         };
         let receivers = self.receivers(hierarchy, elements.clone(), is_due);
         let before = self.shot(&receivers);
         for &(vertex, _) in &receivers {
             let vertex = vertex as usize;
-            if self.vertices[vertex].is_none() {
-                let ends = hierarchy.mesh.vertices[vertex].ends;
-                let expected = ends.map_or(Vec4::ZERO, |[a, b]| {
-                    (self.unoccluded(a) + self.unoccluded(b)) * 0.5
-                });
-                self.vertices[vertex] = Some(DirectLight::expected(expected));
-            }
+            let ends = hierarchy.mesh.vertices[vertex].ends;
+            let expected = match (self.vertices[vertex], ends) {
+                (Some(light), _) if light.tried > 0 => continue,
+                (Some(light), _) => light.exact,
+                (None, Some([a, b])) => (self.unoccluded(a) + self.unoccluded(b)) * 0.5,
+                (None, None) => Vec4::ZERO,
+            };
+            self.vertices[vertex] = Some(DirectLight::expected(expected));
         }
         // A share of the rays, and the others where these disagree.
         let probing = ((samples as f32 * PROBING_SHARE).ceil() as u32).clamp(1, samples);
-        self.shoot(rays, &receivers, probing, seed, cancel);
-        let mut explored = 0;
-        if self.lights.is_unexplored() {
-            explored = self.explore(rays, hierarchy, &receivers, seed, cancel)?;
-            let guided = |(_, receiver): &&(u32, Receiver)| self.lights.is_guided(receiver);
-            let guided: Vec<(u32, Receiver)> = receivers.iter().filter(guided).copied().collect();
-            explored += self.shot(&guided);
-            self.restart(&guided);
-            self.shoot(rays, &guided, probing, seed, cancel);
-        }
+        let explored = self.probe(rays, hierarchy, &receivers, probing, seed, cancel)?;
         let disputed = self.disputed(&self.neighbours(hierarchy, elements.clone()));
         let rest: Vec<(u32, Receiver)> = receivers
             .iter()
@@ -124,6 +97,30 @@ impl DirectField {
         self.sampled_elements = elements.end;
         self.samples = self.samples.max(samples);
         Some(explored + self.shot(&receivers) - before)
+    }
+
+    /// Shoot the first rays from some vertices; where they see little of the sky, learn where it is seen, and begin again.
+    /// Returns the rays that do not count as theirs; `None` when cancelled.
+    pub(super) fn probe(
+        &mut self,
+        rays: &RayTree,
+        hierarchy: &Hierarchy,
+        receivers: &[(u32, Receiver)],
+        samples: u32,
+        seed: u64,
+        cancel: &Cancel,
+    ) -> Option<u64> {
+        self.shoot(rays, receivers, samples, seed, cancel);
+        if !self.lights.is_unexplored() {
+            return Some(0);
+        }
+        let mut explored = self.explore(rays, hierarchy, receivers, seed, cancel)?;
+        let guided = |(_, receiver): &&(u32, Receiver)| self.lights.is_guided(receiver);
+        let guided: Vec<(u32, Receiver)> = receivers.iter().filter(guided).copied().collect();
+        explored += self.shot(&guided);
+        self.restart(&guided);
+        self.shoot(rays, &guided, samples, seed, cancel);
+        Some(explored)
     }
 
     /// Learn where the sky is seen from those of some vertices that see little of it, by their rays and those of their

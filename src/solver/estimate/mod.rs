@@ -207,7 +207,9 @@ impl ErrorEstimator {
 
     /// The error, by at most this share of the rays of the solve.
     fn estimate_by(&mut self, shown: Shown<'_>, share: f64) -> Option<Estimate> {
-        let Surfaces { hierarchy, direct } = shown.surfaces;
+        let Surfaces {
+            hierarchy, direct, ..
+        } = shown.surfaces;
         // All direct light is sampled here, also that which the solve links.
         let own = (shown.settings.direct == Direct::Linked).then(|| {
             let settings = SolveSettings {

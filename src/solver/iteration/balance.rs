@@ -41,6 +41,8 @@ pub(crate) fn balance(
     settings: &SolveSettings,
     cancel: &Cancel,
 ) -> Option<()> {
+    let direct = surfaces.direct_of_leaves();
+    let surfaces = surfaces.knowing(&direct);
     let hierarchy = surfaces.hierarchy;
     let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let emits =

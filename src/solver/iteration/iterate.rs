@@ -155,11 +155,16 @@ fn converge(
         ..
     } = iteration;
     // The same in all sweeps.
+    let direct = surfaces.direct_of_leaves();
+    let surfaces = surfaces.knowing(&direct);
+    let iteration = Iteration {
+        surfaces,
+        ..iteration
+    };
     let hierarchy = surfaces.hierarchy;
     let weights = leaf_areas(hierarchy);
     let linked_clusters = LinkedClusters::new(hierarchy, &linked.links);
     let clusters_of_images = linked.clusters_of_images(hierarchy);
-    let direct = surfaces.direct_of_leaves();
     let powers = surfaces.powers();
     let ceiling = CEILING_SLACK * powers.most;
     let mut acceleration = Anderson::new(DEPTH);
@@ -171,7 +176,7 @@ fn converge(
             linked,
             iteration,
             (&linked_clusters, &clusters_of_images),
-            (&direct, powers.sampled),
+            powers.sampled,
             bounds_rows,
         )?;
         convergence.sweeps += 1;
@@ -209,13 +214,13 @@ fn converge(
     Some(Ending::NotConverged)
 }
 
-/// Gather once, and measure the result together with the direct light of the leaves and the power that is sampled;
+/// Gather once, and measure the result together with the direct light and the power that is sampled;
 /// `None` when cancelled.
 fn sweep(
     linked: &LinkedLight,
     iteration: Iteration<'_>,
     (linked_clusters, clusters_of_images): (&LinkedClusters, &[LinkedClusters]),
-    (direct, sampled): (&[Vec4], f64),
+    sampled: f64,
     bounds_rows: bool,
 ) -> Option<Sweep> {
     let Iteration {
@@ -229,7 +234,7 @@ fn sweep(
     let mut image = linked.gather(hierarchy, &linked.power, linked_clusters, settings, cancel)?;
     let returned = |image: &[Vec4]| {
         area_total(hierarchy, |leaf| {
-            hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + direct[leaf])
+            hierarchy.reflectance_of(leaf).extend(0.0) * (image[leaf] + surfaces.direct(leaf))
         })
     };
     let returned_unscaled = returned(&image);
@@ -240,7 +245,7 @@ fn sweep(
         sent: area_total(hierarchy, |leaf| linked.radiosity(surfaces, leaf)) + sampled,
         returned: returned(&image),
         returned_unscaled,
-        arrived: area_total(hierarchy, |leaf| image[leaf] + direct[leaf]),
+        arrived: area_total(hierarchy, |leaf| image[leaf] + surfaces.direct(leaf)),
         change: power_between(hierarchy, &image, &linked.irradiance),
         image,
     })

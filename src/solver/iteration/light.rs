@@ -11,11 +11,19 @@ use crate::{
     transport::{Kernel, LinkStore},
 };
 
+/// Growth of the mesh from which finer links are tried again that did not pay before. Smaller, and they are refined in
+/// vain; larger, and links of a mesh that has grown stay coarse.
+const GROWTH_TO_RETRY: usize = 2;
+
 /// Light over links, with the links and tables from which it is computed.
 #[derive(Default)]
 pub(crate) struct LinkedLight {
     /// The pairs of nodes that exchange light.
     pub(crate) links: LinkStore,
+    /// The threshold that they meet; 0 before the first.
+    pub(crate) threshold: f32,
+    /// Number of elements when finer links did not pay; 0 before.
+    limited_at: usize,
     /// The same over mirrors.
     pub(crate) images: Vec<ImageLinks>,
     /// Linked irradiance of every element, scaled to the coverage, W/m²; the fourth channel is the unscaled sum of form
@@ -41,6 +49,16 @@ impl LinkedLight {
             links: LinkStore::default(),
         });
         self.images = unlinked.collect();
+    }
+
+    /// Note that finer links do not pay for a mesh of so many elements.
+    pub(crate) fn limit(&mut self, elements: usize) {
+        self.limited_at = elements;
+    }
+
+    /// Whether they are known not to pay for a mesh of so many elements, which has hardly grown since.
+    pub(crate) fn is_limited(&self, elements: usize) -> bool {
+        elements < GROWTH_TO_RETRY * self.limited_at
     }
 
     /// Number of links, those over mirrors included.
@@ -118,6 +136,17 @@ impl LinkedLight {
         let brightest = self.power.brightest(hierarchy, Hierarchy::ROOT);
         // Far emitters send most of their light past the scene.
         mean + luminance(power.as_vec3().extend(0.0)).min(luminance(brightest))
+    }
+
+    /// How often light bounces on average where none escapes, at least once: 1/(1 − ρ), ρ weighted by what arrives.
+    pub(crate) fn bounces(&self, surfaces: Surfaces<'_>) -> f64 {
+        let hierarchy = surfaces.hierarchy;
+        let arrived = sums::area_total(hierarchy, |leaf| self.total(surfaces, leaf));
+        let returned = sums::area_total(hierarchy, |leaf| {
+            hierarchy.reflectance_of(leaf).extend(0.0) * self.total(surfaces, leaf)
+        });
+        let absorbed = (arrived - returned).max(f64::MIN_POSITIVE);
+        (arrived / absorbed).max(1.0)
     }
 
     /// Memory in bytes.

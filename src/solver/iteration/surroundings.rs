@@ -18,6 +18,8 @@ pub(crate) fn surroundings(
     settings: &SolveSettings,
     cancel: &Cancel,
 ) -> Option<Vec<f32>> {
+    let direct = surfaces.direct_of_leaves();
+    let surfaces = surfaces.knowing(&direct);
     let hierarchy = surfaces.hierarchy;
     let total = |leaf: usize| linked.total(surfaces, leaf);
     let mean = sums::scale(hierarchy, total).max(f32::MIN_POSITIVE);

@@ -223,7 +223,9 @@ impl View<'_> {
 
     /// Add the power of sampled emitters, which the tables do not contain.
     fn add_sampled_emission(&self, boxes: &mut [ClusterBox]) {
-        let Surfaces { hierarchy, direct } = self.surfaces;
+        let Surfaces {
+            hierarchy, direct, ..
+        } = self.surfaces;
         for index in direct.sampled_patches() {
             let patch = &hierarchy.patches[index];
             let radiosity = luminance((patch.emission * PI).extend(0.0));

@@ -236,7 +236,9 @@ impl FinalGather<'_> {
 
     /// The vertices at which enough light is indirect, given the linked irradiance.
     fn probes(&self, linked: &[Vec4]) -> Vec<VertexProbe> {
-        let Surfaces { hierarchy, direct } = self.surfaces;
+        let Surfaces {
+            hierarchy, direct, ..
+        } = self.surfaces;
         let mesh = &hierarchy.mesh;
         let weights = vertex_share_roots(hierarchy);
         let emitted = emitted_as_irradiance(hierarchy);
