@@ -11,8 +11,8 @@ use glam::{BVec4A, Vec3, Vec4};
 
 use super::Vectors4;
 
-/// At a distance of more than this many of its longest edges a triangle counts as a point: nearer, that errs by more than 1e-4; further, the
-/// angles of the edges cancel in single precision, until nothing but rounding is left.
+/// At a distance of more than this many of its longest edges a triangle counts as a point: nearer, that errs by more than
+/// 1e-4; further, the angles of the edges cancel in single precision, until nothing but rounding is left.
 const FAR: f32 = 64.0;
 
 /// `acos(x)/√(1 − x²)` for x from 0 to 1, as a polynomial in 1 − x, least power first. Its relative error is at most
