@@ -289,6 +289,7 @@ mod tests {
 
     use crate::scene::{
         Material, MaterialId, Scene, SceneBuilder, SceneOptions, Sides, WarningKind,
+        shells::tests::CUBOID,
     };
 
     const GREY: MaterialId = MaterialId(0);
@@ -326,15 +327,9 @@ mod tests {
                     self.0.push_position(DVec3::from(at) + offset * side)
                 })
                 .collect();
-            for (face, of_face) in [
-                ([0, 2, 3, 1], material),
-                ([4, 5, 7, 6], ceiling),
-                ([0, 1, 5, 4], material),
-                ([2, 6, 7, 3], material),
-                ([0, 4, 6, 2], material),
-                ([1, 3, 7, 5], material),
-            ] {
-                let [a, mut b, c, mut d] = face.map(|corner: usize| corners[corner]);
+            let materials = [material, ceiling, material, material, material, material];
+            for (face, of_face) in CUBOID.into_iter().zip(materials) {
+                let [a, mut b, c, mut d] = face.map(|corner| corners[corner]);
                 if is_inward {
                     (b, d) = (d, b);
                 }

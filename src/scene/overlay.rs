@@ -372,7 +372,10 @@ const LEAST_SHARE: f64 = 1e-9;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Material, MaterialId, Scene, SceneOptions, Sides, Warning, WarningKind};
+    use crate::scene::{
+        Material, MaterialId, Scene, SceneOptions, Sides, Warning, WarningKind,
+        shells::tests::CUBOID,
+    };
 
     /// A scene of rectangles in the plane z = 0, turned about an axis; a corner apart makes the frame large.
     #[derive(Clone)]
@@ -425,15 +428,7 @@ mod tests {
                 self.0
                     .push_position(placed(DVec3::new(along(0), along(1), z)))
             });
-            let sides = [
-                [4, 5, 7, 6],
-                [0, 2, 3, 1],
-                [0, 1, 5, 4],
-                [2, 6, 7, 3],
-                [0, 4, 6, 2],
-                [1, 3, 7, 5],
-            ];
-            for [a, b, c, d] in sides.map(|side: [usize; 4]| side.map(|corner| corners[corner])) {
+            for [a, b, c, d] in CUBOID.map(|side| side.map(|corner| corners[corner])) {
                 self.0.push_triangle([a, b, c], material);
                 self.0.push_triangle([a, c, d], material);
             }

@@ -122,6 +122,17 @@ pub(super) mod tests {
     pub(in crate::scene) const TETRAHEDRON: [[u32; 3]; 4] =
         [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
+    /// Sides of a box that looks outward; bits 0, 1 and 2 of the number of a corner tell whether it is the upper one along x,
+    /// y and z. The second is the top.
+    pub(in crate::scene) const CUBOID: [[usize; 4]; 6] = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+
     const POSITIONS: [Vec3; 7] = [
         Vec3::ZERO,
         Vec3::X,
