@@ -129,6 +129,7 @@ fn spotted_sky() -> SkyPicture {
         width,
         height,
         pixels: (0..width * height).map(pixel).collect(),
+        ..Texture::default()
     };
     SkyPicture::new(Arc::new(picture), Vec3::ONE, UpAxis::Y, 0.0)
 }

@@ -263,6 +263,7 @@ fn painted(places: [Vec2; 4]) -> Arc<Scene> {
         width: 2,
         height: 2,
         pixels: vec![Vec3::ZERO, Vec3::ONE, Vec3::ONE, Vec3::ZERO],
+        ..Texture::default()
     });
     let mut material = Material::plain("checks", Vec3::splat(0.5), Vec3::ZERO);
     material.reflectance_texture = Some(TextureId(0));

@@ -96,6 +96,7 @@ fn picture(radiance: impl Fn(f32) -> f32) -> Environment {
                 _ => Vec3::ZERO,
             })
             .collect(),
+        ..Texture::default()
     };
     let sky = SkyPicture::new(Arc::new(texture), Vec3::ONE, UpAxis::Y, 0.0);
     Environment {

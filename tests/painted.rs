@@ -26,6 +26,7 @@ fn texture(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Texture 
         pixels: pixels
             .map(|(column, row)| Vec3::splat(value(column, row)))
             .collect(),
+        ..Texture::default()
     }
 }
 

@@ -330,6 +330,7 @@ fn textures_show_in_detail() {
         pixels: (0..64)
             .map(|x| if x < 32 { Vec3::X } else { Vec3::Y })
             .collect(),
+        ..Texture::default()
     });
     let painted = builder.push_material(Material {
         reflectance_texture: Some(TextureId(0)),

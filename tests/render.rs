@@ -633,6 +633,7 @@ fn sky_texture() -> Arc<Texture> {
         width,
         height,
         pixels: (0..width * height).map(pixel).collect(),
+        ..Texture::default()
     })
 }
 

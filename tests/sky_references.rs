@@ -141,6 +141,7 @@ fn picture(rows: u32, radiance: impl Fn(f64) -> f64) -> Environment {
         width: columns,
         height: rows,
         pixels: (0..columns * rows).map(pixel).collect(),
+        ..Texture::default()
     };
     let picture = SkyPicture::new(Arc::new(picture), Vec3::ONE, UpAxis::Y, 0.0);
     Environment {
@@ -356,6 +357,7 @@ fn a_small_sun_in_a_picture_is_as_bright_as_a_disc() {
         width: columns,
         height: rows,
         pixels,
+        ..Texture::default()
     };
     let sky = SkyPicture::new(Arc::new(texture), Vec3::ONE, UpAxis::Y, 0.0);
     // Bilinear between pixels: a pyramid of the volume of one pixel, about its centre.

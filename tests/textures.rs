@@ -9,7 +9,11 @@ use std::{fs, path::Path, sync::Arc};
 use common::solve;
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
-    scene::{Scene, SceneOptions, TriangleId, WarningKind, builtin, read_scene, write_builtin},
+    scene::{
+        Cutout, CutoutId, Material, Scene, SceneBuilder, SceneOptions, Texture, TextureId,
+        TriangleId, WarningKind, Wrap, builtin, linear_from_srgb, read_scene, write_builtin,
+        write_obj,
+    },
     solver::{Cancel, Omitted, Snapshot, SolveSettings},
 };
 
@@ -398,4 +402,110 @@ fn pictures_that_no_face_shows_are_not_read() {
     let scene = read("vt 0 0\nvt 1 0\nvt 0 1\nusemtl flat\nf 1/1 2/2 3/3");
     assert_eq!(said(&scene), 2, "{:?}", scene.warnings);
     assert_eq!(scene.omitted_textures.unused_textures, 0);
+}
+
+#[test]
+fn pictures_go_on_beyond_their_edges_when_written_and_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.obj");
+    let pixels = (0..6).map(|n| Vec3::new(0.1 * n as f32, 0.5, 0.1));
+    for wrap in [
+        [Wrap::Repeat; 2],
+        [Wrap::Mirror; 2],
+        [Wrap::Clamp; 2],
+        [Wrap::Repeat, Wrap::Mirror],
+        [Wrap::Mirror, Wrap::Repeat],
+    ] {
+        let mut cutout = Cutout::new("b.png", [3, 2], |column, row| column > row);
+        cutout.wrap = wrap;
+        let mut builder = SceneBuilder::default();
+        builder.textures.push(Texture {
+            name: "a.png".to_owned(),
+            width: 3,
+            height: 2,
+            pixels: pixels.clone().collect(),
+            wrap,
+        });
+        builder.cutouts.push(cutout);
+        let material = builder.push_material(Material {
+            emission_texture: Some(TextureId(0)),
+            cutout: Some(CutoutId(0)),
+            ..Material::plain("m", Vec3::ZERO, Vec3::ONE)
+        });
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|corner| builder.push_position(corner));
+        builder.push_triangle(corners, material);
+        builder.faces[0].texcoords =
+            Some([[-1.6, -1.7], [2.9, 0.3], [0.2, 2.6]].map(Vec2::from_array));
+        let scene = builder.finish(&SceneOptions::default()).unwrap();
+        write_obj(&scene, &path).unwrap();
+        let again = read_scene(&path, &SceneOptions::default()).unwrap();
+        for index in 0..200 {
+            let [a, b] = [0.618 * index as f32, 0.755 * index as f32].map(f32::fract);
+            let at = match a + b <= 1.0 {
+                true => Vec3::new(a, b, 1.0 - a - b),
+                false => Vec3::new(1.0 - a, 1.0 - b, a + b - 1.0),
+            };
+            let triangle = TriangleId(0);
+            let [before, after] = [&scene, &again].map(|scene| {
+                let (cutout, uv) = scene.see_through(triangle).unwrap().cutout.unwrap();
+                let place = uv[0] * at.x + uv[1] * at.y + uv[2] * at.z;
+                (scene.emission_at(triangle, at), cutout.has_at(place))
+            });
+            assert!((before.0 - after.0).abs().max_element() < 0.01, "{wrap:?}");
+            assert_eq!(before.1, after.1, "{wrap:?} at {at}");
+        }
+    }
+}
+
+#[test]
+fn colours_of_vertices_are_reflected_where_no_material_says_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.obj");
+    fs::write(folder.path().join("a.mtl"), "newmtl m\nKd 0.25 0.25 0.25\n").unwrap();
+    let read = |colors: [&str; 4], faces: &str| {
+        let places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
+        let vertices = places.iter().zip(colors);
+        let vertices: String = vertices
+            .map(|(place, color)| format!("v {place} {color}\n"))
+            .collect();
+        fs::write(&path, format!("mtllib a.mtl\n{vertices}{faces}")).unwrap();
+        let scene = read_scene(&path, &SceneOptions::default()).unwrap();
+        let reflectances: Vec<Vec3> = scene.surfaces.iter().map(|s| s.reflectance).collect();
+        let warnings: Vec<String> = scene.warnings.iter().map(ToString::to_string).collect();
+        (reflectances, warnings.join("\n"))
+    };
+    let assert_near = |found: Vec3, [r, g, b]: [f32; 3]| {
+        let difference = (found - Vec3::new(r, g, b)).abs().max_element();
+        assert!(difference < 1e-3, "{found}");
+    };
+    let grey = linear_from_srgb(0.6);
+    let triangles = "f 1 2 3\nf 1 3 4\n";
+    // sRGB numbers of up to 1, or bytes.
+    for colors in [
+        ["0.6 0 0", "0.6 0 0", "0.6 0 0", "0.6 0.6 0"],
+        ["153 0 0", "153 0 0", "153 0 0", "153 153 0"],
+    ] {
+        let (found, said) = read(colors, triangles);
+        assert_near(found[0], [grey, 0.0, 0.0]);
+        assert_near(found[1], [grey, grey / 3.0, 0.0]);
+        assert!(!said.contains("colours"), "{said}");
+    }
+    // A vertex without a colour, or with one that is none, is white beside the others.
+    let (found, _) = read(["0 0 0", "0 0 0", "", "0 0 nan"], triangles);
+    assert_near(found[0], [1.0 / 3.0; 3]);
+    assert_near(found[1], [2.0 / 3.0; 3]);
+    // White everywhere says nothing, and the first vertex says whether there are colours.
+    for (colors, is_told) in [(["1 1 1"; 4], false), (["", "1 0 0", "", "1 0 0"], true)] {
+        let (found, said) = read(colors, triangles);
+        assert_eq!(found, [Vec3::splat(0.5); 2]);
+        assert_eq!(said.contains("vertex colours"), is_told, "{said}");
+    }
+    // A material counts more, and that is said.
+    let (found, said) = read(["1 0 0"; 4], "f 1 2 3\nusemtl m\nf 1 3 4\n");
+    assert_near(found[0], [0.98, 0.0, 0.0]);
+    assert_eq!(found[1], Vec3::splat(0.25));
+    assert!(
+        said.contains("scene.obj:2: vertex colours are not used"),
+        "{said}"
+    );
 }

@@ -175,6 +175,7 @@ fn a_picture_of_the_sky_is_turned_and_dimmed_in_its_rows() {
             width: 2,
             height: 1,
             pixels: vec![Vec3::ONE, Vec3::X],
+            ..Texture::default()
         }),
         file: None,
         scale,

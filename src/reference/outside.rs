@@ -392,6 +392,7 @@ mod tests {
             width: 8,
             height: 4,
             pixels: pixels.collect(),
+            ..Texture::default()
         };
         let sky = SkyPicture::new(Arc::new(picture), Vec3::ONE, UpAxis::Y, 20.0);
         Outside {

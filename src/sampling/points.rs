@@ -644,6 +644,7 @@ mod tests {
             pixels: (0..8)
                 .map(|x| Vec3::splat(if x < 4 { 1.0 } else { 0.0 }))
                 .collect(),
+            ..Texture::default()
         };
         maker.0.textures.push(picture);
         let mut material = Material::plain("screen", Vec3::splat(0.5), Vec3::ONE);

@@ -288,6 +288,7 @@ mod tests {
             width: 2,
             height: 2,
             pixels,
+            ..Texture::default()
         }
     }
 

@@ -75,6 +75,8 @@ pub(super) struct Notes {
     pub(super) any_text: bool,
     /// The error that ended reading.
     pub(super) failure: Option<String>,
+    /// The line of the first vertex with a colour.
+    pub(super) first_color: Option<usize>,
     /// The axis that points up, as a comment before the first statement tells.
     pub(super) up: Option<UpAxis>,
     /// Corrections and omissions.
@@ -83,6 +85,9 @@ pub(super) struct Notes {
 
 /// Text handed to the parser at once. Smaller, and threads wait for each other; larger, and the text leaves the cache.
 const CHUNK: usize = 64 << 10;
+
+/// The colour of vertices without one beside others with colours: white, as of faces without any.
+const UNCOLORED: [&[u8]; 3] = [b"1"; 3];
 
 /// A clean view of an OBJ file.
 #[derive(Debug)]
@@ -94,6 +99,8 @@ pub(super) struct ObjCleaner<R> {
     in_face: bool,
     /// Notes so far.
     pub(super) notes: Notes,
+    /// Whether vertices have colours, as the first one says: the parser needs one for all or none.
+    is_colored: bool,
     position_count: i64,
     texcoord_count: i64,
     normal_count: i64,
@@ -120,6 +127,7 @@ impl<R: BufRead> ObjCleaner<R> {
             clean: b"vt nan nan\nvn nan nan nan\n".to_vec(),
             in_face: false,
             notes: Notes::default(),
+            is_colored: false,
             position_count: 0,
             texcoord_count: 0,
             normal_count: 0,
@@ -223,8 +231,8 @@ impl<R: BufRead> ObjCleaner<R> {
     fn position_statement(&mut self, rest: &[u8], line: usize) {
         self.position_count += 1;
         self.end_face();
-        let mut rest = words(rest);
-        if let Err(trouble) = self.copy_numbers(b"v", &mut rest, 3) {
+        let mut values = words(rest);
+        if let Err(trouble) = self.copy_numbers(b"v", &mut values, 3) {
             self.clean.extend_from_slice(b"v 0 0 0\n");
             self.bad_positions.push(self.position_count);
             let message = match trouble.notation() {
@@ -240,10 +248,29 @@ impl<R: BufRead> ObjCleaner<R> {
                 None => "vertex without three numbers; faces that use it are omitted",
             };
             self.note(WarningKind::LineSkipped, message, line);
-        } else if rest.nth(2).is_some() {
-            // One more value is a weight for free-form surfaces, three are a colour.
-            let message = "vertex colours are not used; give the material Kd or map_Kd";
-            self.note(WarningKind::Unsupported, message, line);
+        }
+        self.color(&mut values, line);
+    }
+
+    /// Copy the colour behind the position that the clean text ends with: three more numbers; one is a weight for
+    /// free-form surfaces. The parser needs a colour for all vertices or none, so the first one decides.
+    fn color<'a>(&mut self, values: &mut impl Iterator<Item = &'a [u8]>, line: usize) {
+        let color = [(); 3].map(|()| values.next().unwrap_or_default());
+        let is_color = color.iter().all(|word| Number::of(word) == Number::Finite);
+        if is_color {
+            self.notes.first_color.get_or_insert(line);
+        }
+        if self.position_count == 1 {
+            self.is_colored = is_color;
+        }
+        if self.is_colored {
+            let words = if is_color { color } else { UNCOLORED };
+            self.clean.pop();
+            for word in words {
+                self.clean.push(b' ');
+                self.clean.extend_from_slice(word);
+            }
+            self.clean.push(b'\n');
         }
     }
 

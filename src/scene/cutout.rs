@@ -2,12 +2,12 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{Material, Scene, Specular, TriangleId, ranges::finite_non_negative};
+use super::{Material, Scene, Specular, TriangleId, Wrap, ranges::finite_non_negative};
 
 /// Alpha below which a pixel is cut out.
 pub(super) const LEAST_ALPHA: f32 = 0.5;
 
-/// A picture of what is there and what is cut out, repeated, looked up without interpolation. Row 0 is the top, so
+/// A picture of what is there and what is cut out, looked up without interpolation. Row 0 is the top, so
 /// `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cutout {
@@ -19,6 +19,8 @@ pub struct Cutout {
     pub height: u32,
     /// Pixels row by row from the top, 64 in a word; 1 is there.
     words: Vec<u64>,
+    /// How it goes on beyond its edges, along u and v.
+    pub wrap: [Wrap; 2],
 }
 
 impl Cutout {
@@ -35,6 +37,7 @@ impl Cutout {
             width,
             height,
             words,
+            wrap: <[Wrap; 2]>::default(),
         }
     }
 
@@ -44,15 +47,16 @@ impl Cutout {
         self.words[index / 64] >> (index % 64) & 1 == 1
     }
 
-    /// Whether something is there at a texture coordinate, repeated outside 0…1. A coordinate that is not finite reads
-    /// as 0.
+    /// Whether something is there at a texture coordinate. One that is not finite reads as 0.
     pub fn has_at(&self, uv: Vec2) -> bool {
         let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
-        let pixel =
-            |at: f32, count: u32| ((at.rem_euclid(1.0) * count as f32) as u32).min(count - 1);
+        let pixel = |wrap: Wrap, at: f32, count: u32| {
+            ((wrap.place(at) * count as f32) as u32).min(count - 1)
+        };
+        let [across, down] = self.wrap;
         self.has(
-            pixel(uv.x, self.width),
-            self.height - 1 - pixel(uv.y, self.height),
+            pixel(across, uv.x, self.width),
+            self.height - 1 - pixel(down, uv.y, self.height),
         )
     }
 
@@ -136,6 +140,16 @@ impl Material {
 }
 
 impl Scene {
+    /// How the pictures of a material go on beyond their edges, along u and v; all in one way.
+    pub fn wrap_of(&self, material: &Material) -> [Wrap; 2] {
+        let texture = material.reflectance_texture.or(material.emission_texture);
+        match (texture, material.cutout) {
+            (Some(texture), _) => self.textures[texture.index()].wrap,
+            (None, Some(cutout)) => self.cutouts[cutout.index()].wrap,
+            (None, None) => [Wrap::Repeat; 2],
+        }
+    }
+
     /// What passes through a triangle; `None` where nothing does.
     pub fn see_through(&self, triangle: TriangleId) -> Option<SeeThrough<'_>> {
         let material = self.material(triangle);

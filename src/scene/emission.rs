@@ -106,6 +106,7 @@ mod tests {
             width: 2,
             height: 1,
             pixels: pixels.to_vec(),
+            ..Texture::default()
         }));
         for (number, &emission) in emissions.iter().enumerate() {
             let mut material = Material::plain("lamp", Vec3::ZERO, emission);

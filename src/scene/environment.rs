@@ -372,6 +372,7 @@ mod tests {
             width,
             height,
             pixels: (0..width * height).map(pixel).collect(),
+            ..Texture::default()
         })
     }
 

@@ -63,6 +63,7 @@ impl HosekSky {
             width: columns,
             height: ROWS,
             pixels: (0..columns * ROWS).map(pixel).collect(),
+            ..Texture::default()
         };
         Some(Self {
             picture,

@@ -128,6 +128,7 @@ mod tests {
             pixels: [0.1, 0.9, 0.4, 0.6]
                 .map(|red| Vec3::new(red, 0.5, 1.0))
                 .to_vec(),
+            ..Texture::default()
         });
         builder
             .cutouts

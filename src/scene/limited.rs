@@ -141,6 +141,7 @@ mod tests {
                 width: 2,
                 height: 1,
                 pixels: pixels.map(Vec3::splat).to_vec(),
+                ..Texture::default()
             };
             let known = builder.textures.iter().position(|known| *known == texture);
             let id = known.unwrap_or_else(|| {

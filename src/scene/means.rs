@@ -191,7 +191,7 @@ impl CutOut<'_> {
     fn halved(&self) -> TextureAverage {
         let size = self.size();
         let [width, height] = size.map(|side| side as f32);
-        TextureAverage::of(size, |column, row| {
+        TextureAverage::of(size, self.cutout.wrap, |column, row| {
             self.at(Vec2::new(
                 (column as f32 + 0.5) / width,
                 1.0 - (row as f32 + 0.5) / height,
@@ -256,6 +256,7 @@ mod tests {
             width: 64,
             height: 1,
             pixels: (0..64).map(half).collect(),
+            ..Texture::default()
         });
         builder.push_material(Material {
             reflectance_texture: Some(TextureId(0)),

@@ -44,6 +44,7 @@ mod omitted_textures;
 mod options;
 mod orientation;
 mod overlay;
+mod palette;
 mod placement;
 mod progress;
 mod ranges;
@@ -68,6 +69,7 @@ mod upright;
 mod usable;
 mod warning;
 mod whole;
+mod wrap;
 mod write;
 
 pub use appearance::Appearance;
@@ -98,6 +100,7 @@ pub use up_axis::UpAxis;
 pub use upright::UpEvidence;
 pub use warning::{Warning, WarningKind};
 pub use whole::{folder_of, place_of, try_writing, write_whole};
+pub use wrap::Wrap;
 pub use write::{MaterialLibrary, write_builtin, write_obj};
 pub(crate) use write::{coordinates, write_name};
 

@@ -20,14 +20,16 @@ use super::listed::{MOST_LISTED, listed, shortened};
 use super::locate::{Missing, SceneFolder};
 use super::mtl::{MtlMaterial, read_mtl};
 use super::options::SceneOptions;
+use super::palette::Palettes;
 use super::read_error::ReadError;
 use super::source::{CHANGED, Watch};
 use super::texcoords::near_origin;
 use super::texture::Role;
-use super::texture_statement::{TextureReference, TextureStatement};
+use super::texture_statement::{Mapping, TextureReference, TextureStatement};
 use super::triangulate::{Doubt, MAX_CLIPPED_CORNERS, Triangulator};
 use super::warning::WarningKind;
 use super::whole::folder_of;
+use super::wrap::Wrap;
 use super::{CutoutId, Material, MaterialId, Scene, Sides, Texture, TextureId};
 
 /// Read the faces of an OBJ file that was opened, and what they show.
@@ -61,6 +63,8 @@ pub(super) fn import<'a>(
         library_budget: MAX_LIBRARIES,
         slots: Vec::new(),
         default_slot: None,
+        painted_slot: None,
+        palettes: Palettes::default(),
     };
     import.materials(&models);
     import.models(&models);
@@ -113,8 +117,10 @@ const MAX_MTL_BYTES: u64 = 256 << 20;
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     id: MaterialId,
-    /// Scale and offset of texture coordinates, where it has a texture.
-    mapping: Option<(DVec2, DVec2)>,
+    /// How its textures lie, where it has any.
+    mapping: Option<Mapping>,
+    /// What the colours of vertices are multiplied by to lie within 0…1, where faces reflect these.
+    color_scale: Option<f64>,
 }
 
 /// The scene on its way in.
@@ -123,14 +129,17 @@ pub(super) struct Import<'a> {
     folder: SceneFolder,
     pub(super) builder: SceneBuilder,
     notes: Notes,
-    /// Pictures by path and by what they are for; nothing where reading failed.
-    textures: HashMap<(PathBuf, Role), Option<Loaded>>,
+    /// Pictures by path, by what they are for and by how they go on; nothing where reading failed.
+    textures: HashMap<(PathBuf, Role, Wrap), Option<Loaded>>,
     pixel_budget: usize,
     /// Names of MTL files that are still looked for.
     library_budget: usize,
     /// By index in [`Notes::materials`].
     slots: Vec<Slot>,
     default_slot: Option<Slot>,
+    /// The material of faces that only the colours of their vertices describe.
+    painted_slot: Option<Slot>,
+    palettes: Palettes,
 }
 
 /// The part of glass that is opaque: nothing, where it does not say that it lets light pass.
@@ -217,8 +226,7 @@ struct Loaded {
 /// A texture of a material, and how it lies.
 struct Placed {
     texture: Loaded,
-    scale: DVec2,
-    offset: DVec2,
+    mapping: Mapping,
 }
 
 impl Import<'_> {
@@ -261,6 +269,7 @@ impl Import<'_> {
                     Slot {
                         id: self.builder.push_material(grey),
                         mapping: None,
+                        color_scale: None,
                     }
                 }
             };
@@ -510,6 +519,7 @@ impl Import<'_> {
         Slot {
             id: self.builder.push_material(material),
             mapping,
+            color_scale: None,
         }
     }
 
@@ -589,15 +599,11 @@ impl Import<'_> {
     }
 
     /// How the material's textures lie; all share the coordinates of a face.
-    fn mapping(
-        &mut self,
-        placed: [Option<Placed>; 3],
-        defined: &Defined,
-    ) -> Option<(DVec2, DVec2)> {
+    fn mapping(&mut self, placed: [Option<Placed>; 3], defined: &Defined) -> Option<Mapping> {
         let mut placed = placed.into_iter().flatten();
-        let first = placed.next().map(|placed| (placed.scale, placed.offset))?;
-        if placed.any(|placed| (placed.scale, placed.offset) != first) {
-            let message = "the textures of a material have different -s or -o: those of the first of map_Kd, map_Ke and map_d are used for all";
+        let first = placed.next()?.mapping;
+        if placed.any(|placed| placed.mapping != first) {
+            let message = "the textures of a material have different -s, -o or -clamp: those of the first of map_Kd, map_Ke and map_d are used for all";
             self.note_defined(WarningKind::Unsupported, message, defined);
         }
         Some(first)
@@ -628,14 +634,10 @@ impl Import<'_> {
             self.note_defined(WarningKind::Unsupported, &message, defined);
         }
         let why = match located {
-            Ok((_, path)) => match self.load(&path, &reading.name, role) {
+            Ok((_, path)) => match self.load(&path, &reading, role) {
                 Ok(texture) => {
-                    let TextureReference { scale, offset, .. } = reading;
-                    return Some(Placed {
-                        texture,
-                        scale,
-                        offset,
-                    });
+                    let mapping = reading.mapping;
+                    return Some(Placed { texture, mapping });
                 }
                 Err(reason) => format!("cannot be used: {reason}"),
             },
@@ -651,13 +653,20 @@ impl Import<'_> {
         None
     }
 
-    fn load(&mut self, path: &Path, name: &str, role: Role) -> Result<Loaded, String> {
-        let key = |role| (path.to_owned(), role);
+    fn load(
+        &mut self,
+        path: &Path,
+        reference: &TextureReference,
+        role: Role,
+    ) -> Result<Loaded, String> {
+        let wrap = reference.mapping.wrap;
+        let key = |role| (path.to_owned(), role, wrap);
         if let Some(known) = self.textures.get(&key(role)) {
             return known.ok_or_else(|| "see above".to_owned());
         }
         let file = self.folder.path_of(path);
-        let read = Texture::read(&file, name, role).map(|picture| {
+        let read = Texture::read(&file, &reference.name, role).map(|picture| {
+            let picture = picture.wrapped([wrap; 2]);
             let id = picture.texture.map(|texture| {
                 let texture = texture.reduced_to(self.pixel_budget / 4);
                 self.pixel_budget = self.pixel_budget.saturating_sub(texture.pixels.len());
@@ -702,6 +711,9 @@ impl Import<'_> {
         let faces = std::mem::take(&mut self.notes.faces);
         self.builder.faces.reserve(faces.len());
         let mut faces = faces.into_iter();
+        let scale = color_scale(models);
+        let is_without = |model: &tobj::Model| model.mesh.vertex_color.is_empty();
+        let mut has_unused_colors = models.iter().all(is_without);
         for model in models {
             let segment = model.name.parse::<usize>().ok();
             let Some(segment) = segment.and_then(|segment| self.notes.segments.get(segment)) else {
@@ -711,11 +723,25 @@ impl Import<'_> {
             if objects.last().is_none_or(|(name, _)| *name != segment.name) {
                 objects.push((segment.name.clone(), self.builder.faces.len()));
             }
+            let mesh = &model.mesh;
+            // White everywhere says nothing.
+            let has_colors = mesh.vertex_color.iter().any(|&channel| channel != 1.0);
             let slot = match segment.material {
-                Some(material) => self.slots[material],
+                Some(material) => {
+                    has_unused_colors |= has_colors;
+                    self.slots[material]
+                }
+                None if has_colors => self.painted_slot(scale),
                 None => self.default_slot(),
             };
-            self.mesh(&model.mesh, slot, &mut triangulator, &mut faces);
+            self.mesh(mesh, slot, &mut triangulator, &mut faces);
+        }
+        std::mem::take(&mut self.palettes).finish(&mut self.builder);
+        if let Some(line) = self.notes.first_color.filter(|_| has_unused_colors) {
+            let message = "vertex colours are not used on faces with a material, and where the first vertex has none; give Kd or map_Kd";
+            let file = &self.builder.source.file;
+            let log = &mut self.notes.log;
+            log.note(WarningKind::Unsupported, message, file, line);
         }
     }
 
@@ -724,6 +750,17 @@ impl Import<'_> {
         *self.default_slot.get_or_insert_with(|| Slot {
             id: builder.push_material(Material::plain("", DEFAULT_REFLECTANCE, Vec3::ZERO)),
             mapping: None,
+            color_scale: None,
+        })
+    }
+
+    /// The material of faces that reflect the colours of their vertices.
+    fn painted_slot(&mut self, scale: f64) -> Slot {
+        let builder = &mut self.builder;
+        *self.painted_slot.get_or_insert_with(|| Slot {
+            id: builder.push_material(Material::plain("", Vec3::ONE, Vec3::ZERO)),
+            mapping: None,
+            color_scale: Some(scale),
         })
     }
 
@@ -787,6 +824,10 @@ impl Import<'_> {
             // Out of range it stays out of range, and the builder says so.
             u32::try_from(index).unwrap_or(u32::MAX)
         };
+        if let Some(colors) = corners.colors(which) {
+            let face = self.builder.faces.len();
+            self.palettes.paint(face, corners.slot.id, colors);
+        }
         self.builder.faces.push(Face {
             corners: which.map(index),
             texcoords: corners.texcoords(which),
@@ -841,6 +882,15 @@ impl Import<'_> {
     }
 }
 
+/// What the colours of vertices are to be multiplied by: some programs write bytes.
+fn color_scale(models: &[tobj::Model]) -> f64 {
+    let mut channels = models.iter().flat_map(|model| &model.mesh.vertex_color);
+    match channels.any(|&channel| channel > 1.0) {
+        true => 1.0 / f64::from(u8::MAX),
+        false => 1.0,
+    }
+}
+
 /// Reflectance where the file gives none.
 const DEFAULT_REFLECTANCE: Vec3 = Vec3::splat(0.5);
 
@@ -873,14 +923,26 @@ impl Corners<'_> {
 
     /// Texture coordinates, mapped and moved next to the origin, where the material has a texture.
     fn texcoords(&self, which: [usize; 3]) -> Option<[Vec2; 3]> {
-        let (scale, offset) = self.slot.mapping?;
+        let mapping = self.slot.mapping?;
         let mut uv = [DVec2::ZERO; 3];
         for (uv, corner) in uv.iter_mut().zip(which) {
             let index = *self.mesh.texcoord_indices.get(self.start + corner)? as usize * 2;
             let value = DVec2::from_slice(self.mesh.texcoords.get(index..index + 2)?);
-            *uv = value * scale + offset;
+            *uv = mapping.place(value);
         }
-        near_origin(uv)
+        near_origin(uv, [mapping.wrap; 2])
+    }
+
+    /// Colours of the vertices, linear, where they are reflected.
+    fn colors(&self, which: [usize; 3]) -> Option<[Vec3; 3]> {
+        let scale = self.slot.color_scale?;
+        let mut colors = [Vec3::ZERO; 3];
+        for (color, corner) in colors.iter_mut().zip(which) {
+            let index = self.mesh.indices[self.start + corner] as usize * 3;
+            let encoded = DVec3::from_slice(self.mesh.vertex_color.get(index..index + 3)?);
+            *color = (encoded * scale).as_vec3().map(linear_from_srgb);
+        }
+        Some(colors)
     }
 
     fn normals(&self, which: [usize; 3]) -> Option<[Vec3; 3]> {

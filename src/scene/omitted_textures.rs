@@ -8,7 +8,7 @@ use glam::Vec2;
 use glam::Vec3;
 
 use super::ranges::finite_non_negative;
-use super::{Cutout, CutoutId, Face, SceneBuilder, Texture, TextureId};
+use super::{Cutout, CutoutId, Face, SceneBuilder, Texture, TextureId, Wrap};
 
 /// Pixels that differ by no more than this share of the first are of one colour: means of equal pixels are rounded.
 const ALIKE: f32 = 1e-6;
@@ -139,8 +139,9 @@ fn is_whole(cutout: &Cutout, view: &View) -> bool {
     let Some([min, max]) = view.bounds else {
         return true;
     };
-    let columns = pixels_between(min.x, max.x, cutout.width);
-    let rows = pixels_between(1.0 - max.y, 1.0 - min.y, cutout.height);
+    let [across, down] = cutout.wrap;
+    let columns = pixels_between(min.x, max.x, cutout.width, across);
+    let rows = pixels_between(1.0 - max.y, 1.0 - min.y, cutout.height, down);
     let has_row = |row: u32| {
         (0..)
             .map_while(&columns)
@@ -151,8 +152,9 @@ fn is_whole(cutout: &Cutout, view: &View) -> bool {
 
 /// The colour of all pixels that lookups within a box of texture coordinates read, where it is one.
 fn constant(texture: &Texture, min: Vec2, max: Vec2) -> Option<Vec3> {
-    let columns = pixels_between(min.x, max.x, texture.width);
-    let rows = pixels_between(1.0 - max.y, 1.0 - min.y, texture.height);
+    let [across, down] = texture.wrap;
+    let columns = pixels_between(min.x, max.x, texture.width, across);
+    let rows = pixels_between(1.0 - max.y, 1.0 - min.y, texture.height, down);
     let pixel = |column: u32, row: u32| {
         texture.pixels[row as usize * texture.width as usize + column as usize]
     };
@@ -170,12 +172,19 @@ fn constant(texture: &Texture, min: Vec2, max: Vec2) -> Option<Vec3> {
 }
 
 /// The pixels along an axis of so many that lookups between two coordinates read, by number; bilinear ones read two.
-fn pixels_between(from: f32, to: f32, count: u32) -> impl Fn(u32) -> Option<u32> {
-    let pixel = |at: f32| (f64::from(at) * f64::from(count) - 0.5).floor();
-    let (first, last) = (pixel(from), pixel(to) + 1.0);
-    let wanted = (last - first + 1.0).min(f64::from(count)) as u32;
-    let start = first.rem_euclid(f64::from(count)) as u64;
-    move |number| (number < wanted).then(|| ((start + u64::from(number)) % u64::from(count)) as u32)
+fn pixels_between(from: f32, to: f32, count: u32, wrap: Wrap) -> impl Fn(u32) -> Option<u32> {
+    let pixel = |at: f32| (f64::from(at) * f64::from(count) - 0.5).floor() as i64;
+    let (mut first, mut last) = (pixel(from), pixel(to).saturating_add(1));
+    // After how many pixels it begins again.
+    let period = i64::from(count) * if wrap == Wrap::Mirror { 2 } else { 1 };
+    if wrap == Wrap::Clamp {
+        (first, last) = (first.clamp(0, period - 1), last.clamp(0, period - 1));
+    }
+    let wanted = last.saturating_sub(first).saturating_add(1).min(period);
+    move |number| {
+        let number = i64::from(number);
+        (number < wanted).then(|| wrap.pixel(first.saturating_add(number), count))
+    }
 }
 
 #[cfg(test)]
@@ -194,6 +203,7 @@ mod tests {
             width: 4,
             height: 4,
             pixels,
+            ..Texture::default()
         }
     }
 

@@ -622,6 +622,7 @@ mod tests {
             width: 2,
             height: 1,
             pixels: vec![Vec3::ZERO, Vec3::ONE],
+            ..crate::scene::Texture::default()
         });
         builder.materials[0].reflectance_texture = Some(crate::scene::TextureId(0));
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(glam::Vec2::from);

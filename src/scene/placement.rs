@@ -134,6 +134,7 @@ mod tests {
             width: 8,
             height: 4,
             pixels: (0..32).map(|at| Vec3::splat(at as f32)).collect(),
+            ..Texture::default()
         });
         let environment = Environment {
             sky: Sky::Picture(SkyPicture::new(picture, Vec3::ONE, up, 20.0)),
@@ -215,6 +216,7 @@ mod tests {
             width: 2,
             height: 2,
             pixels: [1.0, 2.0, 3.0, 4.0].map(Vec3::splat).to_vec(),
+            ..Texture::default()
         };
         let found = mirrored(&texture)
             .pixels

@@ -136,6 +136,7 @@ mod tests {
             width: 2,
             height: 1,
             pixels: vec![Vec3::splat(0.4), Vec3::splat(0.6)],
+            ..Texture::default()
         });
         let textured = builder.push_material(Material {
             reflectance_texture: Some(TextureId(0)),

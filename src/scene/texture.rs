@@ -1,4 +1,4 @@
-//! Textures: linear RGB pixels, repeated, looked up bilinearly; and their reading from picture files.
+//! Textures: linear RGB pixels, looked up bilinearly; and their reading from picture files.
 
 use std::io::{BufRead, Cursor, Seek};
 use std::ops::{AddAssign, Mul};
@@ -7,10 +7,10 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use image::{DynamicImage, ImageBuffer, ImageReader, Limits, Luma, Pixel, Primitive, Rgba};
 
-use super::Cutout;
 use super::color::linear_from_srgb;
 use super::cutout::LEAST_ALPHA;
 use super::ranges::{MAX_EMISSION, finite_non_negative};
+use super::{Cutout, Wrap};
 
 /// A decoded picture in linear RGB. Row 0 is the top, so `v` = 1 is the top edge.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,20 +23,23 @@ pub struct Texture {
     pub height: u32,
     /// `width · height` pixels, row by row from the top.
     pub pixels: Vec<Vec3>,
+    /// How it goes on beyond its edges, along u and v.
+    pub wrap: [Wrap; 2],
 }
 
 impl Texture {
-    /// Bilinear value at a texture coordinate, repeated outside 0…1. A coordinate that is not finite reads as 0.
+    /// Bilinear value at a texture coordinate. One that is not finite reads as 0.
     pub fn sample(&self, uv: Vec2) -> Vec3 {
         let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
-        let x = uv.x.rem_euclid(1.0) * self.width as f32 - 0.5;
-        let y = (1.0 - uv.y).rem_euclid(1.0) * self.height as f32 - 0.5;
+        let [across, down] = self.wrap;
+        let x = across.place(uv.x) * self.width as f32 - 0.5;
+        let y = down.place(1.0 - uv.y) * self.height as f32 - 0.5;
         let (column, row) = (x.floor(), y.floor());
         let (fx, fy) = (x - column, y - row);
         let pixel = |dx: i64, dy: i64| {
-            let i = (column as i64 + dx).rem_euclid(i64::from(self.width)) as usize;
-            let j = (row as i64 + dy).rem_euclid(i64::from(self.height)) as usize;
-            self.pixels[j * self.width as usize + i]
+            let i = across.pixel(column as i64 + dx, self.width);
+            let j = down.pixel(row as i64 + dy, self.height);
+            self.pixels[j as usize * self.width as usize + i as usize]
         };
         let top = pixel(0, 0).lerp(pixel(1, 0), fx);
         let bottom = pixel(0, 1).lerp(pixel(1, 1), fx);
@@ -171,6 +174,7 @@ impl Texture {
         });
         Self {
             name: self.name.clone(),
+            wrap: self.wrap,
             ..half
         }
     }
@@ -200,6 +204,7 @@ fn half([full_width, full_height]: [u32; 2], pixel: impl Fn(u32, u32) -> Vec3) -
         width,
         height,
         pixels,
+        ..Texture::default()
     }
 }
 
@@ -242,6 +247,19 @@ pub(super) struct Picture {
     pub(super) cutout: Option<Cutout>,
 }
 
+impl Picture {
+    /// The picture that goes on in these ways beyond its edges, along u and v.
+    pub(super) fn wrapped(mut self, wrap: [Wrap; 2]) -> Self {
+        if let Some(texture) = &mut self.texture {
+            texture.wrap = wrap;
+        }
+        if let Some(cutout) = &mut self.cutout {
+            cutout.wrap = wrap;
+        }
+        self
+    }
+}
+
 /// A picture of radiance as it is read.
 pub(super) struct RadiancePicture {
     /// Its pixels, finite and within the range of emission.
@@ -274,6 +292,7 @@ impl Grid<Vec3> {
             width: self.width,
             height: self.height,
             pixels: self.values,
+            ..Texture::default()
         }
     }
 }
@@ -430,16 +449,21 @@ impl TextureAverage {
     /// Halve a texture down to one pixel.
     pub(super) fn new(full: &Texture) -> Self {
         let width = full.width as usize;
-        Self::of([full.width, full.height], |column, row| {
+        Self::of([full.width, full.height], full.wrap, |column, row| {
             full.pixels[row as usize * width + column as usize]
         })
     }
 
     /// Halve a picture of this width and height down to one pixel; `pixel` gives its pixels by column and row.
-    pub(super) fn of([width, height]: [u32; 2], pixel: impl Fn(u32, u32) -> Vec3) -> Self {
+    pub(super) fn of(
+        [width, height]: [u32; 2],
+        wrap: [Wrap; 2],
+        pixel: impl Fn(u32, u32) -> Vec3,
+    ) -> Self {
         let mut halved: Vec<Texture> = Vec::new();
         if width > 1 || height > 1 {
-            halved.push(half([width, height], pixel));
+            let half = half([width, height], pixel);
+            halved.push(Texture { wrap, ..half });
         }
         while let Some(last) = halved.last()
             && last.pixels.len() > 1
@@ -509,6 +533,32 @@ mod tests {
     }
 
     #[test]
+    fn lookups_beyond_the_edge_follow_the_wrap() {
+        let texture = |wrap| Texture {
+            name: String::new(),
+            width: 2,
+            height: 1,
+            pixels: vec![Vec3::ZERO, Vec3::ONE],
+            wrap,
+        };
+        // The middles of pixels, and the edges between them.
+        for (wrap, expected) in [
+            (Wrap::Repeat, [1.0, 0.5, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5, 1.0]),
+            (Wrap::Mirror, [0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 0.5, 0.0]),
+            (Wrap::Clamp, [0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0]),
+        ] {
+            let texture = texture([wrap, Wrap::Repeat]);
+            for (number, expected) in (-1..).zip(expected) {
+                let at = Vec2::new(number as f32 * 0.25, 0.3);
+                assert_eq!(texture.sample(at).x, expected, "{wrap:?} {at}");
+                // Halved copies go on alike.
+                let halved = texture.halved();
+                assert_eq!((halved.wrap, halved.sample(at).x), (texture.wrap, 0.5));
+            }
+        }
+    }
+
+    #[test]
     fn halving_keeps_the_mean_of_even_sides() {
         let pixels = (0..16).map(|x| Vec3::splat(x as f32)).collect();
         let texture = Texture {
@@ -516,6 +566,7 @@ mod tests {
             width: 4,
             height: 4,
             pixels,
+            ..Texture::default()
         };
         let small = texture.reduced_to(1);
         assert_eq!((small.width, small.height), (1, 1));
@@ -595,6 +646,7 @@ mod tests {
             width: 1,
             height: 2,
             pixels: vec![Vec3::ONE, Vec3::ZERO],
+            ..Texture::default()
         };
         for shift in [-3.0, 0.0, 5.0] {
             assert_eq!(texture.sample(Vec2::new(0.3, 0.75 + shift)), Vec3::ONE);

@@ -5,6 +5,8 @@
 
 use glam::DVec2;
 
+use super::Wrap;
+
 /// A texture statement without its keyword.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TextureStatement {
@@ -16,12 +18,38 @@ pub(super) struct TextureStatement {
 pub(super) struct TextureReference {
     /// File name, not empty.
     pub(super) name: String,
-    /// `-s`: texture coordinates are multiplied by it …
-    pub(super) scale: DVec2,
-    /// `-o`: … and then moved by it.
-    pub(super) offset: DVec2,
+    /// How it lies.
+    pub(super) mapping: Mapping,
     /// The first option that is not followed and may change the picture.
     pub(super) ignored: Option<String>,
+}
+
+/// How a texture lies on the faces of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Mapping {
+    /// `-s`: texture coordinates are multiplied by it …
+    scale: DVec2,
+    /// `-o`: … and then moved by it.
+    offset: DVec2,
+    /// `-clamp`: how the picture goes on beyond its edges.
+    pub(super) wrap: Wrap,
+}
+
+impl Default for Mapping {
+    fn default() -> Self {
+        Self {
+            scale: DVec2::ONE,
+            offset: DVec2::ZERO,
+            wrap: Wrap::Repeat,
+        }
+    }
+}
+
+impl Mapping {
+    /// Where a texture coordinate of the file lies in the picture.
+    pub(super) fn place(self, uv: DVec2) -> DVec2 {
+        uv * self.scale + self.offset
+    }
 }
 
 /// Arguments of an option at most, by the format.
@@ -107,21 +135,10 @@ fn name_ends(text: &str) -> Vec<usize> {
 }
 
 /// The values of options.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Options {
-    scale: DVec2,
-    offset: DVec2,
+    mapping: Mapping,
     ignored: Option<String>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            scale: DVec2::ONE,
-            offset: DVec2::ZERO,
-            ignored: None,
-        }
-    }
 }
 
 impl Options {
@@ -171,9 +188,15 @@ impl Options {
                 .unwrap_or(default)
         };
         match option {
-            "-s" => self.scale = DVec2::new(number(0, 1.0), number(1, 1.0)),
-            "-o" => self.offset = DVec2::new(number(0, 0.0), number(1, 0.0)),
-            "-t" | "-mm" | "-clamp" if values.first() != Some(&"off") => self.ignore(option),
+            "-s" => self.mapping.scale = DVec2::new(number(0, 1.0), number(1, 1.0)),
+            "-o" => self.mapping.offset = DVec2::new(number(0, 0.0), number(1, 0.0)),
+            "-clamp" => {
+                self.mapping.wrap = match values.first() {
+                    Some(&"off") => Wrap::Repeat,
+                    _ => Wrap::Clamp,
+                }
+            }
+            "-t" | "-mm" => self.ignore(option),
             _ => {}
         }
     }
@@ -191,8 +214,7 @@ impl Options {
         if !name.trim().is_empty() {
             readings.push(TextureReference {
                 name: name.to_owned(),
-                scale: self.scale,
-                offset: self.offset,
+                mapping: self.mapping,
                 ignored: self.ignored,
             });
         }
@@ -237,9 +259,20 @@ mod tests {
             panic!("{:?}", names(text));
         };
         assert_eq!(reading.name, "my tex-ture 2.png");
-        assert_eq!(reading.scale, DVec2::new(2.0, 3.0));
-        assert_eq!(reading.offset, DVec2::new(0.5, 0.0));
-        assert_eq!(reading.ignored.as_deref(), Some("-clamp"));
+        let expected = Mapping {
+            scale: DVec2::new(2.0, 3.0),
+            offset: DVec2::new(0.5, 0.0),
+            wrap: Wrap::Clamp,
+        };
+        assert_eq!((reading.mapping, &reading.ignored), (expected, &None));
+        for (text, wrap) in [
+            ("-clamp off a.png", Wrap::Repeat),
+            ("a.png -clamp on", Wrap::Clamp),
+        ] {
+            assert_eq!(readings(text).last().unwrap().mapping.wrap, wrap, "{text}");
+        }
+        let moved = readings("-t 1 1 1 a.png").remove(0);
+        assert_eq!(moved.ignored.as_deref(), Some("-t"));
         assert_eq!(TextureStatement::of("-s 1 1 1"), None);
         assert_eq!(TextureStatement::of("  "), None);
         assert_eq!(names("-odd.png"), ["-odd.png"]);
@@ -251,10 +284,10 @@ mod tests {
         let found = readings(text);
         let expected = [text, "my floor.png -s 2 4 1", "my floor.png"];
         assert_eq!(names(text), expected);
-        assert_eq!(found[0].scale, DVec2::ONE);
-        assert_eq!(found[1].offset, DVec2::new(0.5, 0.25));
-        assert_eq!(found[2].scale, DVec2::new(2.0, 4.0));
-        assert_eq!(found[2].offset, DVec2::new(0.5, 0.25));
+        assert_eq!(found[0].mapping.scale, DVec2::ONE);
+        assert_eq!(found[1].mapping.offset, DVec2::new(0.5, 0.25));
+        assert_eq!(found[2].mapping.scale, DVec2::new(2.0, 4.0));
+        assert_eq!(found[2].mapping.offset, DVec2::new(0.5, 0.25));
     }
 
     #[test]
@@ -269,7 +302,7 @@ mod tests {
         let found = readings("-colorspace sRGB -s 2 2 1 floor.png -foo 1");
         let last = found.last().unwrap();
         assert_eq!(last.name, "floor.png");
-        assert_eq!(last.scale, DVec2::splat(2.0));
+        assert_eq!(last.mapping.scale, DVec2::splat(2.0));
         assert_eq!(last.ignored.as_deref(), Some("-colorspace"));
     }
 
@@ -279,8 +312,8 @@ mod tests {
         let found = readings(text);
         let last = found.last().unwrap();
         assert_eq!(last.name, "my floor.png");
-        assert_eq!(last.scale, DVec2::splat(2.0));
-        assert_eq!(last.offset, DVec2::ZERO);
+        assert_eq!(last.mapping.scale, DVec2::splat(2.0));
+        assert_eq!(last.mapping.offset, DVec2::ZERO);
         assert_eq!(names("wood #2.png"), ["wood #2.png", "wood"]);
     }
 

@@ -11,10 +11,10 @@ use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
-use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb32FImage, RgbImage};
+use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Pixel, Rgb};
 
 use super::{
-    Cutout, Frame, Material, ObjectName, Scene, SceneOptions, Specular, Texture, TextureId,
+    Cutout, Frame, Material, ObjectName, Scene, SceneOptions, Specular, Texture, TextureId, Wrap,
     builtin, mtl_specular::MIRROR_EXPONENT, srgb_byte, whole::write_whole,
 };
 
@@ -92,10 +92,16 @@ impl MaterialLibrary {
         for (cutout, name) in scene.cutouts.iter().zip(&self.cutouts) {
             write(name, &encoded_cutout(cutout)?)?;
         }
-        let files = [self.textures.as_slice(), &self.cutouts];
+        let textures = scene.textures.iter().map(|texture| texture.wrap);
+        let cutouts = scene.cutouts.iter().map(|cutout| cutout.wrap);
+        let references = [
+            references(&self.textures, textures),
+            references(&self.cutouts, cutouts),
+        ];
+        let references = references.each_ref().map(Vec::as_slice);
         let texts = scene.materials.iter().zip(&self.materials);
         let texts: String = texts
-            .map(|(material, name)| material_text(material, name, files))
+            .map(|(material, name)| material_text(material, name, references))
             .collect();
         write(&self.name, texts.as_bytes())
     }
@@ -353,9 +359,47 @@ fn is_bright(texture: &Texture) -> bool {
     texture.pixels.iter().any(|pixel| pixel.max_element() > 1.0)
 }
 
+/// What texture statements say of these files: the options that let them go on beyond their edges, and the name. MTL has one
+/// word for both axes, and none for mirrored pictures, which are written with their image beside them.
+fn references(names: &[String], wraps: impl Iterator<Item = [Wrap; 2]>) -> Vec<String> {
+    let reference = |(name, wrap): (&String, [Wrap; 2])| {
+        let mut text = String::new();
+        if wrap.contains(&Wrap::Clamp) {
+            text += "-clamp on ";
+        }
+        if wrap.contains(&Wrap::Mirror) {
+            let [u, v] = repeats(wrap).map(|repeats| 1.0 / f64::from(repeats));
+            text += &format!("-s {u} {v} 1 ");
+        }
+        text + name
+    };
+    names.iter().zip(wraps).map(reference).collect()
+}
+
+/// How often a picture is written side by side, along u and v.
+fn repeats(wrap: [Wrap; 2]) -> [u32; 2] {
+    wrap.map(|wrap| if wrap == Wrap::Mirror { 2 } else { 1 })
+}
+
+/// A picture with its image beside it where it goes on mirrored; `pixel` gives its pixels by column and row.
+fn unfolded<P: Pixel>(
+    [width, height]: [u32; 2],
+    wrap: [Wrap; 2],
+    pixel: impl Fn(u32, u32) -> P,
+) -> ImageBuffer<P, Vec<P::Subpixel>> {
+    let [across, up] = repeats(wrap);
+    ImageBuffer::from_fn(across * width, up * height, |column, row| {
+        // The picture itself is below its image: v points up.
+        let above = i64::from(up * height - 1 - row);
+        let column = wrap[0].pixel(i64::from(column), width);
+        pixel(column, height - 1 - wrap[1].pixel(above, height))
+    })
+}
+
 /// A grey PNG: white is there.
 fn encoded_cutout(cutout: &Cutout) -> io::Result<Vec<u8>> {
-    let picture = GrayImage::from_fn(cutout.width, cutout.height, |column, row| {
+    let size = [cutout.width, cutout.height];
+    let picture = unfolded(size, cutout.wrap, |column, row| {
         Luma([u8::MAX * u8::from(cutout.has(column, row))])
     });
     let mut bytes = Cursor::new(Vec::new());
@@ -365,26 +409,24 @@ fn encoded_cutout(cutout: &Cutout) -> io::Result<Vec<u8>> {
 }
 
 fn encoded_texture(texture: &Texture) -> io::Result<Vec<u8>> {
-    let (width, height) = (texture.width, texture.height);
-    let (picture, format) = if is_bright(texture) {
-        let values = texture.pixels.iter().flat_map(|p| p.to_array()).collect();
-        let picture = Rgb32FImage::from_raw(width, height, values);
-        (picture.map(DynamicImage::ImageRgb32F), ImageFormat::OpenExr)
-    } else {
-        let codes = texture
-            .pixels
-            .iter()
-            .flat_map(|p| p.to_array().map(srgb_byte));
-        let picture = RgbImage::from_raw(width, height, codes.collect());
-        (picture.map(DynamicImage::ImageRgb8), ImageFormat::Png)
-    };
-    let wrong_size = || {
+    if !texture.is_consistent() {
         let message = format!("texture '{}' has too few pixels", texture.name);
-        io::Error::new(io::ErrorKind::InvalidData, message)
+        return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+    }
+    let size = [texture.width, texture.height];
+    let color = |column: u32, row: u32| {
+        texture.pixels[row as usize * texture.width as usize + column as usize].to_array()
+    };
+    let (picture, format) = if is_bright(texture) {
+        let picture = unfolded(size, texture.wrap, |column, row| Rgb(color(column, row)));
+        (DynamicImage::ImageRgb32F(picture), ImageFormat::OpenExr)
+    } else {
+        let code = |column, row| Rgb(color(column, row).map(srgb_byte));
+        let picture = unfolded(size, texture.wrap, code);
+        (DynamicImage::ImageRgb8(picture), ImageFormat::Png)
     };
     let mut bytes = Cursor::new(Vec::new());
     picture
-        .ok_or_else(wrong_size)?
         .write_to(&mut bytes, format)
         .map_err(io::Error::other)?;
     Ok(bytes.into_inner())

@@ -205,6 +205,7 @@ mod tests {
             pixels: (0..SIDE * SIDE)
                 .map(|index| Vec3::splat(picture(index % SIDE, index / SIDE)))
                 .collect(),
+            ..Texture::default()
         });
         builder.push_material(Material {
             emission_texture: Some(TextureId(0)),

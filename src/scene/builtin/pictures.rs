@@ -20,6 +20,7 @@ fn painted(name: &str, [width, height]: [u32; 2], colour: impl Fn(Vec2) -> Vec3)
         width,
         height,
         pixels,
+        ..Texture::default()
     }
 }
 

@@ -7,11 +7,11 @@ use super::buffers::Buffers;
 use super::document::{Document, Primitive};
 use super::materials::{Look, Materials, Slot};
 use super::nodes::Placed;
-use super::palette::Palettes;
 use super::printable;
+use crate::scene::palette::Palettes;
 use crate::scene::texcoords::near_origin;
 use crate::scene::warning::WarningLog;
-use crate::scene::{Face, SceneBuilder, WarningKind};
+use crate::scene::{Face, SceneBuilder, WarningKind, Wrap};
 
 /// Triangles of a scene at most: a small file may place a mesh any number of times. So many take some gigabytes.
 pub(super) const MAX_TRIANGLES: usize = 1 << 24;
@@ -232,7 +232,7 @@ impl<'a> Meshes<'a> {
 
     fn push_faces(&mut self, part: &Part, attributes: &Attributes, name: &str) {
         let mut vertices = Vertices::of(part);
-        let (mut is_beyond_edge, mut is_graded) = (false, false);
+        let mut is_graded = false;
         for triangle in 0..part.triangle_count() {
             let corners = part.corners(triangle);
             let known = corners
@@ -253,7 +253,6 @@ impl<'a> Meshes<'a> {
             let builder = &mut self.builder;
             let corners = numbers.map(|number| vertices.index(number, part, builder));
             let uv = attributes.uv(numbers);
-            is_beyond_edge |= attributes.is_beyond_edge(uv);
             if let Some(colors) = attributes.colors(numbers) {
                 is_graded |= colors[0] != colors[1] || colors[1] != colors[2];
                 let face = builder.faces.len();
@@ -261,25 +260,15 @@ impl<'a> Meshes<'a> {
             }
             builder.faces.push(Face {
                 corners,
-                texcoords: uv.and_then(near_origin),
+                texcoords: uv.and_then(|uv| near_origin(uv, attributes.wrap())),
                 normals: attributes.normals(numbers, part),
                 material: attributes.slot.id,
                 line: 0,
             });
         }
-        for (is_so, what) in [
-            (
-                is_beyond_edge,
-                "textures that end at their edges, or are mirrored there, are repeated beyond them on these meshes",
-            ),
-            (
-                is_graded,
-                "vertex colours are those of whole faces, the means of their corners, on these meshes",
-            ),
-        ] {
-            if is_so {
-                self.materials.remark(WarningKind::Unsupported, what, name);
-            }
+        if is_graded {
+            let what = "vertex colours are those of whole faces, the means of their corners, on these meshes";
+            self.materials.remark(WarningKind::Unsupported, what, name);
         }
     }
 }
@@ -431,9 +420,10 @@ impl Attributes<'_> {
         Some(uv)
     }
 
-    fn is_beyond_edge(&self, uv: Option<[DVec2; 3]>) -> bool {
-        let placed = self.slot.placement.zip(uv);
-        placed.is_some_and(|(placement, uv)| placement.is_beyond_edge(uv))
+    /// How the textures go on beyond their edges.
+    fn wrap(&self) -> [Wrap; 2] {
+        let placement = self.slot.placement;
+        placement.map_or([Wrap::Repeat; 2], |placement| placement.wrap)
     }
 
     fn colors(&self, vertices: [u32; 3]) -> Option<[Vec3; 3]> {

@@ -13,7 +13,6 @@ mod lights;
 mod materials;
 mod meshes;
 mod nodes;
-mod palette;
 mod pictures;
 mod placement;
 mod remarks;

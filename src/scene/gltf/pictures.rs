@@ -7,9 +7,10 @@ use image::{DynamicImage, Primitive};
 
 use super::buffers::Buffers;
 use super::document::{Document, Image, TextureInfo};
+use super::placement::Placement;
 use super::printable;
 use crate::scene::texture::{Role, decode_bytes};
-use crate::scene::{CutoutId, SceneBuilder, Texture, TextureId};
+use crate::scene::{CutoutId, SceneBuilder, Texture, TextureId, Wrap};
 
 /// Pixels of all textures together, as for OBJ files: 768 MiB. The next picture gets a quarter of what is left.
 const PIXEL_BUDGET: usize = 1 << 26;
@@ -67,7 +68,7 @@ enum Place {
 }
 
 /// A picture as one use of it reads it, or why that fails.
-type ReadPicture = (Use, Result<Shown, String>);
+type ReadPicture = ((Use, [Wrap; 2]), Result<Shown, String>);
 
 /// The pictures.
 #[derive(Debug)]
@@ -99,6 +100,7 @@ impl<'a> Pictures<'a> {
         buffers: &Buffers,
         builder: &mut SceneBuilder,
     ) -> (String, Result<Shown, String>) {
+        let wrap = Placement::of(self.document, info).wrap;
         let texture = self.document.textures.get(info.index);
         let Some(index) = texture.and_then(|texture| texture.source) else {
             let reason = "has no picture in PNG or JPEG; export it so";
@@ -112,17 +114,17 @@ impl<'a> Pictures<'a> {
         let place = self.place_of(image, index);
         let known = self.read.get(&place);
         if let Some((_, shown)) =
-            known.and_then(|known| known.iter().find(|(of, _)| *of == purpose))
+            known.and_then(|known| known.iter().find(|(of, _)| *of == (purpose, wrap)))
         {
             return (name, shown.clone());
         }
         let shown = if known.is_some_and(|known| known.len() >= MAX_USES) {
             Err("has too many uses".to_owned())
         } else {
-            self.decode(image, &name, purpose, buffers, builder)
+            self.decode(image, &name, (purpose, wrap), buffers, builder)
         };
         let uses = self.read.entry(place).or_default();
-        uses.push((purpose, shown.clone()));
+        uses.push(((purpose, wrap), shown.clone()));
         (name, shown)
     }
 
@@ -141,7 +143,7 @@ impl<'a> Pictures<'a> {
         &mut self,
         image: &Image,
         name: &str,
-        purpose: Use,
+        (purpose, wrap): (Use, [Wrap; 2]),
         buffers: &Buffers,
         builder: &mut SceneBuilder,
     ) -> Result<Shown, String> {
@@ -181,6 +183,7 @@ impl<'a> Pictures<'a> {
                 numbers,
             });
         };
+        let picture = picture.wrapped(wrap);
         let mut color = Vec3::ONE;
         let texture = picture.texture.map(|texture| {
             let texture = texture.reduced_to(self.pixel_budget / 4);

@@ -3,6 +3,7 @@
 use glam::{DAffine2, DMat2, DVec2};
 
 use super::document::{Document, TextureInfo};
+use crate::scene::Wrap;
 
 /// The way of a texture from the texture coordinates of a file to those of a scene, whose v points up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,8 +11,8 @@ pub(super) struct Placement {
     /// The set of texture coordinates.
     pub(super) set: u32,
     from_file: DAffine2,
-    /// Whether it does not repeat beyond its edges, by axis.
-    is_bounded: [bool; 2],
+    /// How it goes on beyond its edges, along u and v.
+    pub(super) wrap: [Wrap; 2],
 }
 
 impl Placement {
@@ -33,14 +34,18 @@ impl Placement {
         let upright = DAffine2::from_scale_angle_translation(DVec2::new(1.0, -1.0), 0.0, DVec2::Y);
         let texture = document.textures.get(info.index);
         let sampler = texture.and_then(|texture| document.samplers.get(texture.sampler?));
-        let is_bounded = sampler.map_or([false; 2], |sampler| {
-            [sampler.wrap_s, sampler.wrap_t].map(|wrap| wrap.is_some_and(|wrap| wrap != REPEAT))
+        let wrap = sampler.map_or([Wrap::Repeat; 2], |sampler| {
+            [sampler.wrap_s, sampler.wrap_t].map(|wrap| match wrap {
+                Some(CLAMP_TO_EDGE) => Wrap::Clamp,
+                Some(MIRRORED_REPEAT) => Wrap::Mirror,
+                _ => Wrap::Repeat,
+            })
         });
         let set = transform.and_then(|transform| transform.tex_coord);
         Self {
             set: set.unwrap_or(info.tex_coord),
             from_file: upright * turned,
-            is_bounded,
+            wrap,
         }
     }
 
@@ -49,21 +54,11 @@ impl Placement {
         self.from_file
             .transform_point2(DVec2::from_array(uv.map(f64::from)))
     }
-
-    /// Whether the texture shows itself there where the file has it end, or mirrored.
-    pub(super) fn is_beyond_edge(&self, uv: [DVec2; 3]) -> bool {
-        let is_outside = |at: f64| !(-TOLERANCE..=1.0 + TOLERANCE).contains(&at);
-        uv.iter().any(|uv| {
-            self.is_bounded[0] && is_outside(uv.x) || self.is_bounded[1] && is_outside(uv.y)
-        })
-    }
 }
 
-/// The number that the specification gives to repetition.
-const REPEAT: u32 = 10_497;
-
-/// Texture coordinates so little beyond an edge are rounded.
-const TOLERANCE: f64 = 1e-3;
+/// The numbers that the specification gives to what is not repetition.
+const CLAMP_TO_EDGE: u32 = 33_071;
+const MIRRORED_REPEAT: u32 = 33_648;
 
 #[cfg(test)]
 mod tests {
@@ -73,8 +68,9 @@ mod tests {
         let info = format!(
             r#"{{"index":0,"texCoord":1,"extensions":{{"KHR_texture_transform":{transform}}}}}"#
         );
-        let document =
-            serde_json::from_str(r#"{"textures":[{"sampler":0}],"samplers":[{"wrapS":33071}]}"#);
+        let document = serde_json::from_str(
+            r#"{"textures":[{"sampler":0}],"samplers":[{"wrapS":33071,"wrapT":33648}]}"#,
+        );
         Placement::of(&document.unwrap(), &serde_json::from_str(&info).unwrap())
     }
 
@@ -98,10 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_bounded_ends() {
-        let placement = placement("{}");
-        let at = |x, y| [DVec2::new(x, y); 3];
-        assert!(placement.is_beyond_edge(at(1.5, 0.5)));
-        assert!(!placement.is_beyond_edge(at(0.5, 1.5)) && !placement.is_beyond_edge(at(1.0, 0.0)));
+    fn samplers_say_how_textures_go_on() {
+        assert_eq!(placement("{}").wrap, [Wrap::Clamp, Wrap::Mirror]);
     }
 }

@@ -1,7 +1,7 @@
 //! Textures on the adapter: one group for each material with a texture, with gloss, or through which light passes, and group 0
 //! for all others.
 
-use std::{ops::Range, sync::Arc};
+use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use glam::Vec3;
 use wgpu::util::DeviceExt as _;
@@ -11,7 +11,7 @@ use super::{
     gloss::{GLOSS_VECTORS, gloss_vectors},
 };
 use crate::{
-    scene::{Appearance, Cutout, CutoutId, Material, Scene, Texture, TextureId, srgb_byte},
+    scene::{Appearance, Cutout, CutoutId, Material, Scene, Texture, TextureId, Wrap, srgb_byte},
     solver::DisplayMesh,
 };
 
@@ -68,9 +68,8 @@ pub(super) struct DrawRange {
 #[derive(Clone)]
 pub(super) struct DetailSet {
     layout: wgpu::BindGroupLayout,
-    /// One that looks along the slant, and one that does not.
-    slanted: wgpu::Sampler,
-    upright: wgpu::Sampler,
+    /// Those in use, by the places that they look at along a slant, and by how pictures go on beyond their edges.
+    samplers: HashMap<(u16, [Wrap; 2]), wgpu::Sampler>,
     /// Stands for textures that materials do not have.
     white: wgpu::TextureView,
     plain: wgpu::BindGroup,
@@ -129,32 +128,19 @@ impl DetailSet {
     /// Only the plain group.
     pub(super) fn new(gpu: &Gpu) -> Self {
         let layout = layout(&gpu.device);
-        let sampler = |anisotropy_clamp: u16| {
-            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("detail"),
-                address_mode_u: wgpu::AddressMode::Repeat,
-                address_mode_v: wgpu::AddressMode::Repeat,
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                anisotropy_clamp,
-                ..Default::default()
-            })
-        };
         let white = Texture {
             name: String::new(),
             width: 1,
             height: 1,
             pixels: vec![Vec3::ONE],
+            ..Texture::default()
         };
         let white = upload(gpu, &white).view;
-        let upright = sampler(1);
-        let plain = bind_group(gpu, &layout, &upright, [&white; 3], &Factors::default());
+        let sampler = sampler(gpu, 1, [Wrap::Repeat; 2]);
+        let plain = bind_group(gpu, &layout, &sampler, [&white; 3], &Factors::default());
         Self {
             layout,
-            // Floors are seen at a slant.
-            slanted: sampler(16),
-            upright,
+            samplers: HashMap::new(),
             white,
             plain,
             scene: None,
@@ -205,10 +191,8 @@ impl DetailSet {
         self.appearances = appearances.to_vec();
         self.own.clear();
         self.group_of = vec![0; scene.materials.len()];
-        let sampler = match self.is_tame {
-            true => &self.slanted,
-            false => &self.upright,
-        };
+        // Floors are seen at a slant.
+        let anisotropy = if self.is_tame { 16 } else { 1 };
         for (index, material) in scene.materials.iter().enumerate() {
             let textures = [material.reflectance_texture, material.emission_texture];
             let gloss = gloss_vectors(material);
@@ -238,6 +222,11 @@ impl DetailSet {
                 let factor = (colors[kind] * uploaded.scale).extend(1.0);
                 (views[kind], factors[kind]) = (uploaded.view.clone(), factor.to_array());
             }
+            let wrap = scene.wrap_of(material);
+            let sampler = self
+                .samplers
+                .entry((anisotropy, wrap))
+                .or_insert_with(|| sampler(gpu, anisotropy, wrap));
             self.own.push(OwnGroup {
                 bindings: bind_group(gpu, &self.layout, sampler, views.each_ref(), &factors),
                 look: Look::of(material),
@@ -287,6 +276,25 @@ impl DetailSet {
         let indices = order.iter().map(|&index| mesh.indices[index]).collect();
         (indices, ranges)
     }
+}
+
+/// A sampler that looks at so many places of a slanted pixel.
+fn sampler(gpu: &Gpu, anisotropy_clamp: u16, wrap: [Wrap; 2]) -> wgpu::Sampler {
+    let [address_mode_u, address_mode_v] = wrap.map(|wrap| match wrap {
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+        Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
+        Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+    });
+    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("detail"),
+        address_mode_u,
+        address_mode_v,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        anisotropy_clamp,
+        ..Default::default()
+    })
 }
 
 fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {

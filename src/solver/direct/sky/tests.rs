@@ -23,6 +23,7 @@ fn picture() -> Sky {
         width,
         height,
         pixels: (0..width * height).map(pixel).collect(),
+        ..Texture::default()
     };
     Sky::Picture(SkyPicture::new(
         Arc::new(texture),

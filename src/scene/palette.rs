@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::{Vec2, Vec3};
 
-use crate::scene::{MaterialId, SceneBuilder, Texture, TextureId};
+use super::{MaterialId, SceneBuilder, Texture, TextureId};
 
 /// Pixels in a row at most. Their middles must be told apart in single precision.
 const MOST_COLUMNS: usize = 4096;
@@ -61,6 +61,7 @@ impl Palettes {
                 width: width as u32,
                 height: height as u32,
                 pixels,
+                ..Texture::default()
             });
             sizes.insert(material, [width, height]);
         }
