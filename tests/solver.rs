@@ -436,6 +436,48 @@ fn a_step_that_is_cancelled_in_any_phase_can_be_repeated() {
 }
 
 #[test]
+fn the_light_of_a_step_is_finished_wherever_the_next_one_was_cancelled() {
+    let never = Cancel::default();
+    let after_a_step = || {
+        let mut solver = prepare(&scene("cornell"), SolveSettings::draft());
+        assert_eq!(solver.finish(&never), None, "there is no step yet");
+        solver.step(&never).unwrap();
+        solver
+    };
+    let mean = |solver: &Solver| mean_irradiance(solver.scene(), &solver.snapshot(), |_| true);
+    let mut expected = after_a_step();
+    let rough = mean(&expected);
+    let report = expected.finish(&never).unwrap();
+    assert!(report.step == 1 && !report.is_final);
+    let expected = mean(&expected);
+    assert!(rough != expected, "rays change the light");
+    let unfinished = [
+        Phase::Direct,
+        Phase::Refine,
+        Phase::Iterate,
+        Phase::Gather,
+        Phase::Display,
+    ];
+    for cancelled in unfinished {
+        let mut solver = after_a_step();
+        let cancel = Cancel::default();
+        let found = solver.step_in_phases(&cancel, &mut |phase, _| {
+            if phase == cancelled {
+                cancel.cancel();
+            }
+        });
+        assert!(found.is_none());
+        let report = solver.finish(&never).unwrap();
+        assert!(report.step == 1 && !report.is_final, "{cancelled:?}");
+        assert_presentable(&solver.snapshot());
+        let ratio = mean(&solver) / expected;
+        assert!((ratio - 1.0).abs() < 0.03, "{ratio} after {cancelled:?}");
+        let last = step_to_end(&mut solver, |_, _| ());
+        assert_eq!(last.step, 3);
+    }
+}
+
+#[test]
 fn a_step_tells_its_phases_in_order_with_the_rays_shot_so_far() {
     let cancel = Cancel::default();
     let mut solver = prepare(&scene("cornell"), SolveSettings::draft());

@@ -55,6 +55,8 @@ struct Script {
     relit: Mutex<Vec<f32>>,
     /// How often a rough light was worked out.
     finished: AtomicU32,
+    /// Time that finishing the light of a step takes unless cancelled.
+    finish_time: Duration,
     /// How often the light of a step was finished.
     finished_steps: AtomicU32,
     /// Emission that steppers were made for.
@@ -89,8 +91,15 @@ impl Stepper for FakeSolver {
         })
     }
 
-    fn finish(&mut self, _: &Cancel) -> Option<StepReport> {
+    fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
         self.script.finished_steps.fetch_add(1, Ordering::SeqCst);
+        let begin = Instant::now();
+        while begin.elapsed() < self.script.finish_time {
+            if cancel.is_cancelled() {
+                return None;
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
         Some(StepReport {
             step: self.step,
             ..StepReport::default()
@@ -576,6 +585,66 @@ fn stop_interrupts_a_step_and_keeps_the_light() {
     let events = wait_for(&worker, is_finished);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Requested)));
     assert!(worker.latest().is_some());
+}
+
+/// A worker that has done a step, is in the second one if `is_running`, and else rests.
+fn after_a_step(script: Script, is_running: bool) -> (Arc<Script>, WorkerHandle) {
+    let script = Arc::new(Script {
+        step_time: Duration::from_millis(100),
+        steps: 1_000,
+        ..script
+    });
+    let mut worker = worker(&script);
+    worker.start(triangle(), short(), one_thread());
+    wait_for(&worker, |event| matches!(event, Event::Stepped(_)));
+    if !is_running {
+        worker.pause();
+        wait_for(&worker, |event| *event == Event::Paused);
+    }
+    (script, worker)
+}
+
+#[test]
+fn stop_finishes_the_light_of_the_last_step() {
+    for is_running in [true, false] {
+        let (script, worker) = after_a_step(Script::default(), is_running);
+        worker.stop();
+        let events = wait_for(&worker, is_finished);
+        assert_eq!(events.last(), Some(&Event::Finished(StopReason::Requested)));
+        let finished = || script.finished_steps.load(Ordering::SeqCst);
+        assert_eq!(finished(), 1, "{events:?}");
+        let is_step = |event: &&Event| matches!(event, Event::Stepped(_));
+        assert!(events.iter().any(|event| is_step(&event)), "{events:?}");
+        // There is nothing more to finish, until another step is done.
+        worker.stop();
+        assert!(worker.next_event(Duration::from_millis(60)).is_none());
+        assert_eq!(finished(), 1);
+        worker.resume();
+        wait_for(&worker, |event| matches!(event, Event::Stepped(_)));
+        worker.stop();
+        wait_for(&worker, is_finished);
+        assert_eq!(finished(), 2);
+    }
+}
+
+#[test]
+fn stop_asked_a_second_time_ends_at_once() {
+    for is_running in [true, false] {
+        let script = Script {
+            finish_time: FOREVER,
+            ..Script::default()
+        };
+        let (script, worker) = after_a_step(script, is_running);
+        worker.stop();
+        let begin = Instant::now();
+        while script.finished_steps.load(Ordering::SeqCst) == 0 {
+            assert!(begin.elapsed() < PATIENCE, "nothing is finished");
+            thread::sleep(Duration::from_millis(1));
+        }
+        worker.stop();
+        let events = wait_for(&worker, is_finished);
+        assert_eq!(events.last(), Some(&Event::Finished(StopReason::Requested)));
+    }
 }
 
 #[test]

@@ -133,7 +133,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         &lighting,
     )?);
     interruption.ends_at_once(false);
-    let interrupted = interruption.flag;
+    let interrupted = interruption.flag.clone();
     let read_s = begin.elapsed().as_secs_f64();
     destinations.extend(arguments.lightmap.mesh(&scene.name));
     output::check_distinct(&destinations)?;
@@ -156,7 +156,7 @@ pub(super) fn solve(arguments: &SolveArguments) -> Result<Outcome> {
         arguments.setting_flags.settings(),
         arguments.run_flags.options(),
     );
-    let mut run = drain(&worker, &interrupted, arguments)?;
+    let mut run = drain(&worker, &interruption, arguments)?;
     if arguments.export_lamps && !run.snapshot.mesh.positions.is_empty() {
         run.lamps = light_by_lamp(&worker)?;
     }
@@ -322,10 +322,12 @@ fn writes_light(arguments: &SolveArguments) -> bool {
     arguments.export.is_some() || arguments.lightmap.is_wanted() || draws
 }
 
-/// Reacts to Ctrl+C and to a request of the system to end the program; a second one has the same effect.
+/// Reacts to Ctrl+C and to a request of the system to end the program.
 pub(super) struct Interruption {
     /// Set once it came.
     pub(super) flag: Arc<AtomicBool>,
+    /// Set once it came again.
+    again: Arc<AtomicBool>,
     at_once: Arc<AtomicBool>,
 }
 
@@ -333,11 +335,13 @@ impl Interruption {
     pub(super) fn listen() -> Result<Self> {
         let new = Self {
             flag: Arc::new(AtomicBool::new(false)),
+            again: Arc::new(AtomicBool::new(false)),
             at_once: Arc::new(AtomicBool::new(false)),
         };
-        let (flag, at_once) = (new.flag.clone(), new.at_once.clone());
+        let (flag, again) = (new.flag.clone(), new.again.clone());
+        let at_once = new.at_once.clone();
         ctrlc::set_handler(move || {
-            flag.store(true, Ordering::Relaxed);
+            again.store(flag.swap(true, Ordering::Relaxed), Ordering::Relaxed);
             if at_once.load(Ordering::Relaxed) {
                 output::say("error: interrupted while the scene was read; nothing was written");
                 std::process::exit(1);
@@ -384,21 +388,26 @@ fn worker(
 /// Follow the run to its end.
 fn drain(
     worker: &WorkerHandle,
-    interrupted: &AtomicBool,
+    interruption: &Interruption,
     arguments: &SolveArguments,
 ) -> Result<Run> {
     let mut progress = Progress::new(arguments.quiet);
     let (mut steps, mut prepare_s, mut times) = (Vec::new(), 0.0, (0.0, 0.0));
-    let mut is_stopping = false;
+    let mut interruptions = [&interruption.flag, &interruption.again]
+        .into_iter()
+        .peekable();
     let stop_reason = loop {
-        if interrupted.load(Ordering::Relaxed) {
+        if interruptions
+            .next_if(|came| came.load(Ordering::Relaxed))
+            .is_some()
+        {
             // The preparation is not waited for: nothing would come of it.
             if worker.latest().is_none() {
                 break StopReason::Requested;
             }
-            if !is_stopping {
-                worker.stop();
-                is_stopping = true;
+            worker.stop();
+            if !steps.is_empty() {
+                progress.say("finishing the light (Ctrl+C again to stop at once)".to_owned());
             }
         }
         match worker.next_event(POLL) {

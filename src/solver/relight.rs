@@ -16,9 +16,19 @@ use super::{
 use crate::{hierarchy::Tables, scene::Appearance, transport::Kernel};
 
 impl Solver {
-    /// Run the final gather on the existing links, as the last step does: for when no further step can end in time. The
-    /// report is that of the last step. `None` when cancelled; the light is then that of the last step.
+    /// Make the last step again as if it were the last one of all, with a final gather: for when no further step is to come.
+    /// Where none was cancelled since, its links and light are still there. The report is that of the last step. `None` when
+    /// cancelled, or before the first step; the snapshot is then that of the last step.
     pub fn finish(&mut self, cancel: &Cancel) -> Option<StepReport> {
+        if self.step == 0 {
+            return None;
+        }
+        if !self.relighting.is_whole() {
+            let mut report = self.advance_to(self.step, true, cancel, &mut |_, _| ())?;
+            report.is_final = false;
+            self.relighting.end_step(&report);
+            return Some(report);
+        }
         let scale = threshold_scale(self.step, self.settings.step_count());
         let found = self.final_gather(scale, cancel)?;
         let before = std::mem::replace(&mut self.vertex_factors, found);

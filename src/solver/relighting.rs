@@ -155,6 +155,11 @@ impl Relighting {
         Some(self.solved.as_ref()?.leaves_under(linked))
     }
 
+    /// Whether the last step was completed, so that links and samples match the mesh.
+    pub(super) fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
     /// Set whether all leaves have gathered the present light.
     pub(super) fn set_solved(&mut self, is_solved: bool) {
         self.is_solved = is_solved;

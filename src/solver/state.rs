@@ -186,9 +186,29 @@ impl Solver {
         cancel: &Cancel,
         begin: PhaseObserver<'_>,
     ) -> Option<StepReport> {
+        let (step, step_count) = (self.next_step(), self.settings.step_count());
+        let mut report = self.advance_to(step, step >= step_count, cancel, begin)?;
+        let estimated = report.estimated_error.filter(|_| report.is_final);
+        report.is_final = estimated.is_some_and(|error| self.ends_with(error, &mut report));
+        if report.is_final {
+            shown::note_diffused(&mut report);
+        }
+        self.relighting.end_step(&report);
+        Some(report)
+    }
+
+    /// Refine to a step and exchange light, with the final gather where it is the last, or full, or the error is reached; the
+    /// report says in `is_final` whether it was. `None` when cancelled.
+    pub(super) fn advance_to(
+        &mut self,
+        step: u32,
+        mut is_last: bool,
+        cancel: &Cancel,
+        begin: PhaseObserver<'_>,
+    ) -> Option<StepReport> {
         let step_count = self.settings.step_count();
         let mut report = StepReport {
-            step: self.next_step(),
+            step,
             ..StepReport::default()
         };
         let threshold_scale = threshold_scale(report.step, step_count);
@@ -223,7 +243,7 @@ impl Solver {
         cancel.proceed()?;
         // Where the error is small enough, this step is the last.
         self.vertex_factors.clear();
-        let mut is_last = self.is_full || report.step >= step_count;
+        is_last |= self.is_full;
         let mut estimated = None;
         if self.settings.error.is_some() && !is_last {
             let coarse = self.show_and_estimate(report.step, cancel, begin)?;
@@ -248,11 +268,7 @@ impl Solver {
         };
         report.estimated_error = Some(estimated);
         self.step = report.step;
-        report.is_final = is_last && self.ends_with(estimated, &mut report);
-        if report.is_final {
-            shown::note_diffused(&mut report);
-        }
-        self.relighting.end_step(&report);
+        report.is_final = is_last;
         Some(report)
     }
 

@@ -35,6 +35,11 @@ impl RunStatus {
         matches!(self, Self::Preparing | Self::Running)
     }
 
+    /// Whether it can be asked to end, or to end at once.
+    pub fn can_stop(&self) -> bool {
+        self.is_busy() || matches!(self, Self::Pausing | Self::Paused | Self::Stopping)
+    }
+
     /// Whether there is something to go on with.
     pub fn can_continue(&self) -> bool {
         match self {

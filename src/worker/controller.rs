@@ -274,6 +274,7 @@ impl Controller {
             }
         };
         run.stepper = Some(completed.stepper);
+        let is_step = matches!(completed.outcome, Outcome::Stepped(..));
         if matches!(completed.outcome, Outcome::Stepped(Some(_), _)) {
             run.last_step = Some(completed.spent);
         }
@@ -289,10 +290,13 @@ impl Controller {
                 self.outbox.publish(generation, snapshot);
                 let event = match report {
                     Some(report) => {
+                        run.is_unfinished = is_step && !report.is_final;
+                        run.is_finishing &= run.is_unfinished;
                         run.ask_again();
                         Event::Stepped(run.take_note(report))
                     }
                     None => {
+                        run.is_finishing &= is_step;
                         let (elapsed_s, solve_s) = run.times();
                         Event::Interrupted { elapsed_s, solve_s }
                     }
@@ -369,7 +373,8 @@ impl Controller {
                 }
             }
             Command::Stop => {
-                if matches!(self.aim(), Some(Aim::Run | Aim::Rest)) {
+                let is_finishing = self.run.as_ref().is_some_and(|run| run.is_finishing);
+                if matches!(self.aim(), Some(Aim::Run | Aim::Rest)) || is_finishing {
                     self.aim_at(Aim::End(StopReason::Requested));
                 }
             }
@@ -456,7 +461,13 @@ impl Controller {
     /// Rest or end: interrupt the step under way, and announce it once the pool has returned the solve.
     fn aim_at(&mut self, aim: Aim) {
         if let Some(run) = &mut self.run {
-            run.turn_to(aim);
+            match aim {
+                // Asked a second time it ends at once.
+                Aim::End(StopReason::Requested) if run.aim != aim => {
+                    run.end_with_finish(StopReason::Requested);
+                }
+                _ => run.turn_to(aim),
+            }
         }
         // A run that reaches a limit keeps what it has: without the first picture that would be nothing.
         let prepares = self
@@ -479,7 +490,8 @@ impl Controller {
     }
 
     fn announce_aim(&mut self) {
-        let Some(run) = self.run.as_mut().filter(|run| !run.announced) else {
+        let is_due = |run: &&mut Run| !run.announced && !run.is_finishing;
+        let Some(run) = self.run.as_mut().filter(is_due) else {
             return;
         };
         run.announced = true;

@@ -169,7 +169,8 @@ impl WorkerHandle {
         self.send(Command::Continue);
     }
 
-    /// End the run and keep its light. [`Event::Finished`] announces the end.
+    /// End the run and keep its light. Where a step is done, its light is finished first, which takes about as long as that
+    /// step; asked a second time, it ends at once. [`Event::Finished`] announces the end.
     pub fn stop(&self) {
         self.send(Command::Stop);
     }

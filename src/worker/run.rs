@@ -73,6 +73,10 @@ pub(super) struct Run {
     pub solving: Duration,
     /// Running time and time spent, in seconds, at the end of the last step.
     last_times: (f64, f64),
+    /// Whether the light of the last step can still be made better over its links.
+    pub is_unfinished: bool,
+    /// Whether that is to be done, or is being done, before the aim counts as reached.
+    pub is_finishing: bool,
     /// Time that the last step took, until its light is finished or another step begins.
     pub last_step: Option<Duration>,
 }
@@ -100,6 +104,8 @@ impl Run {
             before: Duration::ZERO,
             solving: Duration::ZERO,
             last_times: (0.0, 0.0),
+            is_unfinished: false,
+            is_finishing: false,
             last_step: None,
         }
     }
@@ -107,7 +113,8 @@ impl Run {
     /// Whether there is a task for the solve, which is not in the pool.
     pub(super) fn has_task(&self) -> bool {
         self.aim == Aim::Run
-            || ((self.is_asked
+            || ((self.is_finishing
+                || self.is_asked
                 || self.is_asked_by_lamp
                 || self.appearances_changed
                 || self.is_rough)
@@ -158,15 +165,15 @@ impl Run {
                 self.is_asked = false;
                 Task::Inspect(stepper, self.subjects.clone())
             }
+            Some(stepper) if self.is_finishing || self.is_last_in_time() => {
+                self.last_step = None;
+                Task::Finish(stepper, cancel)
+            }
             Some(stepper) if std::mem::take(&mut self.is_rough) && self.aim != Aim::Run => {
                 Task::FinishRelighting(stepper, cancel)
             }
             Some(stepper) if self.aim != Aim::Run && std::mem::take(&mut self.is_asked_by_lamp) => {
                 Task::LightByLamp(stepper, cancel)
-            }
-            Some(stepper) if self.is_last_in_time() => {
-                self.last_step = None;
-                Task::Finish(stepper, cancel)
             }
             Some(mut stepper) => {
                 self.last_step = None;
@@ -195,6 +202,7 @@ impl Run {
         self.since = Instant::now();
         self.aim = aim;
         self.announced = false;
+        self.is_finishing = false;
     }
 
     /// Time since the start, without that in which nothing was to be done.
@@ -232,6 +240,12 @@ impl Run {
     pub(super) fn dated(&self, mut report: StepReport) -> StepReport {
         (report.elapsed_s, report.solve_s) = self.last_times;
         report
+    }
+
+    /// End the run, but finish the light of its last step first if that can be made better.
+    pub(super) fn end_with_finish(&mut self, reason: StopReason) {
+        self.turn_to(Aim::End(reason));
+        self.is_finishing = self.is_unfinished;
     }
 
     /// Complete the report of a step, and end the run if it was the last.

@@ -109,6 +109,8 @@ fn drain(
     let (mut reports, mut is_stopping) = (Vec::new(), false);
     loop {
         if session.is_interrupted() && !is_stopping {
+            // At once: nothing of the run is kept.
+            worker.stop();
             worker.stop();
             is_stopping = true;
         }

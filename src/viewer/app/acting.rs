@@ -302,7 +302,7 @@ impl App {
         if self.state.loading.take().is_some() {
             let text = "reading was cancelled";
             self.state.messages.push(Severity::Note, text);
-        } else if status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused) {
+        } else if status.can_stop() {
             *status = RunStatus::Stopping;
             self.worker.stop();
         } else {

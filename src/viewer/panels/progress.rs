@@ -106,11 +106,10 @@ fn buttons_ui(ui: &mut egui::Ui, status: &RunStatus, actions: &mut Vec<Action>) 
                 Action::PauseContinue,
             );
         }
-        let can_stop = status.is_busy() || matches!(status, RunStatus::Pausing | RunStatus::Paused);
         button(
             "Stop",
-            can_stop,
-            "End the run and keep its light (Esc)",
+            status.can_stop(),
+            "End the run and finish the light that there is; once more to end at once (Esc)",
             Action::Stop,
         );
         button(
