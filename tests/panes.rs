@@ -261,6 +261,37 @@ fn radiance_is_the_same_everywhere_where_all_surfaces_keep_it() {
     }
 }
 
+/// Solve, and compare with path tracing: the ratio of energies and the trimmed error are within these tolerances.
+fn assert_agrees(scene: &Arc<Scene>, [energy, trimmed]: [f64; 2]) {
+    let (solver, _) = solve(scene, SolveSettings::normal());
+    let settings = PathSettings {
+        point_count: 2000,
+        samples_per_pass: 256,
+        seed: 3,
+    };
+    let rays = Arc::new(RayTree::new(scene));
+    let mut tracer = PathTracer::new(scene.clone(), rays, settings);
+    assert!(tracer.pass(&|| false));
+    let snapshot = solver.snapshot();
+    let lookup = MeshLookup::new(scene, &snapshot.mesh);
+    let points = tracer.result().points;
+    let measured = lookup.radiance(&snapshot.light, &points);
+    let error = measure_error(&measured, &points).unwrap();
+    let ratio = error.energy_ratio.unwrap();
+    assert!((ratio - 1.0).abs() < energy, "{error:?}");
+    assert!(error.relative_rms_trimmed < trimmed, "{error:?}");
+}
+
+/// The inner faces of a box from the origin.
+fn closed_room(builder: &mut SceneBuilder, size: f64, wall: MaterialId) {
+    let sides = [DVec3::X, DVec3::Y, DVec3::Z];
+    for axis in 0..3 {
+        let [u, v] = [sides[(axis + 1) % 3] * size, sides[(axis + 2) % 3] * size];
+        rectangle(builder, DVec3::ZERO, [u, v], wall, 1.0);
+        rectangle(builder, sides[axis] * size, [v, u], wall, 1.0);
+    }
+}
+
 #[test]
 fn light_among_leaves_agrees_with_path_tracing() {
     let mut builder = SceneBuilder::default();
@@ -272,12 +303,7 @@ fn light_among_leaves_agrees_with_path_tracing() {
     let mut red = glass(0.3, Vec3::new(1.0, 0.4, 0.3));
     red.reflectance = Vec3::splat(0.3);
     let red = builder.push_material(red);
-    let sides = [DVec3::X, DVec3::Y, DVec3::Z];
-    for axis in 0..3 {
-        let [u, v] = [sides[(axis + 1) % 3] * 4.0, sides[(axis + 2) % 3] * 4.0];
-        rectangle(&mut builder, DVec3::ZERO, [u, v], wall, 1.0);
-        rectangle(&mut builder, sides[axis] * 4.0, [v, u], wall, 1.0);
-    }
+    closed_room(&mut builder, 4.0, wall);
     let lamp_sides = [DVec3::Y, DVec3::X];
     rectangle(
         &mut builder,
@@ -306,24 +332,34 @@ fn light_among_leaves_agrees_with_path_tracing() {
         red,
         1.0,
     );
-    let scene = finish(builder, Sides::Auto);
-    let (solver, _) = solve(&scene, SolveSettings::normal());
-    let settings = PathSettings {
-        point_count: 2000,
-        samples_per_pass: 256,
-        seed: 3,
-    };
-    let rays = Arc::new(RayTree::new(&scene));
-    let mut tracer = PathTracer::new(scene.clone(), rays, settings);
-    assert!(tracer.pass(&|| false));
-    let snapshot = solver.snapshot();
-    let lookup = MeshLookup::new(&scene, &snapshot.mesh);
-    let points = tracer.result().points;
-    let measured = lookup.radiance(&snapshot.light, &points);
-    let error = measure_error(&measured, &points).unwrap();
-    assert!(
-        (error.energy_ratio.unwrap() - 1.0).abs() < 0.02,
-        "{error:?}"
-    );
-    assert!(error.relative_rms_trimmed < 0.05, "{error:?}");
+    assert_agrees(&finish(builder, Sides::Auto), [0.02, 0.05]);
+}
+
+/// Rays through both walls of a coloured box have tints that add to more than 1: they must not fill more than the whole
+/// hemisphere.
+#[test]
+fn a_coloured_box_in_a_closed_room_takes_what_it_absorbs_and_no_more() {
+    for filter in [Vec3::new(0.9, 0.4, 0.4), Vec3::new(1.0, 0.02, 0.02)] {
+        let mut builder = SceneBuilder::default();
+        let wall = builder.push_material(Material::plain("wall", Vec3::splat(0.6), Vec3::ZERO));
+        let lamp = builder.push_material(Material::plain("lamp", Vec3::ZERO, Vec3::splat(5.0)));
+        let coloured = builder.push_material(glass(0.0, filter));
+        closed_room(&mut builder, 4.0, wall);
+        let lamp_sides = [DVec3::Y, DVec3::X];
+        rectangle(
+            &mut builder,
+            DVec3::new(1.5, 1.5, 3.9),
+            lamp_sides,
+            lamp,
+            1.0,
+        );
+        let sides = [DVec3::X, DVec3::Y, DVec3::Z];
+        let origin = DVec3::new(1.2, 1.2, 0.4);
+        for axis in 0..3 {
+            let [u, v] = [sides[(axis + 1) % 3], sides[(axis + 2) % 3]];
+            rectangle(&mut builder, origin, [v, u], coloured, 1.0);
+            rectangle(&mut builder, origin + sides[axis], [u, v], coloured, 1.0);
+        }
+        assert_agrees(&finish(builder, Sides::Auto), [0.02, 0.05]);
+    }
 }

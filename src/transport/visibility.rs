@@ -343,7 +343,8 @@ impl PairSampler<'_> {
                 met += end.tint.element_sum() / 3.0;
             }
         }
-        met / ray_count.max(1) as f32
+        // What coloured panes make of single rays may add to more.
+        (met / ray_count.max(1) as f32).min(1.0)
     }
 
     /// The end of a ray from a receiver, behind the mirrors of the image; `None` where it misses them.

@@ -61,7 +61,9 @@ const ENCLOSED_RAYS: f32 = 512.0;
 struct Met {
     /// Rays that met a lit side.
     hits: f32,
-    /// Rays that met anything but the inside of a solid.
+    /// The same rays, each with its tint: 1 on average, but what coloured panes make of single rays may add to more.
+    tinted: f32,
+    /// Rays that met anything but the inside of a solid, each with its tint.
     blocked: f32,
     /// Rays that began outside solids.
     rays: f32,
@@ -70,14 +72,19 @@ struct Met {
 }
 
 impl Met {
+    /// Hits with their tints, no more than rays.
+    fn filled(self) -> f32 {
+        self.tinted.min(self.rays)
+    }
+
     /// Share of hits, with half a hit and half a miss added, so that no finite number of rays gives 0 or 1.
     fn share(self) -> f32 {
-        (self.hits + 0.5) / (self.rays + 1.0)
+        (self.filled() + 0.5) / (self.rays + 1.0)
     }
 
     /// Of the rays that met something, the part that met a lit side, with one more that has the result of `around`.
     fn lit(self, around: f32) -> f32 {
-        ((self.hits + around) / (self.blocked + 1.0)).min(1.0)
+        ((self.tinted + around) / (self.blocked + 1.0)).min(1.0)
     }
 
     /// Standard error of the share for this many rays.
@@ -97,7 +104,7 @@ impl Met {
             self.rays
         };
         // One more ray has the mean result of the neighbourhood.
-        let share = (self.hits + around.share()) / (self.rays + 1.0);
+        let share = (self.filled() + around.share()) / (self.rays + 1.0);
         let lit = self.lit(around.lit(1.0));
         HemisphereCoverage::estimated(share, self.deviation(rays), lit)
     }
@@ -106,6 +113,7 @@ impl Met {
     fn and(self, other: Self) -> Self {
         Self {
             hits: self.hits + other.hits,
+            tinted: self.tinted + other.tinted,
             blocked: self.blocked + other.blocked,
             rays: self.rays + other.rays,
             within: self.within + other.within,
@@ -338,7 +346,8 @@ impl Prober<'_> {
             if hit.is_some() && !is_within {
                 let tint = self.rays.tint(origin, direction, start, hit).element_sum() / 3.0;
                 met.blocked += tint;
-                met.hits += if is_lit { tint } else { 0.0 };
+                met.tinted += if is_lit { tint } else { 0.0 };
+                met.hits += f32::from(u8::from(is_lit));
             }
             if is_within {
                 met.within += 1.0;

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use super::*;
 use crate::{
@@ -139,4 +139,22 @@ fn small_elements_under_a_box_count_as_inside_it_once_their_rays_tell_so() {
         }
     }
     assert!(inside > 30, "{inside}");
+}
+
+#[test]
+fn tints_of_more_than_one_fill_no_more_than_a_hemisphere() {
+    let all = Met {
+        hits: 30.0,
+        tinted: 40.0,
+        blocked: 44.0,
+        rays: 31.0,
+        within: 0.0,
+    };
+    let coverage = all.coverage(all, 1);
+    assert!(coverage.share > 0.9 && coverage.share < 1.0, "{coverage:?}");
+    let factor = coverage.factor_for(Vec4::new(0.5, 0.5, 0.5, 0.8), (1.0, 0.8));
+    assert!(factor.is_finite() && factor > 0.0, "{factor}");
+    let mut pooled_coverage = Vec::new();
+    pooled(&[all; 64], Met::default(), 1, &mut pooled_coverage);
+    assert!(!pooled_coverage.contains(&HemisphereCoverage::ENCLOSED));
 }
