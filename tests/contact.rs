@@ -198,3 +198,33 @@ fn what_lies_within_fine_solids_takes_no_light_from_the_room_about_them() {
     assert_close(mean, expected, 0.025, "mean");
     assert!(f64::from(most) < 1.025 * expected, "{most} of {expected}");
 }
+
+/// Elements that lie both behind a cabinet and beside it would send light into the gap behind it.
+#[test]
+fn furniture_just_before_the_walls_takes_no_more_light_than_at_the_walls() {
+    let above = |gap: f64| {
+        let mut builder = SceneBuilder::default();
+        let wall = Material::plain("wall", Vec3::splat(0.8), Vec3::ZERO);
+        let lamp = Material::plain("lamp", Vec3::ZERO, Vec3::splat(20.0));
+        let [wall, lamp] = [wall, lamp].map(|material| builder.push_material(material));
+        let room = [DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0)];
+        cuboid(&mut builder, room[0], room[1], true, wall);
+        for [low, high] in [
+            [DVec3::new(gap, gap, 0.5), DVec3::new(0.5, 2.2, 1.5)],
+            [DVec3::new(1.5, gap, gap), DVec3::new(2.5, 0.9, 0.6)],
+            [DVec3::new(gap, 1.5, 2.5), DVec3::new(0.3, 1.53, 3.5)],
+        ] {
+            cuboid(&mut builder, low, high, false, wall);
+        }
+        let corner = DVec3::new(1.5, 2.99, 1.5);
+        rectangle(&mut builder, corner, [DVec3::X, DVec3::Z], lamp);
+        let snapshot = solved(builder, Sides::One, SolveSettings::normal());
+        let (mean, ..) = mean_irradiance(&snapshot, |at, normal| at.y > 2.995 && normal.y < -0.9);
+        mean
+    };
+    let expected = above(0.0);
+    for gap in [0.001, 0.01] {
+        let ratio = above(gap) / expected;
+        assert!((ratio - 1.0).abs() < 0.012, "{ratio} at {gap}");
+    }
+}

@@ -36,6 +36,19 @@ const MOST_CORNERS: usize = 512;
 /// crosses everything. Fewer leave rooms of many sheets uncut, more let what crosses outweigh the scene.
 const MOST_LINES_IN_ALL: usize = 1 << 11;
 
+/// Widest gap between two surfaces that counts as closed, as a part of the square root of the scene's area: 2 cm in a room of
+/// 100 m². Faces are cut along what ends so near before them, too, and no light is looked for deep within such gaps. Larger
+/// takes light from gaps that have some; smaller leaves elements both behind furniture that stands close to a wall and beside
+/// it, and light is lost behind it (three pieces 1 cm before the walls of a room: 1.2 % of it).
+pub const CLOSED_GAP: f64 = 2e-3;
+
+/// Least length of an edge by which a face before which it ends is cut, in widths of the gap. Smaller cuts by small things,
+/// into slivers (`gallery` at `normal` with 1: an error of 2.2 % instead of 1.8 %); larger leaves gaps behind furniture.
+const LEAST_ASPECT: f64 = 32.0;
+
+/// Cosine of the angle up to which two triangles are one flat face.
+const FLAT_COSINE: f64 = 0.999;
+
 /// Points nearer than this are one place, frame units: half of the distance that rays keep from their ends.
 const SAME_PLACE: f64 = 5e-5;
 
@@ -133,12 +146,14 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
         })
         .collect();
     cutters.sort_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.2.cmp(&b.2)));
+    let near = CLOSED_GAP * whole.sqrt();
+    let outlines = Outlines::new(scene, cutters.iter().map(|&(.., index)| index));
     let lines_on = |&(min, max, index): &(Vec3, Vec3, usize)| {
         let height = 2.0 * areas[index] / squares[index].sqrt();
         if squares[index] <= LEAST_CUT * whole || height * NEEDLE < squares[index].sqrt() {
             return None;
         }
-        let slack = tolerance(min.abs().max(max.abs()).as_dvec3()) as f32;
+        let slack = tolerance(min.abs().max(max.abs()).as_dvec3()).max(near) as f32;
         let (min, max) = (min - slack, max + slack);
         let last = cutters.partition_point(|other| other.0.x <= max.x);
         let own = corners(index);
@@ -149,9 +164,14 @@ fn lines(scene: &Scene) -> BTreeMap<usize, Vec<Line>> {
                 continue;
             }
             let line = crossing(own, corners(other));
+            let before = line.is_none().then(|| {
+                let sides = scene.triangles[index].two_sided;
+                ends_before(own, corners(other), outlines.of(scene, other), near, sides)
+            });
+            let before = before.into_iter().flatten();
             // Along an edge there is nothing to cut.
             let is_wanted = |[(_, a), (_, b)]: &Line| a.edges() & b.edges() == 0;
-            found.extend(line.filter(is_wanted));
+            found.extend(line.into_iter().chain(before).filter(is_wanted));
         }
         found.sort_by(|a, b| squared_length(b).total_cmp(&squared_length(a)));
         found.truncate(MOST_LINES);
@@ -222,6 +242,70 @@ fn crossing(first: [DVec3; 3], second: [DVec3; 3]) -> Option<Line> {
         (other_to.place, place_on(first, other_to.place))
     };
     (end.0.dot(along) - start.0.dot(along) > 2.0 * slack).then_some([start, end])
+}
+
+/// The edges of triangles that are no seams within a flat face.
+struct Outlines {
+    /// By edge: the normals of its triangles.
+    normals: HashMap<EdgeKey, Vec<Vec3>>,
+}
+
+impl Outlines {
+    /// Of some triangles.
+    fn new(scene: &Scene, triangles: impl Iterator<Item = usize>) -> Self {
+        let mut normals: HashMap<EdgeKey, Vec<Vec3>> = HashMap::new();
+        for index in triangles {
+            let normal = scene.surfaces[index].area_vector.normalize_or_zero();
+            for key in edges_of(scene.triangles[index].corners) {
+                normals.entry(key).or_default().push(normal);
+            }
+        }
+        Self { normals }
+    }
+
+    /// By edge of a triangle: whether it is part of an outline.
+    fn of(&self, scene: &Scene, index: usize) -> [bool; 3] {
+        let own = scene.surfaces[index].area_vector.normalize_or_zero();
+        edges_of(scene.triangles[index].corners).map(|key| {
+            let is_along = |normal: &&Vec3| f64::from(normal.dot(own).abs()) > FLAT_COSINE;
+            let all = self.normals.get(&key).into_iter().flatten();
+            all.filter(is_along).count() < 2
+        })
+    }
+}
+
+/// Lines on the first of two triangles under edges of the second that end before it, nearer than a distance.
+fn ends_before(
+    first: [DVec3; 3],
+    second: [DVec3; 3],
+    is_outline: [bool; 3],
+    near: f64,
+    is_two_sided: bool,
+) -> impl Iterator<Item = Line> {
+    let [a, b, c] = first;
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    let heights = second.map(|corner| (corner - a).dot(normal));
+    let is_before = move |corner: usize| {
+        let height = heights[corner]
+            * if is_two_sided {
+                heights[corner].signum()
+            } else {
+                1.0
+            };
+        height > tolerance(second[corner]) && height <= near
+    };
+    (0..3)
+        .map(|edge| (edge, (edge + 1) % 3))
+        .filter(move |&(from, to)| is_outline[from] && is_before(from) && is_before(to))
+        .filter(move |&(from, to)| {
+            let height = heights[from].abs().max(heights[to].abs());
+            height * LEAST_ASPECT <= second[from].distance(second[to])
+        })
+        .filter_map(move |(from, to)| {
+            let [from, to] = [from, to].map(|corner| second[corner] - normal * heights[corner]);
+            // A triangle that stands on the line.
+            crossing(first, [from, to, from + normal * from.distance(to)])
+        })
 }
 
 /// The two points of the outline of a triangle that lie in a plane, given by a point and its unit normal.

@@ -76,6 +76,7 @@ pub use appearance::Appearance;
 pub use bsdf::{Gloss, LobeMoments, LobeValue, Specular, reflected, reflected_by_pane, refracted};
 pub use builder::{BuildError, Face, ObjectName, SceneBuilder, Source};
 pub use color::{LUMINANCE, linear_from_srgb, luminance, srgb_byte, srgb_from_linear};
+pub use crossings::CLOSED_GAP;
 pub use cutout::{Cutout, SeeThrough};
 pub use edges::{DisjointSets, HalfEdge, half_edges};
 pub use environment::{Environment, Sky, SkyPicture, SkySample, Sun};

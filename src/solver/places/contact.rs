@@ -1,7 +1,7 @@
 //! Contacts: where one object stands on another or reaches into it.
 //!
-//! A contact element is one that lies partly inside a solid or behind a wall: its part inside gets no light, and is not
-//! visible. Its mean would be too dark beside the object, so it is divided until it is small, and then takes the light
+//! A contact element is one that lies partly inside a solid, behind a wall or in a gap that is closed but for its edges, as
+//! between a cabinet and the wall behind it: this part gets no light, and is not visible. Its mean would be too dark beside the object, so it is divided until it is small, and then takes the light
 //! of its corners outside.
 
 use glam::Vec3;
@@ -11,7 +11,7 @@ use super::receivers::inset;
 use crate::{
     geometry::RayTree,
     hierarchy::{Element, Hierarchy},
-    scene::{Scene, TriangleId},
+    scene::{CLOSED_GAP, Scene, TriangleId},
     solver::{Cancel, limits::Limits},
 };
 
@@ -35,6 +35,13 @@ const PROBES: [[f32; 2]; 8] = [
 
 /// Tangents of the rays that count the solids about a point: along no edge of usual scenes.
 const SOLID_PROBES: [[f32; 2]; 3] = [[0.173, 0.291], [-0.419, 0.137], [0.083, -0.531]];
+
+/// Tangents of the rays that look whether a gap is closed for far around. Smaller, and low rooms count as gaps; larger,
+/// and light is lost from elements that reach far into them.
+const GAP_PROBES: [[f32; 2]; 4] = [[8.0, 0.7], [-0.7, 8.0], [-8.0, -0.7], [0.7, -8.0]];
+
+/// Cosine of the angle within which two surfaces count as parallel.
+const PARALLEL_COSINE: f32 = 0.9;
 
 /// Number of the first rays of [`PROBES`]. Fewer miss contacts; more cost rays everywhere.
 const FIRST_PROBES: usize = 4;
@@ -112,7 +119,8 @@ pub(crate) fn probe_contacts(
     Some(ray_count)
 }
 
-/// Find which of some leaves lie inside solids or behind walls. Returns the rays shot; `None` when cancelled.
+/// Find which of some leaves lie inside solids, behind walls or in closed gaps. Returns the rays shot; `None` when
+/// cancelled.
 fn probe_leaves(
     scene: &Scene,
     hierarchy: &mut Hierarchy,
@@ -121,14 +129,18 @@ fn probe_leaves(
     cancel: &Cancel,
 ) -> Option<u64> {
     let mut triangles = scene.triangles.iter();
-    let solids = triangles
-        .any(|triangle| triangle.bounds_solid)
-        .then_some(scene);
+    let prober = Prober {
+        scene,
+        has_solids: triangles.any(|triangle| triangle.bounds_solid),
+        rays,
+        hierarchy,
+        gap: (CLOSED_GAP * hierarchy.importance.area.sqrt()) as f32,
+    };
     let probed: Vec<(u8, u64)> = leaves
         .par_iter()
         .map(|&leaf| match cancel.is_cancelled() {
             true => (0, 0),
-            false => probe(solids, rays, hierarchy, leaf),
+            false => prober.probe(leaf),
         })
         .collect();
     cancel.proceed()?;
@@ -172,33 +184,100 @@ fn least_contact(hierarchy: &Hierarchy, limits: Limits) -> f32 {
     (root * root * hierarchy.importance.area as f32).max(limits.min_area)
 }
 
-/// The corners of an element, and its centroid, that lie inside a solid or behind a wall, as bits of
-/// [`Element::inside_solid`]; and the rays shot. `scene` is `None` if it has no solids.
-fn probe(
-    scene: Option<&Scene>,
-    rays: &RayTree,
-    hierarchy: &Hierarchy,
-    element: usize,
-) -> (u8, u64) {
-    if rays.is_clear() {
-        return (0, 0);
-    }
-    let (mut inside_solid, mut shot) = (0, 0);
-    for (place, point) in places(hierarchy, element).into_iter().enumerate() {
-        let in_solid = scene.map_or((false, 0), |scene| {
-            is_in_solid(scene, rays, hierarchy, element, point)
-        });
-        let (is_inside, count) = match in_solid {
-            (true, count) => (true, count),
-            (false, count) => {
-                let (is_behind, more) = is_behind_wall(rays, hierarchy, element, point);
-                (is_behind, count + more)
+/// Looks for places without light.
+struct Prober<'a> {
+    scene: &'a Scene,
+    has_solids: bool,
+    rays: &'a RayTree,
+    hierarchy: &'a Hierarchy,
+    /// Width of the gaps that count as closed, frame units.
+    gap: f32,
+}
+
+impl Prober<'_> {
+    /// The corners of an element, and its centroid, that lie inside a solid, behind a wall or in a closed gap, as bits of
+    /// [`Element::inside_solid`]; and the rays shot.
+    fn probe(&self, element: usize) -> (u8, u64) {
+        if self.rays.is_clear() {
+            return (0, 0);
+        }
+        let (mut inside_solid, mut shot) = (0, 0);
+        for (place, point) in places(self.hierarchy, element).into_iter().enumerate() {
+            let mut is_dark = false;
+            let looks = [Self::is_in_solid, Self::is_behind_wall, Self::is_in_gap];
+            for look in looks {
+                if !is_dark {
+                    let (found, count) = look(self, element, point);
+                    (is_dark, shot) = (found, shot + count);
+                }
             }
-        };
-        inside_solid |= u8::from(is_inside) << place;
-        shot += count;
+            inside_solid |= u8::from(is_dark) << place;
+        }
+        (inside_solid, shot)
     }
-    (inside_solid, shot)
+
+    /// Whether a point of an element lies inside a solid of the scene, by two of three rays, since a ray may slip through
+    /// an edge; and the rays shot.
+    fn is_in_solid(&self, element: usize, point: Vec3) -> (bool, u64) {
+        if !self.has_solids {
+            return (false, 0);
+        }
+        let patch = self.hierarchy.patch_of(element);
+        let is_left = |tangents| {
+            let direction = tilted(patch.normal, tangents);
+            let bounds = |triangle: TriangleId| self.scene.triangles[triangle.index()].bounds_solid;
+            let start = Some(patch.triangle);
+            self.rays.solids_left(point, direction, start, bounds) > 0
+        };
+        let [first, second, third] = SOLID_PROBES;
+        if is_left(first) {
+            (is_left(second) || is_left(third), 3)
+        } else {
+            (false, 1)
+        }
+    }
+
+    /// See [`is_behind_wall`].
+    fn is_behind_wall(&self, element: usize, point: Vec3) -> (bool, u64) {
+        is_behind_wall(self.rays, self.hierarchy, element, point)
+    }
+
+    /// Whether the side of a triangle that a ray meets has no light of its own; backs never have.
+    fn is_dark(&self, triangle: TriangleId, direction: Vec3) -> bool {
+        let met = self.hierarchy.side_met(triangle, direction);
+        met.is_none_or(|patch| self.hierarchy.patches[patch].emission == Vec3::ZERO)
+    }
+
+    /// Whether a point of an element lies in a gap that is closed far around: something without light of its own stands
+    /// parallel before it. And the rays shot.
+    fn is_in_gap(&self, element: usize, point: Vec3) -> (bool, u64) {
+        let patch = self.hierarchy.patch_of(element);
+        if patch.emission != Vec3::ZERO {
+            return (false, 0);
+        }
+        let start = Some(patch.triangle);
+        let across = point + patch.normal * self.gap;
+        if !self.rays.occluded(point, across, [start, None]) {
+            return (false, 1);
+        }
+        // The width of the gap in a direction, where it is closed there.
+        let width = |tangents: [f32; 2]| {
+            let direction = tilted(patch.normal, tangents);
+            let hit = self.rays.closest(point, direction, start)?;
+            let surface = &self.scene.surfaces[hit.triangle.index()];
+            let normal = surface.area_vector.normalize_or_zero();
+            let is_closed = normal.dot(patch.normal).abs() > PARALLEL_COSINE
+                && self.is_dark(hit.triangle, direction)
+                && !self.rays.is_see_through(hit.triangle);
+            is_closed.then_some(hit.distance * direction.dot(patch.normal))
+        };
+        let Some(before) = width([0.0, 0.0]).filter(|&width| width <= self.gap) else {
+            return (false, 2);
+        };
+        let is_closed = |tangents: &[f32; 2]| width(*tangents).is_some_and(|w| w < 2.0 * before);
+        let count = 2 + GAP_PROBES.len() as u64;
+        (GAP_PROBES.iter().all(is_closed), count)
+    }
 }
 
 /// The places at which an element is probed: its corners, offset inwards, and its centroid.
@@ -225,29 +304,6 @@ pub(crate) fn outside_places(hierarchy: &Hierarchy, element: usize) -> Vec<Vec3>
 fn tilted(normal: Vec3, [x, y]: [f32; 2]) -> Vec3 {
     let tangent = normal.any_orthonormal_vector();
     (normal + tangent * x + normal.cross(tangent) * y).normalize_or_zero()
-}
-
-/// Whether a point of an element lies inside a solid of the scene, by two of three rays, since a ray may slip through
-/// an edge; and the rays shot.
-fn is_in_solid(
-    scene: &Scene,
-    rays: &RayTree,
-    hierarchy: &Hierarchy,
-    element: usize,
-    point: Vec3,
-) -> (bool, u64) {
-    let patch = hierarchy.patch_of(element);
-    let is_left = |tangents| {
-        let direction = tilted(patch.normal, tangents);
-        let bounds = |triangle: TriangleId| scene.triangles[triangle.index()].bounds_solid;
-        rays.solids_left(point, direction, Some(patch.triangle), bounds) > 0
-    };
-    let [first, second, third] = SOLID_PROBES;
-    if is_left(first) {
-        (is_left(second) || is_left(third), 3)
-    } else {
-        (false, 1)
-    }
 }
 
 /// Whether a point of an element lies behind a wall: rays from there meet backs, and no lit side except one of another
@@ -293,7 +349,7 @@ mod tests {
         solver::SolveSettings,
     };
 
-    /// A box that stands on a floor, sunk into it if `depth` is above 0.
+    /// A box that stands on a floor, sunk into it if `depth` is above 0, or closely above it.
     fn standing(depth: f64) -> Scene {
         let (mut builder, wall, lamp) = builder();
         let floor = [DVec3::Z * 4.0, DVec3::X * 4.0];
@@ -307,7 +363,7 @@ mod tests {
 
     #[test]
     fn what_lies_under_a_box_is_inside_and_nothing_else_on_the_floor_is() {
-        for depth in [0.0, 0.05] {
+        for depth in [0.0, 0.05, -0.001, -0.006] {
             let scene = standing(depth);
             let mut hierarchy = Hierarchy::new(&scene, 30.0);
             let rays = RayTree::new(&scene);
@@ -370,5 +426,46 @@ mod tests {
             }
         }
         assert!(found.contains(&true) && found.contains(&false));
+    }
+
+    #[test]
+    fn gaps_are_narrow_closed_and_dark() {
+        // The floor under the middle of a sheet of this size and height, which may shine.
+        for (size, height, shines, is_gap) in [
+            (0.4, 0.004, false, true),
+            (0.4, 0.004, true, false),
+            (0.02, 0.004, false, false),
+            (0.4, 0.2, false, false),
+        ] {
+            let (mut builder, wall, lamp) = builder();
+            let floor = [DVec3::Z * 4.0, DVec3::X * 4.0];
+            rectangle(&mut builder, DVec3::new(-2.0, 0.0, -2.0), floor, wall);
+            let corner = DVec3::new(-0.5 * size, height, -0.5 * size);
+            let sheet = [DVec3::X * size, DVec3::Z * size];
+            rectangle(
+                &mut builder,
+                corner,
+                sheet,
+                if shines { lamp } else { wall },
+            );
+            let scene = crate::scene::test_shapes::one_sided(builder);
+            let (hierarchy, rays) = (Hierarchy::new(&scene, 30.0), RayTree::new(&scene));
+            let prober = Prober {
+                scene: &scene,
+                has_solids: false,
+                rays: &rays,
+                hierarchy: &hierarchy,
+                gap: (CLOSED_GAP * hierarchy.importance.area.sqrt()) as f32,
+            };
+            let middle = scene.frame.from_world(DVec3::new(0.001, 0.0, 0.001));
+            let is_floor = |&element: &usize| {
+                let elements = &hierarchy.mesh.elements;
+                let height = scene.frame.to_world(elements[element].centroid).y;
+                height < 1e-3
+            };
+            let element = (0..hierarchy.mesh.elements.len()).find(is_floor).unwrap();
+            let (found, _) = prober.is_in_gap(element, middle);
+            assert_eq!(found, is_gap, "{size} {height} {shines}");
+        }
     }
 }
