@@ -2,10 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod boxes;
 mod common;
 
 use std::{collections::BTreeMap, f32::consts::PI, sync::Arc};
 
+use boxes::cuboid;
 use common::{assert_close, finish, solve};
 use glam::{DVec3, Vec2, Vec3};
 use vecrad::{
@@ -284,16 +286,6 @@ fn assert_agrees(scene: &Arc<Scene>, [energy, trimmed]: [f64; 2]) {
     assert!(error.relative_rms_trimmed < trimmed, "{error:?}");
 }
 
-/// The inner faces of a box from the origin.
-fn closed_room(builder: &mut SceneBuilder, size: f64, wall: MaterialId) {
-    let sides = [DVec3::X, DVec3::Y, DVec3::Z];
-    for axis in 0..3 {
-        let [u, v] = [sides[(axis + 1) % 3] * size, sides[(axis + 2) % 3] * size];
-        rectangle(builder, DVec3::ZERO, [u, v], wall, 1.0);
-        rectangle(builder, sides[axis] * size, [v, u], wall, 1.0);
-    }
-}
-
 #[test]
 fn light_among_leaves_agrees_with_path_tracing() {
     let mut builder = SceneBuilder::default();
@@ -305,7 +297,7 @@ fn light_among_leaves_agrees_with_path_tracing() {
     let mut red = glass(0.3, Vec3::new(1.0, 0.4, 0.3));
     red.reflectance = Vec3::splat(0.3);
     let red = builder.push_material(red);
-    closed_room(&mut builder, 4.0, wall);
+    cuboid(&mut builder, DVec3::ZERO, DVec3::splat(4.0), true, wall);
     let lamp_sides = [DVec3::Y, DVec3::X];
     rectangle(
         &mut builder,
@@ -346,7 +338,7 @@ fn a_coloured_box_in_a_closed_room_takes_what_it_absorbs_and_no_more() {
         let wall = builder.push_material(Material::plain("wall", Vec3::splat(0.6), Vec3::ZERO));
         let lamp = builder.push_material(Material::plain("lamp", Vec3::ZERO, Vec3::splat(5.0)));
         let coloured = builder.push_material(glass(0.0, filter));
-        closed_room(&mut builder, 4.0, wall);
+        cuboid(&mut builder, DVec3::ZERO, DVec3::splat(4.0), true, wall);
         let lamp_sides = [DVec3::Y, DVec3::X];
         rectangle(
             &mut builder,
@@ -355,13 +347,8 @@ fn a_coloured_box_in_a_closed_room_takes_what_it_absorbs_and_no_more() {
             lamp,
             1.0,
         );
-        let sides = [DVec3::X, DVec3::Y, DVec3::Z];
-        let origin = DVec3::new(1.2, 1.2, 0.4);
-        for axis in 0..3 {
-            let [u, v] = [sides[(axis + 1) % 3], sides[(axis + 2) % 3]];
-            rectangle(&mut builder, origin, [v, u], coloured, 1.0);
-            rectangle(&mut builder, origin + sides[axis], [u, v], coloured, 1.0);
-        }
+        let low = DVec3::new(1.2, 1.2, 0.4);
+        cuboid(&mut builder, low, low + 1.0, false, coloured);
         assert_agrees(&finish(builder, Sides::Auto), [0.02, 0.05]);
     }
 }

@@ -86,7 +86,7 @@ pub(super) struct Notes {
 /// Text handed to the parser at once. Smaller, and threads wait for each other; larger, and the text leaves the cache.
 const CHUNK: usize = 64 << 10;
 
-/// The colour of vertices without one beside others with colours: white, as of faces without any.
+/// The colour of vertices without one beside others with colours: white.
 const UNCOLORED: [&[u8]; 3] = [b"1"; 3];
 
 /// A clean view of an OBJ file.

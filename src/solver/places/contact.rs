@@ -1,8 +1,8 @@
 //! Contacts: where one object stands on another or reaches into it.
 //!
 //! A contact element is one that lies partly inside a solid, behind a wall or in a gap that is closed but for its edges, as
-//! between a cabinet and the wall behind it: this part gets no light, and is not visible. Its mean would be too dark beside the object, so it is divided until it is small, and then takes the light
-//! of its corners outside.
+//! between a cabinet and the wall behind it: this part gets no light, and is not visible. Its mean would be too dark beside
+//! the object, so it is divided until it is small, and then takes the light of its corners outside.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -40,7 +40,8 @@ const SOLID_PROBES: [[f32; 2]; 3] = [[0.173, 0.291], [-0.419, 0.137], [0.083, -0
 /// and light is lost from elements that reach far into them.
 const GAP_PROBES: [[f32; 2]; 4] = [[8.0, 0.7], [-0.7, 8.0], [-8.0, -0.7], [0.7, -8.0]];
 
-/// Cosine of the angle within which two surfaces count as parallel.
+/// Cosine of the angle within which two surfaces count as parallel. Smaller takes narrow corners for gaps; larger misses gaps
+/// behind what stands askew.
 const PARALLEL_COSINE: f32 = 0.9;
 
 /// Number of the first rays of [`PROBES`]. Fewer miss contacts; more cost rays everywhere.
