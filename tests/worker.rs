@@ -15,7 +15,9 @@ use glam::{DVec3, Vec3};
 use vecrad::{
     hierarchy::NodeId,
     scene::{Appearance, Material, Scene, SceneBuilder, SceneOptions},
-    solver::{Cancel, Inspection, LampLight, Relit, Snapshot, SolveSettings, StepReport, Subject},
+    solver::{
+        Cancel, Inspection, LampLight, Note, Relit, Snapshot, SolveSettings, StepReport, Subject,
+    },
     worker::{Effect, Event, Generation, Job, RunOptions, Stepper, StopReason, WorkerHandle},
 };
 
@@ -57,6 +59,10 @@ struct Script {
     finished: AtomicU32,
     /// Time that finishing the light of a step takes unless cancelled.
     finish_time: Duration,
+    /// The threshold of each step, if it is not that of the settings.
+    coarser: Option<f32>,
+    /// Notes of each step.
+    notes: Vec<Note>,
     /// How often the light of a step was finished.
     finished_steps: AtomicU32,
     /// Emission that steppers were made for.
@@ -85,7 +91,8 @@ impl Stepper for FakeSolver {
         Some(StepReport {
             step: self.step,
             memory_bytes: self.script.memory_bytes,
-            epsilon: self.settings.epsilon,
+            epsilon: self.script.coarser.unwrap_or(self.settings.epsilon),
+            notes: self.script.notes.clone(),
             is_final: self.step >= self.script.steps.max(self.settings.max_steps),
             ..StepReport::default()
         })
@@ -327,6 +334,31 @@ fn a_run_announces_each_step_and_publishes_its_light_first() {
     assert_eq!(steps, [1, 2, 3]);
     assert_eq!(events.last(), Some(&Event::Finished(StopReason::Converged)));
     assert_eq!(worker.latest().map(|snapshot| snapshot.step), Some(3));
+}
+
+/// Links that stay coarse because rays do as well are no limit that cut the run short.
+#[test]
+fn a_run_is_converged_where_its_links_are_limited_by_what_they_gain() {
+    let epsilon = short().epsilon * 2.0;
+    for (notes, expected) in [
+        (vec![], StopReason::StepLimit),
+        (vec![Note::LinksLimited { epsilon }], StopReason::Converged),
+    ] {
+        let script = Arc::new(Script {
+            steps: 2,
+            coarser: Some(epsilon),
+            notes,
+            ..Script::default()
+        });
+        let mut worker = worker(&script);
+        worker.start(triangle(), short(), one_thread());
+        let events = wait_for(&worker, is_finished);
+        let reason = events.iter().find_map(|event| match event {
+            Event::Finished(reason) => Some(*reason),
+            _ => None,
+        });
+        assert_eq!(reason, Some(expected));
+    }
 }
 
 #[test]

@@ -274,7 +274,10 @@ impl Run {
                     StopReason::Converged
                 }
                 Some(_) => StopReason::ErrorNotReached,
-                None if report.epsilon <= self.settings.epsilon => StopReason::Converged,
+                // Where links are limited by what they gain, the rest is left to rays: nothing was cut short.
+                None if report.epsilon <= self.settings.epsilon || report.has_limited_links() => {
+                    StopReason::Converged
+                }
                 None => StopReason::StepLimit,
             });
         }

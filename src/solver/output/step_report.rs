@@ -58,3 +58,11 @@ pub struct StepReport {
     /// Measures to stay stable or within the memory limit.
     pub notes: Vec<Note>,
 }
+
+impl StepReport {
+    /// Whether its links were left coarser than asked for, since rays do as well (see [`Note::LinksLimited`]).
+    pub fn has_limited_links(&self) -> bool {
+        let is_limit = |note: &Note| matches!(note, Note::LinksLimited { .. });
+        self.notes.iter().any(is_limit)
+    }
+}
