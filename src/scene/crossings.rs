@@ -19,8 +19,10 @@ use spade::{
 use super::{Appearance, Scene, SizeClasses, Surface, Triangle, TriangleId};
 
 /// Faces are cut whose longest edge, squared, is more than this part of the scene's area. Smaller cuts what elements resolve
-/// anyway, larger leaves furniture whole.
-const LEAST_CUT: f64 = 4e-4;
+/// anyway (a quarter of it costs a tenth of the time on loose triangles, and gains nothing), larger leaves furniture whole,
+/// and what lies in stacks (ten times as much: an error of 17 % instead of 10 % in an office at draft, 1.54 % instead of 1.39 %
+/// in `gallery` at normal).
+const LEAST_CUT: f64 = 4e-5;
 
 /// Faces cut others whose longest edge, squared, is more than this part of the scene's area. Smaller makes slivers about
 /// small things, larger leaves the feet of furniture on whole floors.
