@@ -135,6 +135,33 @@ fn light_along_a_plank_is_not_drawn_straight_from_end_to_end() {
     }
 }
 
+/// A bar along a ceiling with lamps in it, far smaller than all that is divided in a room of this size.
+#[test]
+fn light_along_a_narrow_bar_is_that_of_its_pieces() {
+    const LENGTH: f64 = 12.0;
+    let light = |pieces: u32| {
+        let mut builder = SceneBuilder::default();
+        let black = paint(&mut builder, 0.0, 0.0);
+        let lamp = paint(&mut builder, 0.0, 10.0);
+        let high = DVec3::new(LENGTH, 8.0, 3.0);
+        cuboid(&mut builder, DVec3::new(0.0, 0.0, -0.1), high, true, black);
+        for place in 0..6 {
+            let middle = DVec3::new(1.3 + 1.8 * f64::from(place), 4.32, 2.999);
+            square(&mut builder, middle, 0.3, false, lamp);
+        }
+        let length = LENGTH / f64::from(pieces);
+        for piece in 0..pieces {
+            let corner = DVec3::new(length * f64::from(piece + 1), 4.0, 2.99);
+            let edges = [DVec3::X * -length, DVec3::Z * 0.008];
+            rectangle(&mut builder, corner, edges, black);
+        }
+        let snapshot = solved(builder, Sides::One, SolveSettings::draft());
+        let is_bar = |at: Vec3, normal: Vec3| normal.y > 0.9 && at.y > 3.9 && at.z > 2.98;
+        mean_irradiance(&snapshot, is_bar).0
+    };
+    assert_close(light(1), light(80), 0.05, "one bar");
+}
+
 /// Mean irradiance of a floor below the middle of a lamp of 1 by 1 and radiance 10, by a fine grid.
 fn floor_mean(length: f64, width: f64, height: f64) -> f64 {
     const CELLS: u32 = 60;

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::{
     Patch,
     edge_leaves::{Edge, EdgeLeaves, EdgeMap},
+    longest_edge_squared,
 };
 use crate::{
     geometry::barycentric_in_plane,
@@ -46,6 +47,8 @@ pub struct Element {
     /// Bit k: whether corner k lies inside a solid or behind a wall; bit 3: whether the centroid does.
     /// [`Element::UNPROBED`] if that is unknown.
     pub inside_solid: u8,
+    /// Whether no light at all reaches these places: each lies in a solid or a closed gap, or sees nothing but backs.
+    pub is_covered: bool,
     /// Number of children: 0, 2 or 4.
     pub child_count: u8,
     /// Mean of the corners.
@@ -136,6 +139,12 @@ pub struct Mesh {
     leaves_at: Option<EdgeLeaves>,
 }
 
+/// Whether a triangle with this square of its longest edge, and this area, is halved: its height is twice the area over that
+/// edge.
+fn is_sliver(longest_squared: f32, area: f32) -> bool {
+    longest_squared > SLIVER * 2.0 * area
+}
+
 fn edge(a: u32, b: u32) -> Edge {
     (a.min(b), a.max(b))
 }
@@ -201,6 +210,7 @@ impl Mesh {
             parent,
             level,
             inside_solid: Element::UNPROBED,
+            is_covered: false,
             child_count: 0,
             centroid,
             radius,
@@ -242,6 +252,18 @@ impl Mesh {
     /// The leaves among some elements, in order.
     pub fn leaves_among(&self, elements: Range<usize>) -> impl Iterator<Item = usize> + '_ {
         elements.filter(|&index| self.elements[index].is_leaf())
+    }
+
+    /// What limits of the size of elements compare, square frame units: the area of the parts into which an element would be
+    /// divided. Slivers are halved along their length, and so count by that: as right isosceles triangles with the longest
+    /// edge of their parts. By their area, light along a bar of a room could not change from end to end.
+    pub fn size_of_parts(&self, element: usize) -> f32 {
+        let area = self.elements[element].area_vector.length();
+        let squared = longest_edge_squared(self.corners(element)) as f32;
+        match is_sliver(squared, area) {
+            true => squared / 16.0,
+            false => area / 4.0,
+        }
     }
 
     /// Area of the leaves about each vertex.
@@ -360,8 +382,7 @@ impl Mesh {
                 best
             }
         });
-        // The height is twice the area over the longest side.
-        if squares[longest] > SLIVER * 2.0 * area {
+        if is_sliver(squares[longest], area) {
             let [a, b, c] = [0, 1, 2].map(|turn| vertices[(longest + turn) % 3]);
             let ab = self.middle(a, b);
             return vec![[a, ab, c], [ab, b, c]];

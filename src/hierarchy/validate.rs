@@ -246,6 +246,28 @@ mod tests {
     }
 
     #[test]
+    fn parts_of_slivers_count_by_their_length() {
+        for (length, halvings) in [(1.0, 1), (40.0, 2)] {
+            let mut hierarchy = hierarchy(long_sheet(1, 5, length));
+            let largest = |hierarchy: &Hierarchy| {
+                let sizes = hierarchy.mesh.leaves();
+                let sizes = sizes.map(|leaf| hierarchy.mesh.size_of_parts(leaf));
+                sizes.fold(0.0, f32::max)
+            };
+            let before = largest(&hierarchy);
+            let area = hierarchy.mesh.elements[0].area_vector.length();
+            assert_eq!(before > area, length > 2.0, "{before} {area}");
+            // Halves of a triangle with two long edges have one of them.
+            for _ in 0..halvings {
+                let wanted: Vec<u32> = hierarchy.mesh.leaves().map(|leaf| leaf as u32).collect();
+                assert!(hierarchy.mesh.divide(&wanted));
+            }
+            let ratio = largest(&hierarchy) / before;
+            assert!((0.2..0.3).contains(&ratio), "{ratio}");
+        }
+    }
+
+    #[test]
     fn division_makes_slivers_shorter() {
         let mut hierarchy = hierarchy(long_sheet(2, 5, 40.0));
         // Lengths over heights: their largest, and their mean by area.

@@ -102,8 +102,8 @@ impl Painted<'_> {
             return Vec::new();
         }
         let leaves = hierarchy.mesh.active_leaves().filter(|&leaf| {
-            let area = hierarchy.mesh.elements[leaf].area_vector.length();
-            area * 0.25 >= min_area && self.scene.is_textured(hierarchy.patch_of(leaf).triangle)
+            hierarchy.mesh.size_of_parts(leaf) >= min_area
+                && self.scene.is_textured(hierarchy.patch_of(leaf).triangle)
         });
         leaves.collect()
     }

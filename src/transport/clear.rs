@@ -145,7 +145,7 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         if !receiver.is_leaf() && exceeds(of_receiver) {
             return Decision::DivideReceiver;
         }
-        if exceeds(of_source) && source.area_vector.length() * 0.25 >= self.min_area {
+        if exceeds(of_source) && hierarchy.mesh.size_of_parts(from) >= self.min_area {
             out.wanted.push(from as u32);
         }
         // The estimate from a few points is usually tighter than the bound over all points.

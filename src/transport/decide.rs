@@ -154,8 +154,8 @@ impl<'a, F: Fn(NodeId) -> &'a [Link] + Sync> Refiner<'a, F> {
         let can_divide_receiver = match hierarchy.kind(receiver) {
             Kind::Cluster(_) => true,
             Kind::Element(index) => {
-                let area = hierarchy.mesh.elements[index].area_vector.length();
-                !hierarchy.mesh.elements[index].is_leaf() || area * 0.25 >= self.min_area
+                !hierarchy.mesh.elements[index].is_leaf()
+                    || hierarchy.mesh.size_of_parts(index) >= self.min_area
             }
         };
         let prefers_source = hierarchy.radius(source) >= TIE * hierarchy.radius(receiver);

@@ -66,7 +66,10 @@ pub(crate) fn divide_coarse(
         let wanted: Vec<u32> = large
             .into_par_iter()
             .filter(|&leaf| {
-                (!is_clear && !hierarchy.is_empty_above(leaf, EMPTY_RADII)) || has_error(leaf)
+                let may_be_shaded = !is_clear
+                    && !is_narrow(hierarchy, leaf, limits)
+                    && !hierarchy.is_empty_above(leaf, EMPTY_RADII);
+                may_be_shaded || has_error(leaf)
             })
             .map(|leaf| leaf as u32)
             .collect();
@@ -84,8 +87,14 @@ fn is_large(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
     let squared = longest_edge_squared(hierarchy.mesh.corners(leaf)) as f32;
     // The area of a right isosceles triangle with that edge.
     let area = squared * 0.25;
-    let own = hierarchy.mesh.elements[leaf].area_vector.length();
-    hierarchy.share_of_area(leaf, area) > LARGEST_SHARE && own > 4.0 * limits.min_area
+    hierarchy.share_of_area(leaf, area) > LARGEST_SHARE
+        && hierarchy.mesh.size_of_parts(leaf) > limits.min_area
+}
+
+/// Whether an element is so narrow that it is smaller than what elements are divided into: shadows that its corners miss do
+/// not matter, however long it is.
+fn is_narrow(hierarchy: &Hierarchy, leaf: usize, limits: Limits) -> bool {
+    hierarchy.mesh.elements[leaf].area_vector.length() <= 4.0 * limits.min_area
 }
 
 impl DirectField {
@@ -314,16 +323,16 @@ impl DirectField {
         at_centre: &mut Option<f32>,
     ) -> bool {
         let element = &hierarchy.mesh.elements[leaf];
-        let area = element.area_vector.length();
+        let size = hierarchy.mesh.size_of_parts(leaf);
         let Some(centre) = self.centres.get(leaf).copied().flatten() else {
             return false;
         };
         // Contact elements are divided elsewhere.
-        if !element.is_outside_solids() || area * 0.25 < SMOOTH_SHARE * limits.min_area {
+        if !element.is_outside_solids() || size < SMOOTH_SHARE * limits.min_area {
             return false;
         }
         // Shadow borders need a smallest area; unoccluded light is smooth.
-        if area * 0.25 < limits.min_area {
+        if size < limits.min_area {
             return self.unoccluded_interpolation_error(hierarchy, leaf, limits, mean, at_centre)
                 > limits.tolerance;
         }

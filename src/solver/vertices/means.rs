@@ -84,12 +84,11 @@ pub(crate) fn divide_by_interpolation_error(
     mean: f32,
 ) -> bool {
     let has_error = |light: &LeafLight| {
-        let element = &hierarchy.mesh.elements[light.element as usize];
         let corners = light.corners.map(luminance);
         let [least, most] = [f32::min, f32::max].map(|of| corners.into_iter().fold(corners[0], of));
         let error = (luminance(light.centre) - corners.iter().sum::<f32>() / 3.0).abs();
         let weight = share_root(hierarchy, light.element as usize) / mean.max(f32::MIN_POSITIVE);
-        element.area_vector.length() * 0.25 >= limits.min_area
+        hierarchy.mesh.size_of_parts(light.element as usize) >= limits.min_area
             && (error + SPREAD_SHARE * (most - least)) * weight > limits.tolerance
     };
     let divided = found.iter().filter(|light| has_error(light));
