@@ -228,3 +228,44 @@ fn furniture_just_before_the_walls_takes_no_more_light_than_at_the_walls() {
         assert!((ratio - 1.0).abs() < 0.012, "{ratio} at {gap}");
     }
 }
+
+/// What lies on a floor, and in a stack, covers surfaces whose corners lie on outlines in the light.
+#[test]
+fn what_is_covered_shows_no_light() {
+    let mut builder = SceneBuilder::default();
+    let wall = Material::plain("wall", Vec3::splat(0.8), Vec3::ZERO);
+    let lamp = Material::plain("lamp", Vec3::ZERO, Vec3::splat(20.0));
+    let [wall, lamp] = [wall, lamp].map(|material| builder.push_material(material));
+    let room = [DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0)];
+    cuboid(&mut builder, room[0], room[1], true, wall);
+    // Each reaches a little into what it lies on; the upper ones are smaller, so that all of a top is covered but a rim.
+    let mut height = 0.0;
+    for inset in [0.0, 0.02, 0.04, 0.06] {
+        let low = DVec3::new(1.0 + inset, height - 0.002, 1.0 + inset);
+        height += 0.02;
+        let high = DVec3::new(2.2 - inset, height, 1.8 - inset);
+        cuboid(&mut builder, low, high, false, wall);
+    }
+    let corner = DVec3::new(1.5, 2.99, 1.5);
+    rectangle(&mut builder, corner, [DVec3::X, DVec3::Z], lamp);
+    let snapshot = solved(builder, Sides::One, SolveSettings::draft());
+    let light_within = |inset: f64, height: f64| {
+        let is_within = |at: Vec3, normal: Vec3| {
+            let at = at.as_dvec3();
+            let (x, z) = (at.x - 1.0 - inset, at.z - 1.0 - inset);
+            let is_inside = x
+                .min(1.2 - 2.0 * inset - x)
+                .min(z)
+                .min(0.8 - 2.0 * inset - z)
+                > 0.0;
+            is_inside && (at.y - height).abs() < 1e-4 && normal.y > 0.9
+        };
+        mean_irradiance(&snapshot, is_within).0
+    };
+    let lit = light_within(0.06, 0.08);
+    assert!(lit > 1.0, "{lit}");
+    for (inset, height) in [(0.0, 0.0), (0.02, 0.02), (0.04, 0.04), (0.06, 0.06)] {
+        let covered = light_within(inset, height);
+        assert!(covered < 0.01 * lit, "{covered} at {height}, {lit} on top");
+    }
+}

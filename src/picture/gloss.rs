@@ -77,7 +77,7 @@ pub fn gloss_at_vertices(
     };
     let mut vertices: Vec<GlossVertex> = places.par_iter().enumerate().map(light).collect();
     cancel.proceed()?;
-    lit.mesh.repeat(&mut vertices);
+    lit.mesh.repeat_light(&mut vertices);
     Some(GlossLight {
         lamps: found.list,
         vertices,

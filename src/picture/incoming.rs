@@ -74,7 +74,7 @@ pub fn harmonics_at_vertices(
     };
     let mut found: Vec<Harmonics> = places.par_iter().enumerate().map(harmonics).collect();
     cancel.proceed()?;
-    lit.mesh.repeat(&mut found);
+    lit.mesh.repeat_light(&mut found);
     Some(found)
 }
 

@@ -134,8 +134,12 @@ impl Scenery<'_> {
             .vertices
             .map(|vertex| self.irradiance[vertex as usize]);
         let met = 1.0 / self.hierarchy.opacity_of(leaf).max(f32::MIN_POSITIVE);
+        let irradiance = match mesh.elements[leaf].is_covered {
+            true => Vec3::ZERO,
+            false => u * a + v * b + w * c,
+        };
         Some(Stored {
-            irradiance: u * a + v * b + w * c,
+            irradiance,
             reflectance: self.hierarchy.reflectance_of(leaf) * met,
         })
     }

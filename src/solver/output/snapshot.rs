@@ -33,8 +33,12 @@ pub struct DisplayMesh {
     pub is_back: Vec<bool>,
     /// The element under each display triangle, as a node of the hierarchy.
     pub element_of: Vec<u32>,
-    /// The last vertices are copies of these, with the texture coordinates of the other side of a seam.
+    /// The last vertices are copies of these, with the texture coordinates of the other side of a seam, or for what lies
+    /// inside a solid.
     pub repeated: Vec<u32>,
+    /// Those of the copies, in order, of triangles inside solids, which no light reaches: they share no vertex with what
+    /// is lit beside them.
+    pub covered: Vec<u32>,
 }
 
 impl DisplayMesh {
@@ -47,6 +51,20 @@ impl DisplayMesh {
     pub fn own_vertex(&self, vertex: u32) -> usize {
         let repetition = (vertex as usize).checked_sub(self.own_vertex_count());
         repetition.map_or(vertex, |place| self.repeated[place]) as usize
+    }
+
+    /// Give copies the light of their vertices, and those inside solids none.
+    pub fn repeat_light<T: Copy + Default>(&self, values: &mut Vec<T>) {
+        self.repeat(values);
+        for &vertex in &self.covered {
+            values[vertex as usize] = T::default();
+        }
+    }
+
+    /// Whether a display triangle lies inside a solid.
+    pub fn is_covered(&self, triangle: usize) -> bool {
+        let [vertex, ..] = self.indices[triangle];
+        self.covered.binary_search(&vertex).is_ok()
     }
 
     /// Give copies the values of their vertices.
@@ -140,6 +158,7 @@ impl Snapshot {
             + size_of_val(mesh.is_back.as_slice())
             + size_of_val(mesh.element_of.as_slice())
             + size_of_val(mesh.repeated.as_slice())
+            + size_of_val(mesh.covered.as_slice())
             + size_of_val(light.irradiance.as_slice())
             + size_of_val(light.direct.as_slice())
             + size_of_val(self.clusters.as_slice())

@@ -137,17 +137,18 @@ fn probe_leaves(
         hierarchy,
         gap: (CLOSED_GAP * hierarchy.importance.area.sqrt()) as f32,
     };
-    let probed: Vec<(u8, u64)> = leaves
+    let probed: Vec<(u8, bool, u64)> = leaves
         .par_iter()
         .map(|&leaf| match cancel.is_cancelled() {
-            true => (0, 0),
+            true => (0, false, 0),
             false => prober.probe(leaf),
         })
         .collect();
     cancel.proceed()?;
     let mut ray_count = 0;
-    for (&leaf, (inside_solid, shot)) in leaves.iter().zip(probed) {
-        hierarchy.mesh.elements[leaf].inside_solid = inside_solid;
+    for (&leaf, (inside_solid, is_covered, shot)) in leaves.iter().zip(probed) {
+        let element = &mut hierarchy.mesh.elements[leaf];
+        (element.inside_solid, element.is_covered) = (inside_solid, is_covered);
         ray_count += shot;
     }
     Some(ray_count)
@@ -185,6 +186,25 @@ fn least_contact(hierarchy: &Hierarchy, limits: Limits) -> f32 {
     (root * root * hierarchy.importance.area as f32).max(limits.min_area)
 }
 
+/// What is known of the light at a place.
+#[derive(Clone, Copy, Default)]
+struct Darkness {
+    /// Whether it lies inside a solid, behind a wall or in a closed gap, and so gets no light from the room before it.
+    is_dark: bool,
+    /// Whether it gets none from elsewhere, either.
+    is_covered: bool,
+}
+
+impl Darkness {
+    /// Of places where nothing else shines.
+    fn all(is_dark: bool) -> Self {
+        Self {
+            is_dark,
+            is_covered: is_dark,
+        }
+    }
+}
+
 /// Looks for places without light.
 struct Prober<'a> {
     scene: &'a Scene,
@@ -197,24 +217,38 @@ struct Prober<'a> {
 
 impl Prober<'_> {
     /// The corners of an element, and its centroid, that lie inside a solid, behind a wall or in a closed gap, as bits of
-    /// [`Element::inside_solid`]; and the rays shot.
-    fn probe(&self, element: usize) -> (u8, u64) {
+    /// [`Element::inside_solid`]; whether all are covered; and the rays shot.
+    fn probe(&self, element: usize) -> (u8, bool, u64) {
         if self.rays.is_clear() {
-            return (0, 0);
+            return (0, false, 0);
         }
-        let (mut inside_solid, mut shot) = (0, 0);
+        let (mut inside_solid, mut is_covered, mut shot) = (0, true, 0);
         for (place, point) in places(self.hierarchy, element).into_iter().enumerate() {
-            let mut is_dark = false;
-            let looks = [Self::is_in_solid, Self::is_behind_wall, Self::is_in_gap];
+            let mut found = Darkness::default();
+            let looks = [Self::in_solid, Self::behind_wall, Self::in_gap];
             for look in looks {
-                if !is_dark {
-                    let (found, count) = look(self, element, point);
-                    (is_dark, shot) = (found, shot + count);
+                if !found.is_dark {
+                    let count;
+                    (found, count) = look(self, element, point);
+                    shot += count;
                 }
             }
-            inside_solid |= u8::from(is_dark) << place;
+            inside_solid |= u8::from(found.is_dark) << place;
+            is_covered &= found.is_covered;
         }
-        (inside_solid, shot)
+        (inside_solid, is_covered, shot)
+    }
+
+    /// See [`Self::is_in_solid`].
+    fn in_solid(&self, element: usize, point: Vec3) -> (Darkness, u64) {
+        let (is_dark, shot) = self.is_in_solid(element, point);
+        (Darkness::all(is_dark), shot)
+    }
+
+    /// See [`Self::is_in_gap`].
+    fn in_gap(&self, element: usize, point: Vec3) -> (Darkness, u64) {
+        let (is_dark, shot) = self.is_in_gap(element, point);
+        (Darkness::all(is_dark), shot)
     }
 
     /// Whether a point of an element lies inside a solid of the scene, by two of three rays, since a ray may slip through
@@ -238,9 +272,9 @@ impl Prober<'_> {
         }
     }
 
-    /// See [`is_behind_wall`].
-    fn is_behind_wall(&self, element: usize, point: Vec3) -> (bool, u64) {
-        is_behind_wall(self.rays, self.hierarchy, element, point)
+    /// See [`behind_wall`].
+    fn behind_wall(&self, element: usize, point: Vec3) -> (Darkness, u64) {
+        behind_wall(self.rays, self.hierarchy, element, point)
     }
 
     /// Whether the side of a triangle that a ray meets has no light of its own; backs never have.
@@ -307,14 +341,25 @@ fn tilted(normal: Vec3, [x, y]: [f32; 2]) -> Vec3 {
     (normal + tangent * x + normal.cross(tangent) * y).normalize_or_zero()
 }
 
-/// Whether a point of an element lies behind a wall: rays from there meet backs, and no lit side except one of another
-/// object that reaches into the wall. And the rays shot.
+/// Whether a point of an element lies behind a wall (see [`behind_wall`]), and the rays shot.
 pub(crate) fn is_behind_wall(
     rays: &RayTree,
     hierarchy: &Hierarchy,
     element: usize,
     point: Vec3,
 ) -> (bool, u64) {
+    let (place, shot) = behind_wall(rays, hierarchy, element, point);
+    (place.is_dark, shot)
+}
+
+/// Whether a point of an element lies behind a wall: rays from there meet backs, and no lit side except one of another
+/// object that reaches into the wall. It is covered if they meet nothing else. And the rays shot.
+fn behind_wall(
+    rays: &RayTree,
+    hierarchy: &Hierarchy,
+    element: usize,
+    point: Vec3,
+) -> (Darkness, u64) {
     let patch = hierarchy.patch_of(element);
     let (mut backs, mut lit, mut shot) = (0, 0, 0);
     for tangents in PROBES {
@@ -327,14 +372,18 @@ pub(crate) fn is_behind_wall(
             Some(hit) if hierarchy.patch_met(hit.triangle, direction).is_some() => {
                 lit += 1;
                 if lit > MOST_LIT {
-                    return (false, shot as u64);
+                    return (Darkness::default(), shot as u64);
                 }
             }
             Some(hit) if !rays.is_see_through(hit.triangle) => backs += 1,
             _ => {}
         }
     }
-    (backs >= LEAST_BACKS * (1 + lit), shot as u64)
+    let place = Darkness {
+        is_dark: backs >= LEAST_BACKS * (1 + lit),
+        is_covered: backs == PROBES.len(),
+    };
+    (place, shot as u64)
 }
 
 #[cfg(test)]

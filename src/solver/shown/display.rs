@@ -21,14 +21,15 @@ use crate::{
 /// A triangle of the display mesh: its element and its vertices.
 pub(super) type DisplayTriangle = (u32, [u32; 3]);
 
-/// The triangles of a crack-free mesh of the elements; `None` if the elements are those of the current display mesh.
+/// The triangles of a crack-free mesh of the elements; `None` if the elements are those of the current display mesh, and as
+/// many of them lie inside solids.
 pub(crate) fn changed_triangles(
     hierarchy: &mut Hierarchy,
     current: &DisplayMesh,
 ) -> Option<Vec<DisplayTriangle>> {
     let has_changed = current.indices.is_empty()
         || current.own_vertex_count() != hierarchy.mesh.vertices.len()
-        || hierarchy.mesh.leaves().count() != leaf_count(current);
+        || leaf_counts(hierarchy) != shown_leaf_counts(current);
     has_changed.then(|| hierarchy.mesh.crack_free_triangles())
 }
 
@@ -102,16 +103,17 @@ impl View<'_> {
         let hierarchy = self.surfaces.hierarchy;
         let mesh = &hierarchy.mesh;
         let count = mesh.vertices.len();
-        let mut seams = (!self.scene.texcoords.is_empty()).then(Seams::default);
+        let has_texcoords = !self.scene.texcoords.is_empty();
+        let mut seams = Seams::default();
         let mut display = DisplayMesh {
             positions: (0..count as u32)
                 .map(|vertex| mesh.position(vertex))
                 .collect(),
             normals: vec![Vec3::ZERO; count],
-            texcoords: vec![Vec2::NAN; if seams.is_some() { count } else { 0 }],
+            texcoords: vec![Vec2::NAN; if has_texcoords { count } else { 0 }],
             ..DisplayMesh::default()
         };
-        // Triangles, with copies of vertices where texture coordinates differ.
+        // Triangles, with copies of vertices where texture coordinates differ, and inside solids.
         for (element, vertices) in triangles {
             let patch = hierarchy.patch_of(element as usize);
             let corners = vertices.map(|vertex| display.positions[vertex as usize]);
@@ -119,14 +121,12 @@ impl View<'_> {
             for vertex in vertices.map(|vertex| vertex as usize) {
                 display.normals[vertex] += patch.normal * weight;
             }
-            let shown = match &mut seams {
-                Some(seams) => vertices.map(|vertex| {
-                    let point = display.positions[vertex as usize];
-                    let uv = self.texcoord_at(patch.triangle, point);
-                    seams.vertex_with(vertex, uv, &mut display)
-                }),
-                None => vertices,
-            };
+            let is_covered = mesh.elements[element as usize].is_covered;
+            let shown = vertices.map(|vertex| {
+                let point = display.positions[vertex as usize];
+                let uv = has_texcoords.then(|| self.texcoord_at(patch.triangle, point));
+                seams.vertex_with(vertex, uv, is_covered, &mut display)
+            });
             display.indices.push(shown);
             display.triangle_of.push(patch.triangle.0);
             display.is_back.push(patch.is_back);
@@ -195,8 +195,8 @@ impl View<'_> {
                 .push(displayable((linked + direct).min(brightest)));
             light.direct.push(displayable(direct));
         }
-        mesh.repeat(&mut light.irradiance);
-        mesh.repeat(&mut light.direct);
+        mesh.repeat_light(&mut light.irradiance);
+        mesh.repeat_light(&mut light.direct);
         light
     }
 
@@ -267,9 +267,22 @@ impl View<'_> {
     }
 }
 
-/// Number of leaves in a mesh: display triangles of one element are consecutive.
-fn leaf_count(mesh: &DisplayMesh) -> usize {
-    mesh.element_of.chunk_by(|a, b| a == b).count()
+/// Number of leaves, and of those that are covered.
+fn leaf_counts(hierarchy: &Hierarchy) -> [usize; 2] {
+    let mesh = &hierarchy.mesh;
+    let is_covered = |leaf: &usize| mesh.elements[*leaf].is_covered;
+    [
+        mesh.leaves().count(),
+        mesh.leaves().filter(is_covered).count(),
+    ]
+}
+
+/// The same of a display mesh: triangles of one element are consecutive.
+fn shown_leaf_counts(mesh: &DisplayMesh) -> [usize; 2] {
+    let of = &mesh.element_of;
+    let firsts = (0..of.len()).filter(|&at| at == 0 || of[at] != of[at - 1]);
+    let covered = firsts.clone().filter(|&first| mesh.is_covered(first));
+    [firsts.count(), covered.count()]
 }
 
 /// Set the colours of the vertices of a display mesh to the means of the elements about them, weighted by the area that

@@ -1,8 +1,9 @@
-//! Vertices on texture seams.
+//! Vertices on seams: of textures, and between what is lit and what lies inside a solid.
 //!
 //! All triangles about a vertex share its light, but not always its texture coordinates: at a seam of the picture, or
 //! where it repeats, those on either side differ. Such a vertex has a copy for each further pair of coordinates; copies
-//! follow all other vertices.
+//! follow all other vertices. Triangles inside solids have copies of their own, which are dark: the outline of what stands
+//! on a floor goes through vertices that the lit floor has, too.
 
 use std::collections::HashMap;
 
@@ -17,33 +18,47 @@ const SAME_PLACE: f32 = 1.0 / 1024.0;
 /// The copies of the vertices of a display mesh.
 #[derive(Default)]
 pub(super) struct Seams {
-    repetitions: HashMap<u32, Vec<u32>>,
+    /// By vertex, and whether they are of triangles inside solids.
+    copies: HashMap<(u32, bool), Vec<u32>>,
 }
 
 impl Seams {
-    /// The vertex, or its copy, with these texture coordinates; a new copy if there is none. A vertex whose coordinates
-    /// are NaN takes them.
-    pub(super) fn vertex_with(&mut self, vertex: u32, uv: Vec2, mesh: &mut DisplayMesh) -> u32 {
-        let present = &mut mesh.texcoords[vertex as usize];
-        if present.is_nan() {
-            *present = uv;
+    /// The vertex, or its copy, with these texture coordinates, if there are any; a new copy if there is none. A vertex whose
+    /// coordinates are NaN takes them. Inside a solid it is always a copy.
+    pub(super) fn vertex_with(
+        &mut self,
+        vertex: u32,
+        uv: Option<Vec2>,
+        is_covered: bool,
+        mesh: &mut DisplayMesh,
+    ) -> u32 {
+        if let (Some(uv), false) = (uv, is_covered) {
+            let present = &mut mesh.texcoords[vertex as usize];
+            if present.is_nan() {
+                *present = uv;
+            }
         }
         let has_them = |vertex: u32| {
-            let present = mesh.texcoords[vertex as usize];
-            present == uv || present.abs_diff_eq(uv, SAME_PLACE)
+            uv.is_none_or(|uv| {
+                let present = mesh.texcoords[vertex as usize];
+                present == uv || present.abs_diff_eq(uv, SAME_PLACE)
+            })
         };
-        if has_them(vertex) {
+        if !is_covered && has_them(vertex) {
             return vertex;
         }
-        let others = self.repetitions.entry(vertex).or_default();
+        let others = self.copies.entry((vertex, is_covered)).or_default();
         if let Some(&other) = others.iter().find(|&&other| has_them(other)) {
             return other;
         }
         let other = mesh.positions.len() as u32;
         others.push(other);
         mesh.positions.push(mesh.positions[vertex as usize]);
-        mesh.texcoords.push(uv);
+        mesh.texcoords.extend(uv);
         mesh.repeated.push(vertex);
+        if is_covered {
+            mesh.covered.push(other);
+        }
         other
     }
 }
@@ -62,7 +77,8 @@ mod tests {
             ..DisplayMesh::default()
         };
         let mut seams = Seams::default();
-        let mut at = |vertex, u| seams.vertex_with(vertex, Vec2::new(u, 0.5), &mut mesh);
+        let mut at =
+            |vertex, u| seams.vertex_with(vertex, Some(Vec2::new(u, 0.5)), false, &mut mesh);
         assert_eq!((at(0, 0.0), at(1, 0.5)), (0, 1));
         // Rounding is no seam, a whole period is.
         assert_eq!((at(0, 1e-5), at(0, 1.0), at(0, 1.0)), (0, 2, 2));
@@ -73,5 +89,29 @@ mod tests {
         let mut light = vec![3.0, 4.0, 9.0, 9.0];
         mesh.repeat(&mut light);
         assert_eq!(light, [3.0, 4.0, 3.0, 3.0]);
+    }
+
+    #[test]
+    fn triangles_inside_solids_have_vertices_of_their_own_without_light() {
+        let mut mesh = DisplayMesh {
+            positions: vec![Vec3::X, Vec3::Y],
+            ..DisplayMesh::default()
+        };
+        let mut seams = Seams::default();
+        let mut at = |vertex, is_covered| seams.vertex_with(vertex, None, is_covered, &mut mesh);
+        assert_eq!((at(0, false), at(0, true), at(1, true)), (0, 2, 3));
+        assert_eq!((at(1, false), at(0, true), at(1, true)), (1, 2, 3));
+        (mesh.indices, mesh.normals) = (vec![[0, 1, 1], [2, 3, 3]], vec![Vec3::Z; 2]);
+        assert_eq!(
+            [0, 1].map(|triangle| mesh.is_covered(triangle)),
+            [false, true]
+        );
+        let (mut light, mut normals) = (vec![3.0, 4.0], mesh.normals.clone());
+        mesh.repeat_light(&mut light);
+        mesh.repeat(&mut normals);
+        assert_eq!(
+            (light, normals),
+            (vec![3.0, 4.0, 0.0, 0.0], vec![Vec3::Z; 4])
+        );
     }
 }
