@@ -199,26 +199,32 @@ fn what_lies_within_fine_solids_takes_no_light_from_the_room_about_them() {
     assert!(f64::from(most) < 1.025 * expected, "{most} of {expected}");
 }
 
+/// A white room with boxes in it, by their corners, under a lamp.
+fn white_room(boxes: &[[DVec3; 2]], settings: SolveSettings) -> Snapshot {
+    let mut builder = SceneBuilder::default();
+    let wall = Material::plain("wall", Vec3::splat(0.8), Vec3::ZERO);
+    let lamp = Material::plain("lamp", Vec3::ZERO, Vec3::splat(20.0));
+    let [wall, lamp] = [wall, lamp].map(|material| builder.push_material(material));
+    let room = [DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0)];
+    cuboid(&mut builder, room[0], room[1], true, wall);
+    for &[low, high] in boxes {
+        cuboid(&mut builder, low, high, false, wall);
+    }
+    let corner = DVec3::new(1.5, 2.99, 1.5);
+    rectangle(&mut builder, corner, [DVec3::X, DVec3::Z], lamp);
+    solved(builder, Sides::One, settings)
+}
+
 /// Elements that lie both behind a cabinet and beside it would send light into the gap behind it.
 #[test]
 fn furniture_just_before_the_walls_takes_no_more_light_than_at_the_walls() {
     let above = |gap: f64| {
-        let mut builder = SceneBuilder::default();
-        let wall = Material::plain("wall", Vec3::splat(0.8), Vec3::ZERO);
-        let lamp = Material::plain("lamp", Vec3::ZERO, Vec3::splat(20.0));
-        let [wall, lamp] = [wall, lamp].map(|material| builder.push_material(material));
-        let room = [DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0)];
-        cuboid(&mut builder, room[0], room[1], true, wall);
-        for [low, high] in [
+        let furniture = [
             [DVec3::new(gap, gap, 0.5), DVec3::new(0.5, 2.2, 1.5)],
             [DVec3::new(1.5, gap, gap), DVec3::new(2.5, 0.9, 0.6)],
             [DVec3::new(gap, 1.5, 2.5), DVec3::new(0.3, 1.53, 3.5)],
-        ] {
-            cuboid(&mut builder, low, high, false, wall);
-        }
-        let corner = DVec3::new(1.5, 2.99, 1.5);
-        rectangle(&mut builder, corner, [DVec3::X, DVec3::Z], lamp);
-        let snapshot = solved(builder, Sides::One, SolveSettings::normal());
+        ];
+        let snapshot = white_room(&furniture, SolveSettings::normal());
         let (mean, ..) = mean_irradiance(&snapshot, |at, normal| at.y > 2.995 && normal.y < -0.9);
         mean
     };
@@ -232,23 +238,13 @@ fn furniture_just_before_the_walls_takes_no_more_light_than_at_the_walls() {
 /// What lies on a floor, and in a stack, covers surfaces whose corners lie on outlines in the light.
 #[test]
 fn what_is_covered_shows_no_light() {
-    let mut builder = SceneBuilder::default();
-    let wall = Material::plain("wall", Vec3::splat(0.8), Vec3::ZERO);
-    let lamp = Material::plain("lamp", Vec3::ZERO, Vec3::splat(20.0));
-    let [wall, lamp] = [wall, lamp].map(|material| builder.push_material(material));
-    let room = [DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0)];
-    cuboid(&mut builder, room[0], room[1], true, wall);
     // Each reaches a little into what it lies on; the upper ones are smaller, so that all of a top is covered but a rim.
-    let mut height = 0.0;
-    for inset in [0.0, 0.02, 0.04, 0.06] {
-        let low = DVec3::new(1.0 + inset, height - 0.002, 1.0 + inset);
-        height += 0.02;
-        let high = DVec3::new(2.2 - inset, height, 1.8 - inset);
-        cuboid(&mut builder, low, high, false, wall);
-    }
-    let corner = DVec3::new(1.5, 2.99, 1.5);
-    rectangle(&mut builder, corner, [DVec3::X, DVec3::Z], lamp);
-    let snapshot = solved(builder, Sides::One, SolveSettings::draft());
+    let sheets = [0, 1, 2, 3].map(|place| {
+        let at = 0.02 * f64::from(place);
+        let low = DVec3::new(1.0 + at, at - 0.002, 1.0 + at);
+        [low, DVec3::new(2.2 - at, at + 0.02, 1.8 - at)]
+    });
+    let snapshot = white_room(&sheets, SolveSettings::draft());
     let light_within = |inset: f64, height: f64| {
         let is_within = |at: Vec3, normal: Vec3| {
             let at = at.as_dvec3();
@@ -264,8 +260,8 @@ fn what_is_covered_shows_no_light() {
     };
     let lit = light_within(0.06, 0.08);
     assert!(lit > 1.0, "{lit}");
-    for (inset, height) in [(0.0, 0.0), (0.02, 0.02), (0.04, 0.04), (0.06, 0.06)] {
-        let covered = light_within(inset, height);
+    for height in [0.0, 0.02, 0.04, 0.06] {
+        let covered = light_within(height, height);
         assert!(covered < 0.01 * lit, "{covered} at {height}, {lit} on top");
     }
 }

@@ -33,10 +33,10 @@ pub struct DisplayMesh {
     pub is_back: Vec<bool>,
     /// The element under each display triangle, as a node of the hierarchy.
     pub element_of: Vec<u32>,
-    /// The last vertices are copies of these, with the texture coordinates of the other side of a seam, or for what lies
-    /// inside a solid.
+    /// The last vertices are copies of these, with the texture coordinates of the other side of a seam, or for what is
+    /// covered.
     pub repeated: Vec<u32>,
-    /// Those of the copies, in order, of triangles inside solids, which no light reaches: they share no vertex with what
+    /// Those of the copies, in order, of triangles that are covered, which no light reaches: they share no vertex with what
     /// is lit beside them.
     pub covered: Vec<u32>,
 }
@@ -53,7 +53,7 @@ impl DisplayMesh {
         repetition.map_or(vertex, |place| self.repeated[place]) as usize
     }
 
-    /// Give copies the light of their vertices, and those inside solids none.
+    /// Give copies the light of their vertices, and those that are covered none.
     pub fn repeat_light<T: Copy + Default>(&self, values: &mut Vec<T>) {
         self.repeat(values);
         for &vertex in &self.covered {
@@ -61,7 +61,7 @@ impl DisplayMesh {
         }
     }
 
-    /// Whether a display triangle lies inside a solid.
+    /// Whether a display triangle is covered.
     pub fn is_covered(&self, triangle: usize) -> bool {
         let [vertex, ..] = self.indices[triangle];
         self.covered.binary_search(&vertex).is_ok()
